@@ -1,0 +1,66 @@
+"""Checked, read-only arrays: what every value of the package is made of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase.errors import InputError
+
+Array = npt.NDArray[np.float64]
+
+
+def read_only(value: Any) -> Array:
+    """A float64 copy of `value` that cannot be written to."""
+    array = np.array(value, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
+    """A read-only copy of `value`, after checking that it has `shape` (None = any length) and is finite.
+
+    Raises `InputError` with the name, the shape found and the shape wanted.
+    """
+    try:
+        array = read_only(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be numbers of shape {_shape_text(shape)}, not {value!r}.") from None
+    fits = array.ndim == len(shape) and all(
+        want is None or have == want for have, want in zip(array.shape, shape, strict=True)
+    )
+    if not fits:
+        unit_text = f" ({unit})" if unit else ""
+        raise InputError(f"{name} has shape {array.shape}; it must have shape {_shape_text(shape)}{unit_text}.")
+    if not np.all(np.isfinite(array)):
+        where = np.argwhere(~np.isfinite(array))[0]
+        at = ", ".join(str(i) for i in where)
+        raise InputError(f"{name} holds {array[tuple(where)]} at index [{at}]; every entry must be a finite number.")
+    return array
+
+
+def positive(name: str, value: Any, unit: str = "", allow_zero: bool = False) -> float:
+    """`value` as a float, after checking that it is a finite number above zero (or not below, with `allow_zero`)."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a number, not {value!r}.") from None
+    if not np.isfinite(number) or number < 0 or (number == 0 and not allow_zero):
+        bound = "≥ 0" if allow_zero else "> 0"
+        raise InputError(f"{name} is {number:g}; it must be {bound}{' ' + unit if unit else ''}.")
+    return number
+
+
+def unit_vector(name: str, value: Any) -> Array:
+    """`value` scaled to unit length, shape (3,); a zero vector is an `InputError`."""
+    vector = checked(name, value, (3,))
+    length = float(np.linalg.norm(vector))
+    if length < 1e-9:
+        raise InputError(f"{name} is the zero vector; it must have a direction.")
+    return read_only(vector / length)
+
+
+def _shape_text(shape: tuple[int | None, ...]) -> str:
+    return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"

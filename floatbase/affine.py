@@ -1,0 +1,211 @@
+"""The two values that everything else is written in: `Affine` maps and `Quadratic` costs.
+
+A task is a residual `Affine` with a weight; the space of motions is an `Affine` from β to (q̈, τ, λ); a cost seen from
+another space, (15) and (18), *is* composition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, checked, positive, read_only
+from floatbase.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Affine:
+    """The map x -> A x + b.
+
+    A: shape (m, n); b: shape (m,). `blocks` names slices of the output: `f["tau"]` is the `Affine` of those rows.
+    Raises `InputError` when the shapes do not fit or an entry is not finite.
+    """
+
+    A: Array
+    b: Array
+    blocks: Mapping[str, slice] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "A", checked("A", self.A, (None, None)))
+        object.__setattr__(self, "b", checked("b", self.b, (self.A.shape[0],)))
+        object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
+
+    @staticmethod
+    def linear(A: npt.ArrayLike) -> Affine:
+        """The map x -> A x."""
+        A = np.asarray(A, dtype=np.float64)
+        return Affine(A, np.zeros(A.shape[0]))
+
+    @staticmethod
+    def identity(n: int) -> Affine:
+        """The map x -> x on R^n."""
+        return Affine(np.eye(n), np.zeros(n))
+
+    @staticmethod
+    def constant(b: npt.ArrayLike, n: int) -> Affine:
+        """The map x -> b for every x in R^n."""
+        b = np.asarray(b, dtype=np.float64)
+        return Affine(np.zeros((b.size, n)), b)
+
+    @staticmethod
+    def stack(**parts: Affine) -> Affine:
+        """One map whose output is the outputs of `parts` one after the other, as blocks of those names."""
+        if not parts:
+            raise InputError("stack needs at least one map.")
+        widths = {name: f.n_in for name, f in parts.items()}
+        if len(set(widths.values())) > 1:
+            raise InputError(f"maps that are stacked must start from the same space; input sizes: {widths}.")
+        ends = np.cumsum([f.n_out for f in parts.values()])
+        blocks = {
+            name: slice(int(end) - f.n_out, int(end)) for (name, f), end in zip(parts.items(), ends, strict=True)
+        }
+        A = np.vstack([f.A for f in parts.values()])
+        return Affine(A, np.concatenate([f.b for f in parts.values()]), blocks)
+
+    @property
+    def n_in(self) -> int:
+        """Size of x."""
+        return int(self.A.shape[1])
+
+    @property
+    def n_out(self) -> int:
+        """Size of A x + b."""
+        return int(self.A.shape[0])
+
+    def __call__(self, x: npt.ArrayLike) -> Array:
+        """The value A x + b; x of shape (n,), or (n, N) for N points side by side."""
+        x = np.asarray(x, dtype=np.float64)
+        if x.ndim not in (1, 2) or x.shape[0] != self.n_in:
+            raise InputError(f"x has shape {x.shape}; this map takes shape ({self.n_in},) or ({self.n_in}, N).")
+        return self.A @ x + (self.b if x.ndim == 1 else self.b[:, None])
+
+    def __getitem__(self, block: str) -> Affine:
+        """The rows of one named block."""
+        if block not in self.blocks:
+            raise InputError(f"this map has no block {block!r}; its blocks are {list(self.blocks)}.")
+        rows = self.blocks[block]
+        return Affine(self.A[rows], self.b[rows])
+
+    def __matmul__(self, inner: Affine) -> Affine:
+        """Composition: (f @ g)(x) = f(g(x)). Keeps the block names of f."""
+        if not isinstance(inner, Affine):
+            return NotImplemented
+        if inner.n_out != self.n_in:
+            raise InputError(f"cannot compose: the inner map gives {inner.n_out} numbers, the outer takes {self.n_in}.")
+        return Affine(self.A @ inner.A, self.A @ inner.b + self.b, self.blocks)
+
+    def __add__(self, other: Affine | npt.ArrayLike) -> Affine:
+        """The sum of two maps with the same sizes, or of a map and a constant vector of shape (m,)."""
+        if isinstance(other, Affine):
+            if other.A.shape != self.A.shape:
+                raise InputError(f"cannot add maps of shapes {self.A.shape} and {other.A.shape}.")
+            return Affine(self.A + other.A, self.b + other.b, self.blocks)
+        return Affine(self.A, self.b + checked("the constant", other, (self.n_out,)), self.blocks)
+
+    def __sub__(self, other: Affine | npt.ArrayLike) -> Affine:
+        return self + (-1.0 * other if isinstance(other, Affine) else -np.asarray(other, dtype=np.float64))
+
+    def __rmul__(self, scale: float) -> Affine:
+        """The map x -> scale (A x + b)."""
+        if not np.isscalar(scale):
+            return NotImplemented
+        return Affine(float(scale) * self.A, float(scale) * self.b, self.blocks)
+
+    def __neg__(self) -> Affine:
+        return -1.0 * self
+
+    def __iter__(self) -> Iterator[Array]:
+        """Unpacks as `A, b = f`."""
+        return iter((self.A, self.b))
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """The cost x -> ½ xᵀ H x + gᵀ x + c.
+
+    H: shape (n, n), made symmetric; g: shape (n,); c: a number. Raises `InputError` when the shapes do not fit.
+    """
+
+    H: Array
+    g: Array
+    c: float = 0.0
+
+    def __post_init__(self) -> None:
+        g = checked("g", self.g, (None,))
+        H = checked("H", self.H, (g.size, g.size))
+        object.__setattr__(self, "g", g)
+        object.__setattr__(self, "H", read_only(0.5 * (H + H.T)))
+        object.__setattr__(self, "c", float(self.c))
+
+    @staticmethod
+    def from_residual(A: npt.ArrayLike, r: npt.ArrayLike, weight: float = 1.0) -> Quadratic:
+        """The cost (weight / 2) ‖A x - r‖²; A: shape (m, n), r: shape (m,)."""
+        A = checked("A", A, (None, None))
+        r = checked("r", r, (A.shape[0],))
+        w = positive("weight", weight, allow_zero=True)
+        return Quadratic(w * A.T @ A, -w * A.T @ r, 0.5 * w * float(r @ r))
+
+    @staticmethod
+    def of(residual: Affine, weight: float = 1.0) -> Quadratic:
+        """The cost (weight / 2) ‖residual(x)‖²."""
+        return Quadratic.from_residual(residual.A, -residual.b, weight)
+
+    @staticmethod
+    def zero(n: int) -> Quadratic:
+        """The cost that is zero everywhere on R^n."""
+        return Quadratic(np.zeros((n, n)), np.zeros(n))
+
+    @property
+    def n(self) -> int:
+        """Size of x."""
+        return int(self.g.size)
+
+    def __call__(self, x: npt.ArrayLike) -> float:
+        """The cost at x, shape (n,)."""
+        x = checked("x", x, (self.n,))
+        return float(0.5 * x @ self.H @ x + self.g @ x + self.c)
+
+    def gradient(self, x: npt.ArrayLike) -> Array:
+        """H x + g at x, shape (n,)."""
+        return self.H @ checked("x", x, (self.n,)) + self.g
+
+    def pullback(self, f: Affine) -> Quadratic:
+        """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)).
+
+        f: an `Affine` whose output is this cost's variable. Source: the document, §3.
+        """
+        if f.n_out != self.n:
+            raise InputError(f"cannot pull back: the map gives {f.n_out} numbers, the cost takes {self.n}.")
+        return Quadratic(f.A.T @ self.H @ f.A, f.A.T @ (self.H @ f.b + self.g), self(f.b))
+
+    def minimiser(self) -> Array:
+        """The minimiser of smallest norm, shape (n,).
+
+        Raises `InputError` where the cost has no minimum: a direction without curvature but with slope, or with
+        negative curvature.
+        """
+        values, vectors = np.linalg.eigh(self.H)
+        scale = float(np.abs(values).max(initial=0.0))
+        if values.size and values[0] < -1e-9 * scale:
+            raise InputError(f"the cost has no minimum: its smallest curvature is {values[0]:.3g}.")
+        curved = values > 1e-12 * scale
+        slope = vectors.T @ self.g
+        if np.any(np.abs(slope[~curved]) > 1e-7 * (1.0 + float(np.abs(self.g).max(initial=0.0)))):
+            raise InputError("the cost has no minimum: it falls for ever along a direction without curvature.")
+        return -vectors[:, curved] @ (slope[curved] / values[curved])
+
+    def __add__(self, other: Quadratic) -> Quadratic:
+        if not isinstance(other, Quadratic):
+            return NotImplemented
+        if other.n != self.n:
+            raise InputError(f"cannot add costs over {self.n} and {other.n} numbers.")
+        return Quadratic(self.H + other.H, self.g + other.g, self.c + other.c)
+
+    def __rmul__(self, scale: float) -> Quadratic:
+        if not np.isscalar(scale):
+            return NotImplemented
+        return Quadratic(float(scale) * self.H, float(scale) * self.g, float(scale) * self.c)

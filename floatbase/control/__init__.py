@@ -1,0 +1,1 @@
+"""Control as a quadratic program (§4, Appendices B and C of the document)."""

@@ -1,0 +1,217 @@
+"""`WholeBodyController`: (26)(27) assembled by `build_qp`, solved each tick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, positive, read_only
+from floatbase.control.friction import FrictionPolyhedron
+from floatbase.control.qp import QP, RANK_TOLERANCE, Solution, solve, solvers
+from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
+from floatbase.errors import InputError, unknown_name
+from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
+from floatbase.robots.robot import Robot
+from floatbase.robots.state import State
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the inequalities of (26)(27) are made of.
+
+    facets, inside: the friction polyhedron of every contact point (see `FrictionPolyhedron`). min_normal_force: N, for
+    normal · f ≥ min_normal_force at every point. torque_limits: shape (d,), N·m, +inf where there is none.
+    """
+
+    torque_limits: Array
+    facets: int = 4
+    inside: bool = True
+    min_normal_force: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Command:
+    """One answer of the controller.
+
+    tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the contact
+    forces planned with them. active: names of the inequality rows that push; multipliers: theirs, by name.
+    """
+
+    tau: Array
+    qdd: Array
+    forces: Array
+    solution: Solution
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Names of the inequality rows that push, such as "FL_foot facet 2" or "torque limit FL_calf_joint upper"."""
+        return self.solution.active
+
+    @property
+    def multipliers(self) -> dict[str, float]:
+        """Multiplier of each active row, by name."""
+        return self.solution.multipliers
+
+
+def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
+    """(26)(27) as a QP in x = (q̈, τ, λ).
+
+    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: the
+    friction polyhedron (28) and normal force of every contact point, and the torque limits. Source: the document, §4.1.
+
+    Where A of (5) loses rank (solo8 on four feet, straight knees) and the measured velocity is not quite one the contacts
+    allow, its rows contradict each other; then they are met as nearly as possible (least squares). Otherwise b stays as it is.
+    """
+    nv, d, k = eom.nv, eom.d, eom.k
+    blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
+    n = nv + d + k
+    H, g = np.zeros((n, n)), np.zeros(n)
+    for task in tasks:
+        part, residual = blocks[task.block], task.residual(eom, t)
+        H[part, part] += task.weight * residual.A.T @ residual.A
+        g[part] += task.weight * residual.A.T @ residual.b
+    A = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), d + k))]])
+    b = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=RANK_TOLERANCE)[0]
+    G_force, h_force, force_names = _force_rows(eom.contacts, limits)
+    G_torque, h_torque, torque_names = _torque_rows(eom.robot, limits)
+    G = np.zeros((len(G_force) + len(G_torque), n))
+    G[: len(G_force), blocks["forces"]] = G_force
+    G[len(G_force) :, blocks["tau"]] = G_torque
+    return QP(
+        H=H,
+        g=g,
+        A=A,
+        b=np.concatenate([-eom.h, b]),
+        G=G,
+        h=np.concatenate([h_force, h_torque]),
+        equality_names=_equality_names(eom),
+        inequality_names=force_names + torque_names,
+        blocks=blocks,
+    )
+
+
+def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
+    """Friction facets and normal force of every point: G λ ≤ h."""
+    per_point = limits.facets + 1
+    G = np.zeros((per_point * contacts.n_points, contacts.k))
+    h = np.zeros(len(G))
+    names: list[str] = []
+    for i, point in enumerate(contacts.point_names):
+        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
+        rows = slice(per_point * i, per_point * (i + 1))
+        G[rows, 3 * i : 3 * i + 3] = np.vstack([cone.rows, -cone.normal])
+        h[rows.stop - 1] = -limits.min_normal_force
+        names += [f"{point} {name}" for name in cone.names] + [f"{point} normal force"]
+    return G, h, tuple(names)
+
+
+def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
+    """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h."""
+    limited = np.flatnonzero(np.isfinite(limits.torque_limits))
+    rows = np.eye(robot.d)[limited]
+    bound = limits.torque_limits[limited]
+    names = tuple(
+        f"torque limit {robot.joint_names[i]} {side}" for side in ("upper", "lower") for i in limited
+    )
+    return np.vstack([rows, -rows]), np.concatenate([bound, bound]), names
+
+
+def _equality_names(eom: EquationsOfMotion) -> tuple[str, ...]:
+    """Names of the rows of (7)."""
+    base = [f"dynamics base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
+    joints = [f"dynamics {joint}" for joint in eom.robot.joint_names]
+    motion = []
+    for contact in eom.contacts:
+        motion += [f"motion {contact.name} {i}" for i in range(len(contact.constraint(eom.state)[1]))]
+    return tuple((base if eom.robot.is_floating else []) + joints + motion)
+
+
+class WholeBodyController:
+    """(26)(27) every tick: the torques that serve the tasks best while (7), friction, contact and motors allow them.
+
+    tasks: values of `floatbase.objectives.tasks` or anything of that form. When none of them regularises forces or torques,
+    a `ForceTask()` and a `TorqueTask()` with their small default weights are added, so that the answer is unique; `tasks`
+    shows all. facets, inside: the friction polyhedron. min_normal_force: N, at every contact point. torque_limits: N·m, one
+    number or (d,), the robot's by default; np.inf switches them off. solver: one of `floatbase.control.qp.solvers()`.
+    Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError` with the rows in conflict.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        contacts: Contacts,
+        tasks: Sequence[Task],
+        *,
+        facets: int = 4,
+        inside: bool = True,
+        min_normal_force: float = 0.0,
+        torque_limits: npt.ArrayLike | None = None,
+        solver: str = "daqp",
+    ):
+        if solver not in solvers():
+            raise unknown_name("solver", solver, solvers())
+        if not isinstance(contacts, Contacts):
+            raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(contacts).__name__}.")
+        self.robot = robot
+        self.contacts = contacts
+        self.tasks = _with_regularisation(tasks)
+        self.limits = Limits(
+            torque_limits=_limits(robot, torque_limits),
+            facets=FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets).facets,
+            inside=inside,
+            min_normal_force=positive("min_normal_force", min_normal_force, "N", allow_zero=True),
+        )
+        self.solver = solver
+        self.qp(robot.standing(), 0.0)  # names that do not exist and shapes that do not fit show now, not in the loop
+
+    def qp(self, state: State, t: float = 0.0) -> QP:
+        """The problem of one tick, to look at."""
+        return build_qp(equations_of_motion(state, self.contacts), self.tasks, self.limits, t)
+
+    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
+        """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
+        solution = solve(self.qp(State(self.robot, q, v), t), self.solver)
+        return Command(
+            tau=read_only(solution["tau"]),
+            qdd=read_only(solution["qdd"]),
+            forces=read_only(solution["forces"]),
+            solution=solution,
+        )
+
+    def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
+        """A new controller with other contacts or tasks and everything else as here."""
+        return WholeBodyController(
+            self.robot,
+            self.contacts if contacts is None else contacts,
+            self.tasks if tasks is None else tasks,
+            facets=self.limits.facets,
+            inside=self.limits.inside,
+            min_normal_force=self.limits.min_normal_force,
+            torque_limits=self.limits.torque_limits,
+            solver=self.solver,
+        )
+
+    def __repr__(self) -> str:
+        return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks)"
+
+
+def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
+    tasks = tuple(tasks)
+    for task in tasks:
+        if not isinstance(task, Task):
+            raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {task!r} is none.")
+    missing = [kind() for kind in (ForceTask, TorqueTask) if not any(task.block == kind.block for task in tasks)]
+    return tasks + tuple(missing)
+
+
+def _limits(robot: Robot, asked: npt.ArrayLike | None) -> Array:
+    if asked is None:
+        return robot.torque_limits
+    limits = np.broadcast_to(np.asarray(asked, dtype=np.float64), (robot.d,)) if np.ndim(asked) == 0 else asked
+    if np.shape(limits) != (robot.d,) or not np.all(np.asarray(limits) > 0):
+        raise InputError(f"torque_limits must be one number > 0 or {robot.d} of them (N·m).")
+    return read_only(limits)

@@ -1,0 +1,80 @@
+"""The constrained equations of motion (1)(4)(7) at one state, as one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, checked
+from floatbase.dynamics.contacts import Contacts
+from floatbase.errors import InputError
+from floatbase.robots.robot import Robot
+from floatbase.robots.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class EquationsOfMotion:
+    """(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
+
+    M: (nv, nv) inertia. h: (nv,) Coriolis, centrifugal and gravity forces. S: (nv, d) actuation (3).
+    J: (k, nv) Jacobian of the points where λ acts, world-aligned. A: (m, nv), b: (m,) the rows of (5), in m/s²; for point
+    contacts A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed base (1).
+    Source: the document, §1-§2.1.
+    """
+
+    state: State
+    contacts: Contacts
+    M: Array
+    h: Array
+    S: Array
+    J: Array
+    A: Array
+    b: Array
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that moves."""
+        return self.state.robot
+
+    @property
+    def nv(self) -> int:
+        """Length of q̈."""
+        return int(self.h.size)
+
+    @property
+    def d(self) -> int:
+        """Length of τ."""
+        return int(self.S.shape[1])
+
+    @property
+    def k(self) -> int:
+        """Length of λ."""
+        return int(self.J.shape[0])
+
+    def acceleration(self, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
+        """q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,): (4) solved for given torques and thruster-like forces."""
+        tau = checked("tau", tau, (self.d,), "N·m")
+        forces = checked("forces", np.ravel(forces), (self.k,), "N")
+        return np.linalg.solve(self.M, self.S @ tau + self.J.T @ forces - self.h)
+
+    def residual(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> tuple[Array, Array]:
+        """How far (q̈, τ, λ) is from satisfying (7): M q̈ + h - S τ - Jᵀ λ, shape (nv,), and A q̈ - b, shape (m,)."""
+        qdd = checked("qdd", qdd, (self.nv,))
+        tau = checked("tau", tau, (self.d,), "N·m")
+        forces = checked("forces", np.ravel(forces), (self.k,), "N")
+        return self.M @ qdd + self.h - self.S @ tau - self.J.T @ forces, self.A @ qdd - self.b
+
+
+def equations_of_motion(state: State, contacts: Contacts) -> EquationsOfMotion:
+    """(7) The constrained equations of motion of a state with contacts.
+
+    Raises `InputError` for values of another kind and `UnknownNameError` for a contact on a frame the robot lacks.
+    """
+    if not isinstance(state, State):
+        raise InputError(f"equations_of_motion needs a State first, not {type(state).__name__}.")
+    if not isinstance(contacts, Contacts):
+        raise InputError(f"equations_of_motion needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
+    A, b = contacts.constraint(state)
+    return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, contacts.jacobian(state), A, b)

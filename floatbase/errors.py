@@ -1,0 +1,59 @@
+"""Every error that `floatbase` raises on purpose, under one root.
+
+A message says what was wrong, what would be right, and what to do next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class FloatbaseError(Exception):
+    """Root of all errors of the package: `except fb.FloatbaseError` catches them all."""
+
+
+class InputError(FloatbaseError, ValueError):
+    """A value handed in cannot be used: wrong shape, NaN, a quaternion that is not of unit length, μ ≤ 0, …"""
+
+
+class UnknownNameError(FloatbaseError, KeyError):
+    """A robot, frame, task or back end of that name does not exist; the message lists the near ones."""
+
+    def __str__(self) -> str:  # KeyError would print the repr of the message
+        return str(self.args[0])
+
+
+class InfeasibleError(FloatbaseError):
+    """No point satisfies all rows of a quadratic program.
+
+    `rows` holds the names of a smallest set of rows in conflict: drop any one of them and the others can be met.
+    """
+
+    def __init__(self, message: str, rows: Iterable[str] = ()):
+        super().__init__(message)
+        self.rows = tuple(rows)
+
+
+class SolverError(FloatbaseError):
+    """A solver gave up (iteration limit, cycling, not convex) although the problem was not shown to be infeasible."""
+
+
+class SimulationError(FloatbaseError):
+    """The physics cannot be built or stepped as asked."""
+
+
+class ViewerError(FloatbaseError):
+    """The picture cannot be made: port taken, no browser connected, …"""
+
+
+def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:
+    """An `UnknownNameError` that lists the names nearest to `name` (or all of them when there are few)."""
+    known = sorted(known)
+    near = get_close_matches(str(name), known, n=5, cutoff=0.5)
+    near = near or [k for k in known if str(name).lower() in k.lower()][:5]
+    if near:
+        listed = "near names: " + ", ".join(near)
+    else:
+        listed = "known: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
+    return UnknownNameError(f"unknown {kind} {name!r}; {listed}." + (f" {hint}" if hint else ""))

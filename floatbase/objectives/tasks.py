@@ -1,0 +1,256 @@
+"""Tasks: what a controller should bring about, each a weighted affine residual in q̈, τ or λ.
+
+Residual = actual - desired. A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of
+position and velocity, so its residual is J q̈ + J̇ q̇ - a. Its cost is (weight / 2) ‖residual‖², a term of ψ in (26).
+
+A target is a value, or a function of the time t in s that gives one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, positive
+from floatbase.affine import Affine
+from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.errors import InputError
+from floatbase.robots.state import State
+
+Block: TypeAlias = Literal["qdd", "tau", "forces"]
+Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
+_ZERO3 = (0.0, 0.0, 0.0)
+
+
+@runtime_checkable
+class Task(Protocol):
+    """A weighted residual on one block of x = (q̈, τ, λ)."""
+
+    block: ClassVar[Block]
+
+    @property
+    def name(self) -> str:
+        """Name in messages and tables."""
+
+    @property
+    def weight(self) -> float:
+        """Weight of ½‖residual‖² in the objective."""
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """The residual as an `Affine` of the task's block at time t."""
+
+
+def _value(name: str, target: Target, t: float, shape: tuple[int, ...]) -> Array:
+    return checked(name, target(t) if callable(target) else target, shape)
+
+
+def _check_gains(name: str, kp: float, kd: float | None, weight: float) -> None:
+    positive(f"kp of {name}", kp, "1/s²", allow_zero=True)
+    if kd is not None:
+        positive(f"kd of {name}", kd, "1/s", allow_zero=True)
+    positive(f"weight of {name}", weight, allow_zero=True)
+
+
+def _fixed(name: str, target: Target, shape: tuple[int, ...]) -> Target:
+    """The target, checked and copied at once when it does not move."""
+    return target if callable(target) else checked(name, target, shape)
+
+
+def _damping(kp: float, kd: float | None) -> float:
+    """kd, critically damped when none is given: 2 √kp."""
+    return 2.0 * float(np.sqrt(kp)) if kd is None else kd
+
+
+@dataclass(frozen=True, eq=False)
+class CoMTask:
+    """Bring the centre of mass to a position, shape (3,), m, world; residual in q̈, m/s².
+
+    velocity [m/s] and acceleration [m/s²], shape (3,), world: those of a moving target. kp [1/s²], kd [1/s]: gains; kd is
+    critically damped by default.
+    """
+
+    position: Target
+    velocity: Target = _ZERO3
+    acceleration: Target = _ZERO3
+    kp: float = 100.0
+    kd: float | None = None
+    weight: float = 10.0
+    name: str = "centre of mass"
+    block: ClassVar[Block] = "qdd"
+
+    def __post_init__(self) -> None:
+        _check_gains(self.name, self.kp, self.kd, self.weight)
+        for part in ("position", "velocity", "acceleration"):
+            object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """J_com q̈ + J̇_com q̇ - a, shape (3,), m/s²."""
+        state = eom.state
+        e = state.com - _value("position", self.position, t, (3,))
+        e_dot = state.com_velocity - _value("velocity", self.velocity, t, (3,))
+        feed = _value("acceleration", self.acceleration, t, (3,))
+        return _motion_residual(state.com_jacobian, state.com_drift, feed, self.kp, self.kd, e, e_dot)
+
+
+@dataclass(frozen=True, eq=False)
+class OrientationTask:
+    """Bring a frame to an orientation R_world_frame, shape (3, 3); residual in q̈, rad/s².
+
+    frame: its name; "base" is the base link. The error is e = log(R R_desiredᵀ), rad, world-aligned.
+    angular_velocity [rad/s], angular_acceleration [rad/s²], shape (3,), world: those of a moving target.
+    """
+
+    frame: str = "base"
+    rotation: Target = field(default_factory=lambda: np.eye(3))
+    angular_velocity: Target = _ZERO3
+    angular_acceleration: Target = _ZERO3
+    kp: float = 100.0
+    kd: float | None = None
+    weight: float = 10.0
+    block: ClassVar[Block] = "qdd"
+
+    def __post_init__(self) -> None:
+        _check_gains(self.name, self.kp, self.kd, self.weight)
+        object.__setattr__(self, "rotation", _fixed(f"rotation of {self.name}", self.rotation, (3, 3)))
+        if not callable(self.rotation):
+            _check_rotation(self.name, np.asarray(self.rotation))
+        for part in ("angular_velocity", "angular_acceleration"):
+            object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
+
+    @property
+    def name(self) -> str:
+        """orientation of the frame."""
+        return f"orientation of {self.frame}"
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """J_ω q̈ + J̇_ω q̇ - α, shape (3,), rad/s², world-aligned."""
+        state = eom.state
+        wanted = _value("rotation", self.rotation, t, (3, 3))
+        _check_rotation(self.name, wanted)
+        e = pin.log3(state.frame_pose(self.frame).rotation @ wanted.T)
+        e_dot = state.frame_velocity(self.frame)[3:] - _value("angular velocity", self.angular_velocity, t, (3,))
+        feed = _value("angular acceleration", self.angular_acceleration, t, (3,))
+        J, drift = state.frame_jacobian(self.frame)[3:], state.frame_drift(self.frame)[3:]
+        return _motion_residual(J, drift, feed, self.kp, self.kd, e, e_dot)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTask:
+    """Bring a frame's origin to a position, shape (3,), m, world; residual in q̈, m/s². A foot that swings, a hand.
+
+    velocity [m/s] and acceleration [m/s²], shape (3,), world: those of a moving target.
+    """
+
+    frame: str
+    position: Target
+    velocity: Target = _ZERO3
+    acceleration: Target = _ZERO3
+    kp: float = 400.0
+    kd: float | None = None
+    weight: float = 10.0
+    block: ClassVar[Block] = "qdd"
+
+    def __post_init__(self) -> None:
+        _check_gains(self.name, self.kp, self.kd, self.weight)
+        for part in ("position", "velocity", "acceleration"):
+            object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
+
+    @property
+    def name(self) -> str:
+        """position of the frame."""
+        return f"position of {self.frame}"
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """J q̈ + J̇ q̇ - a, shape (3,), m/s², world-aligned."""
+        state = eom.state
+        e = state.point(self.frame) - _value("position", self.position, t, (3,))
+        e_dot = state.frame_velocity(self.frame)[:3] - _value("velocity", self.velocity, t, (3,))
+        feed = _value("acceleration", self.acceleration, t, (3,))
+        J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
+        return _motion_residual(J, drift, feed, self.kp, self.kd, e, e_dot)
+
+
+@dataclass(frozen=True, eq=False)
+class PostureTask:
+    """Bring the joints to those of a configuration q, shape (nq,) (its base part does not count); residual in q̈, rad/s²."""
+
+    q: Target
+    kp: float = 100.0
+    kd: float | None = None
+    weight: float = 0.1
+    name: str = "posture"
+    block: ClassVar[Block] = "qdd"
+
+    def __post_init__(self) -> None:
+        _check_gains(self.name, self.kp, self.kd, self.weight)
+        if not callable(self.q):
+            object.__setattr__(self, "q", checked("q of posture", self.q, (None,)))
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """q̈_joints - a, shape (d,), rad/s²."""
+        state, robot = eom.state, eom.robot
+        e = state.difference(_value("q of posture", self.q, t, (robot.nq,)))[-robot.d :]
+        e_dot = state.v[-robot.d :]
+        return _motion_residual(robot.S.T, np.zeros(robot.d), np.zeros(robot.d), self.kp, self.kd, e, e_dot)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceTask:
+    """Keep contact forces near a target, shape (k,), N, world, zero by default; residual in λ, N.
+
+    With a small weight this is the force regularisation that chooses among forces of equal wrench.
+    """
+
+    target: Target | None = None
+    weight: float = 1e-5
+    name: str = "force regularisation"
+    block: ClassVar[Block] = "forces"
+
+    def __post_init__(self) -> None:
+        positive(f"weight of {self.name}", self.weight, allow_zero=True)
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """λ - target, shape (k,), N."""
+        wanted = np.zeros(eom.k) if self.target is None else _value("target forces", self.target, t, (eom.k,))
+        return Affine.identity(eom.k) - wanted
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueTask:
+    """Keep joint torques near a target, shape (d,), N·m, zero by default; residual in τ, N·m."""
+
+    target: Target | None = None
+    weight: float = 1e-5
+    name: str = "torque regularisation"
+    block: ClassVar[Block] = "tau"
+
+    def __post_init__(self) -> None:
+        positive(f"weight of {self.name}", self.weight, allow_zero=True)
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """τ - target, shape (d,), N·m."""
+        wanted = np.zeros(eom.d) if self.target is None else _value("target torques", self.target, t, (eom.d,))
+        return Affine.identity(eom.d) - wanted
+
+
+def standing_tasks(state: State) -> tuple[Task, ...]:
+    """The tasks that keep a robot where `state` has it: centre of mass, base orientation, posture."""
+    rotation = state.frame_pose("base").rotation
+    return (CoMTask(state.com), OrientationTask("base", rotation), PostureTask(state.q))
+
+
+def _motion_residual(
+    J: Array, drift: Array, feed: Array, kp: float, kd: float | None, e: Array, e_dot: Array
+) -> Affine:
+    """J q̈ + J̇ q̇ - (a_ff - kp e - kd ė)."""
+    return Affine(J, drift - feed + kp * e + _damping(kp, kd) * e_dot)
+
+
+def _check_rotation(name: str, R: Array) -> None:
+    if not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
+        raise InputError(f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, determinant +1.")

@@ -1,0 +1,204 @@
+"""What can be loaded: the catalogue, and any other robot of example-robot-data once its feet are given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, positive, read_only
+from floatbase.errors import InputError, unknown_name
+from floatbase.robots.robot import Foot, Robot
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the catalogue adds to a robot of example-robot-data: its feet, true torque limits, and what it is for."""
+
+    description: str
+    feet: tuple[Foot, ...] = ()
+    torque_limit: float | None = None
+    joints: Mapping[str, float] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+
+def _balls(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Foot, ...]:
+    return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
+
+
+def _soles(frames: Sequence[str], x: tuple[float, float], y: tuple[float, float]) -> tuple[Foot, ...]:
+    corners = np.array([[x[1], y[1], 0.0], [x[1], y[0], 0.0], [x[0], y[0], 0.0], [x[0], y[1], 0.0]])
+    return tuple(Foot(frame, corners=corners) for frame in frames)
+
+
+_SOLO_FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
+_SOLO_SOURCES = {
+    "foot radius": "half the width of the foot's mesh in example-robot-data",
+    "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular robot architecture, 2020 "
+    "(the URDF says 1000 N·m, which no motor of this size gives)",
+}
+
+CATALOGUE: Mapping[str, Entry] = {
+    "go2": Entry(
+        "quadruped with 3 joints a leg: as many leg torques as contact forces",
+        _balls(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022),
+        sources={"foot radius": "the foot's mesh in example-robot-data", "torque limits": "URDF"},
+    ),
+    "solo12": Entry(
+        "small quadruped with 3 joints a leg, weak motors: torque limits are near",
+        _balls(_SOLO_FEET, 0.016),
+        torque_limit=2.7,
+        sources=_SOLO_SOURCES,
+    ),
+    "solo8": Entry(
+        "small quadruped with 2 joints a leg: fewer torques than contact forces",
+        _balls(_SOLO_FEET, 0.016),
+        torque_limit=2.7,
+        sources=_SOLO_SOURCES,
+    ),
+    "anymal_kinova": Entry(
+        "quadruped with an arm: more torques than contact forces",
+        _balls(("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), 0.031, (0.0, 0.0, 0.02325)),
+        sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
+    ),
+    "talos": Entry(
+        "humanoid with flat feet: each foot carries a wrench through its corners",
+        _soles(("left_sole_link", "right_sole_link"), (-0.1, 0.1), (-0.06, 0.06)),
+        sources={"sole": "20 cm × 12 cm, within the ankle's collision mesh", "torque limits": "URDF"},
+    ),
+    "ur5": Entry(
+        "arm bolted to the ground: the fixed-base equations (1)",
+        joints={"shoulder_lift_joint": -1.3, "elbow_joint": 1.6, "wrist_1_joint": -0.3, "wrist_2_joint": 0.0},
+        sources={"torque limits": "URDF"},
+    ),
+}
+
+
+def robots() -> dict[str, str]:
+    """The catalogue: name -> what the robot is for. `load` also takes the other names of example-robot-data."""
+    return {name: entry.description for name, entry in CATALOGUE.items()}
+
+
+def load(
+    name: str,
+    *,
+    feet: Sequence[str | Foot] | None = None,
+    foot_radius: float | None = None,
+    torque_limits: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | None = None,
+) -> Robot:
+    """Load a robot by name.
+
+    name: one of `robots()`, or any other robot of example-robot-data that has a URDF.
+    feet: frames (or `Foot` values) that can touch the ground; by default as the catalogue has them. A floating-base robot
+    outside the catalogue needs them. foot_radius: radius of the feet given as frames, m, 0 by default.
+    torque_limits: one number or shape (d,), N·m; by default those of the catalogue or the URDF.
+    posture: shape (nq,), a configuration to stand in; by default the one that comes with the robot.
+    Raises `UnknownNameError` with the near names, and `InputError` for feet or limits that do not fit.
+    """
+    loader = _loader(name)
+    entry = CATALOGUE.get(name)
+    root = Path(loader.model_root)
+    model = pin.buildModelFromUrdf(
+        str(root / loader.urdf), *([pin.JointModelFreeFlyer()] if loader.free_flyer else [])
+    )
+    posture = _posture(model, loader, entry, posture)
+    limits = _torque_limits(model, loader.free_flyer, entry, torque_limits)
+    robot = Robot(
+        name=name,
+        model=model,
+        urdf=root / loader.urdf,
+        package_dirs=(root.parent.parent, root),
+        feet=_feet(name, entry, feet, foot_radius, loader.free_flyer),
+        torque_limits=limits,
+        posture=posture,
+        description=entry.description if entry else "",
+        sources=entry.sources if entry else {},
+    )
+    for foot in robot.feet:
+        robot.frame_id(foot.frame)
+    return robot
+
+
+@dataclass(frozen=True)
+class _Loader:
+    """Where example-robot-data keeps a robot."""
+
+    model_root: str
+    urdf: str
+    srdf: str
+    reference: str | None
+    free_flyer: bool
+    rotors: bool
+
+
+def _loader(name: str) -> _Loader:
+    import example_robot_data as data
+
+    known = data.robots_loader.ROBOTS
+    if name not in known:
+        raise unknown_name("robot", name, known, "fb.robots() says what the catalogue's robots are for.")
+    loader: Any = known[name]
+    if not loader.urdf_filename:
+        raise InputError(f"{name} comes as an SDF file; floatbase reads URDF. Choose one of {', '.join(CATALOGUE)}.")
+    urdf = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
+    srdf = f"{loader.path}/{loader.srdf_subpath}/{loader.srdf_filename}" if loader.srdf_filename else ""
+    root = Path(data.getModelPath(urdf)).resolve()
+    return _Loader(str(root), urdf, srdf, loader.ref_posture, loader.free_flyer, loader.has_rotor_parameters)
+
+
+def _posture(model: pin.Model, loader: _Loader, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:
+    """The posture asked for, or the reference of the SRDF with the catalogue's joint angles on top; loads rotor inertia too."""
+    q = pin.neutral(model)
+    if loader.srdf:
+        srdf = str(Path(loader.model_root) / loader.srdf)
+        if loader.rotors:
+            pin.loadRotorParameters(model, srdf, False)
+            model.armature = model.rotorInertia * model.rotorGearRatio**2
+        pin.loadReferenceConfigurations(model, srdf, False)
+        references = {entry.key(): entry.data() for entry in model.referenceConfigurations}
+        q = references.get(loader.reference, q)
+    if asked is not None:
+        q = checked("posture", asked, (model.nq,))
+    elif entry is not None:
+        q = q.copy()
+        for joint, angle in entry.joints.items():
+            q[model.idx_qs[model.getJointId(joint)]] = angle
+    return read_only(pin.normalize(model, np.array(q)))
+
+
+def _torque_limits(
+    model: pin.Model, free_flyer: bool, entry: Entry | None, asked: npt.ArrayLike | None
+) -> Array:
+    d = model.nv - (6 if free_flyer else 0)
+    if asked is not None:
+        limits = np.broadcast_to(np.asarray(asked, dtype=np.float64), (d,)) if np.ndim(asked) == 0 else asked
+        limits = np.array(limits, dtype=np.float64)
+        if limits.shape != (d,) or not np.all(limits > 0):
+            raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); got shape {limits.shape}.")
+        return read_only(limits)
+    if entry is not None and entry.torque_limit is not None:
+        return read_only(np.full(d, entry.torque_limit))
+    effort = np.array(model.effortLimit)[model.nv - d :]
+    return read_only(np.where(effort > 0, effort, np.inf))  # URDF writers put 0 where they do not know
+
+
+def _feet(
+    name: str, entry: Entry | None, asked: Sequence[str | Foot] | None, radius: float | None, free_flyer: bool
+) -> tuple[Foot, ...]:
+    if asked is None:
+        if entry is None and free_flyer:
+            raise InputError(
+                f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be given: "
+                f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02).'
+            )
+        return entry.feet if entry else ()
+    if isinstance(asked, str):
+        raise InputError(f'feet must be a list of frames, as in feet=["{asked}"].')
+    r = 0.0 if radius is None else positive("foot_radius", radius, "m", allow_zero=True)
+    return tuple(foot if isinstance(foot, Foot) else Foot(foot, r) for foot in asked)

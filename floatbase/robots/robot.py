@@ -1,0 +1,191 @@
+"""A robot: floating or fixed base, feet, standing posture, torque limits, S of (2)(3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, positive, read_only
+from floatbase.errors import InputError, unknown_name
+
+if TYPE_CHECKING:
+    from floatbase.robots.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class Foot:
+    """Where a robot can touch the ground.
+
+    frame: name of the frame that carries the foot. A ball foot has a `radius` in m and the ball's `centre`, shape (3,)
+    in m, in that frame. A flat foot has `corners`, shape (n, 3) in m, in that frame, whose z axis points out of the
+    ground when the foot stands; its radius is 0.
+    """
+
+    frame: str
+    radius: float = 0.0
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    corners: Array | None = None
+
+    def __post_init__(self) -> None:
+        positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True)
+        object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
+        if self.corners is not None:
+            corners = checked(f"corners of foot {self.frame}", self.corners, (None, 3), "m")
+            if len(corners) < 3:
+                raise InputError(f"foot {self.frame} has {len(corners)} corners; a flat foot needs at least 3.")
+            object.__setattr__(self, "corners", corners)
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the foot stands on its corners rather than on a point."""
+        return self.corners is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot as the equations need it. Made by `load`; nothing in it changes afterwards.
+
+    model: the Pinocchio model; q = (base position [m, world], base quaternion x y z w, joints), or joints alone.
+    torque_limits: shape (d,), N·m (N for prismatic joints), +inf where none is known.
+    posture: shape (nq,), a configuration to stand in, before the feet are put on the ground.
+    """
+
+    name: str
+    model: pin.Model
+    urdf: Path
+    package_dirs: tuple[Path, ...]
+    feet: tuple[Foot, ...]
+    torque_limits: Array
+    posture: Array
+    description: str = ""
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def is_floating(self) -> bool:
+        """Whether the base is free to move: nv = d + 6 rather than d."""
+        return self.model.njoints > 1 and self.model.joints[1].shortname() == "JointModelFreeFlyer"
+
+    @property
+    def nq(self) -> int:
+        """Length of q."""
+        return int(self.model.nq)
+
+    @property
+    def nv(self) -> int:
+        """Length of v, of q̈ and of each row of J: d + 6 for a floating base, d for a fixed one."""
+        return int(self.model.nv)
+
+    @property
+    def d(self) -> int:
+        """Number of actuated joints: the length of τ."""
+        return self.nv - (6 if self.is_floating else 0)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the actuated joints, in the order of τ."""
+        first = 2 if self.is_floating else 1
+        return tuple(self.model.names[i] for i in range(first, self.model.njoints))
+
+    @cached_property
+    def S(self) -> Array:
+        """(2)(3) The actuation matrix, shape (nv, d): S τ puts zeros where no motor acts. Source: the document, §2."""
+        S = np.zeros((self.nv, self.d))
+        S[self.nv - self.d :] = np.eye(self.d)
+        return read_only(S)
+
+    @cached_property
+    def mass(self) -> float:
+        """Total mass, kg."""
+        return float(sum(inertia.mass for inertia in self.model.inertias))
+
+    @property
+    def gravity(self) -> float:
+        """Size of the acceleration of gravity, m/s²."""
+        return float(np.linalg.norm(self.model.gravity.linear))
+
+    @property
+    def weight(self) -> float:
+        """Total weight, N."""
+        return self.mass * self.gravity
+
+    @cached_property
+    def base(self) -> str:
+        """Name of the base link's frame."""
+        root = 1 if self.is_floating else 0
+        for frame in self.model.frames:
+            if frame.type == pin.FrameType.BODY and frame.parentJoint == root:
+                return str(frame.name)
+        return str(self.model.frames[0].name)
+
+    @cached_property
+    def frames(self) -> tuple[str, ...]:
+        """Names of all frames that can be asked for: bodies, joints and fixed frames."""
+        return tuple(str(f.name) for f in self.model.frames if f.name != "universe")
+
+    def frame_id(self, frame: str) -> int:
+        """Pinocchio's number of a frame; "base" stands for the base link on every robot.
+
+        Raises `UnknownNameError` with the near names.
+        """
+        for name in (frame, self.base if frame == "base" else None):
+            if isinstance(name, str) and self.model.existFrame(name):
+                return int(self.model.getFrameId(name))
+        raise unknown_name(f"frame of {self.name}", frame, self.frames, "robot.frames lists them all.")
+
+    def foot(self, frame: str) -> Foot:
+        """The foot carried by a frame; a frame that is no foot gives a point foot of radius 0 at its origin."""
+        self.frame_id(frame)
+        for foot in self.feet:
+            if foot.frame == frame:
+                return foot
+        return Foot(frame)
+
+    def neutral(self) -> State:
+        """The state with all joints at zero and the base at the world's origin, at rest."""
+        from floatbase.robots.state import State
+
+        return State(self, pin.neutral(self.model), np.zeros(self.nv))
+
+    def standing(self, height: float | None = None) -> State:
+        """A state at rest with every foot on the ground z = 0.
+
+        height: how far above the ground the base's origin should be, m; by default as the posture has it. Found by
+        Gauss-Newton steps of smallest size from the robot's posture. Raises `InputError` when the feet cannot get there.
+        A fixed-base robot, or one without feet, gets its posture.
+        """
+        from floatbase.robots.standing import stand
+
+        return stand(self, height)
+
+    def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:
+        """A random state around standing, the same for the same seed.
+
+        spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with that
+        deviation in rad/s and m/s. Joint limits are kept.
+        """
+        from floatbase.robots.state import State
+
+        rng = np.random.default_rng(seed)
+        spread = positive("spread", spread, allow_zero=True)
+        step = rng.uniform(-spread, spread, self.nv)
+        q = pin.integrate(self.model, self.standing().q, step)
+        single = np.array([self.model.nqs[i] == 1 for i in range(self.model.njoints)])
+        for i in np.flatnonzero(single):
+            at = self.model.idx_qs[int(i)]
+            q[at] = np.clip(q[at], self.model.lowerPositionLimit[at], self.model.upperPositionLimit[at])
+        return State(self, q, spread * rng.standard_normal(self.nv))
+
+    def torque_violation(self, tau: npt.ArrayLike) -> float:
+        """How far the worst joint is over its limit, N·m; negative when all are within."""
+        return float(np.max(np.abs(checked("tau", tau, (self.d,), "N·m")) - self.torque_limits))
+
+    def __repr__(self) -> str:
+        base = "floating" if self.is_floating else "fixed"
+        return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"

@@ -1,0 +1,76 @@
+"""A standing state: every foot on the ground, found by steps of smallest size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from floatbase._arrays import Array
+from floatbase.errors import InputError
+from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.state import State
+
+_TOLERANCE = 1e-11  # m and rad
+_STEPS = 50
+
+
+def stand(robot: Robot, height: float | None = None) -> State:
+    """The standing state nearest to `robot.posture`, at rest; see `Robot.standing`."""
+    posture = State(robot, robot.posture)
+    if not robot.is_floating or not robot.feet:
+        return posture
+    q = posture.q.copy()
+    q[2] = height if height is not None else q[2] - min(_sole_height(posture, foot) for foot in robot.feet)
+    state = State(robot, q)
+    for _ in range(_STEPS):
+        error, J = _gap(state, posture, height)
+        if np.max(np.abs(error)) < _TOLERANCE:
+            return state
+        step = -np.linalg.pinv(J, rcond=1e-9) @ error
+        state = State(robot, pin.integrate(robot.model, state.q, np.clip(step, -0.2, 0.2)))
+    raise InputError(
+        f"{robot.name} cannot put all its feet on the ground"
+        + (f" with its base {height:g} m above it" if height is not None else "")
+        + f": {np.max(np.abs(error)):.2g} m is left. Ask for another height, or load it with another posture."
+    )
+
+
+def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Array]:
+    """What must be zero when the robot stands, and its Jacobian.
+
+    Soles at z = 0 and level; the base where the posture has it, but for its height, which follows the feet or is given.
+    """
+    errors: list[float] = []
+    rows: list[Array] = []
+    for foot in state.robot.feet:
+        errors.append(_sole_height(state, foot))
+        rows.append(_sole_jacobian(state, foot)[2])
+        if foot.is_flat:
+            up = state.frame_pose(foot.frame).rotation[:, 2]
+            errors += [up[0], up[1]]
+            rows += list((-pin.skew(up) @ state.frame_jacobian(foot.frame)[3:])[:2])  # d(up)/dt = ω × up
+    R = state.frame_pose("base").rotation
+    J_base = np.eye(state.robot.nv)[:6]
+    errors += list(pin.log3(posture.frame_pose("base").rotation.T @ R))
+    rows += list(J_base[3:])
+    place = state.q[:3] - posture.q[:3] if height is None else state.q[:3] - [*posture.q[:2], height]
+    kept = 2 if height is None else 3
+    errors += list(place[:kept])
+    rows += list((R @ J_base[:3])[:kept])
+    return np.array(errors), np.array(rows)
+
+
+def _sole_offset(foot: Foot) -> Array:
+    """The point of the foot whose height counts, in the foot's frame: the ball's centre or the middle of the corners."""
+    return foot.centre if foot.corners is None else foot.corners.mean(axis=0)
+
+
+def _sole_height(state: State, foot: Foot) -> float:
+    """Height of the foot's lowest point above z = 0, m."""
+    return float(state.point(foot.frame, _sole_offset(foot))[2] - foot.radius)
+
+
+def _sole_jacobian(state: State, foot: Foot) -> Array:
+    """Jacobian of the point whose height counts, shape (3, nv)."""
+    J = state.frame_jacobian(foot.frame)
+    return J[:3] - pin.skew(state.frame_pose(foot.frame).rotation @ _sole_offset(foot)) @ J[3:]

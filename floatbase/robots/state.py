@@ -1,0 +1,130 @@
+"""`State(robot, q, v)`: where a robot is and how it moves; validated, immutable, kinematics computed once."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, read_only
+from floatbase.errors import InputError
+from floatbase.robots.robot import Robot
+
+WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class State:
+    """A configuration q and a velocity v of a robot, and all that follows from them alone.
+
+    q: shape (nq,): base position [m, world], base quaternion x y z w, joints [rad or m].
+    v: shape (nv,): base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint velocities.
+    Jacobians, velocities and drifts of frames are given in the world-aligned frame at the point asked for.
+    Raises `InputError` for wrong shapes, entries that are not finite and quaternions that are not of unit length.
+    """
+
+    def __init__(self, robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike | None = None):
+        if not isinstance(robot, Robot):
+            raise InputError(f"State needs a Robot first, as in State(robot, q, v), not {type(robot).__name__}.")
+        self.robot = robot
+        self.q = checked("q", q, (robot.nq,))
+        self.v = checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,))
+        if robot.is_floating:
+            length = float(np.linalg.norm(self.q[3:7]))
+            if abs(length - 1.0) > 1e-6:
+                raise InputError(
+                    f"the base quaternion q[3:7] (x y z w) has length {length:.6g}; it must be 1. "
+                    "Divide it by its length, or use robot.standing()."
+                )
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        """Pinocchio's results at (q, v) with zero acceleration: never handed out, never computed again."""
+        model = self.robot.model
+        data = model.createData()
+        pin.computeAllTerms(model, data, self.q, self.v)
+        # after computeAllTerms: accelerations at q̈ = 0 are the drifts J̇ v
+        pin.forwardKinematics(model, data, self.q, self.v, np.zeros(model.nv))
+        pin.centerOfMass(model, data, self.q, self.v, np.zeros(model.nv))
+        pin.updateFramePlacements(model, data)
+        return data
+
+    @cached_property
+    def M(self) -> Array:
+        """The generalised inertia matrix M(q) of (1), shape (nv, nv), symmetric positive definite, rotor inertia included."""
+        upper = np.triu(self._data.M)
+        return read_only(upper + np.triu(upper, 1).T)
+
+    @cached_property
+    def h(self) -> Array:
+        """The generalised bias force h(q, q̇) of (1), shape (nv,): Coriolis, centrifugal and gravity."""
+        return read_only(self._data.nle)
+
+    @cached_property
+    def com(self) -> Array:
+        """Centre of mass, shape (3,), m, world."""
+        return read_only(self._data.com[0])
+
+    @cached_property
+    def com_velocity(self) -> Array:
+        """Velocity of the centre of mass, shape (3,), m/s, world."""
+        return read_only(self._data.vcom[0])
+
+    @cached_property
+    def com_jacobian(self) -> Array:
+        """Jacobian of the centre of mass, shape (3, nv): com_velocity = com_jacobian v."""
+        return read_only(self._data.Jcom)
+
+    @cached_property
+    def com_drift(self) -> Array:
+        """J̇ v of the centre of mass, shape (3,), m/s²: its acceleration when q̈ = 0."""
+        return read_only(self._data.acom[0])
+
+    @cached_property
+    def joint_transforms(self) -> Array:
+        """World poses of Pinocchio's joints, shape (njoints, 4, 4), index = joint number (0 = the world)."""
+        return read_only([placement.homogeneous for placement in self._data.oMi])
+
+    def frame_pose(self, frame: str) -> pin.SE3:
+        """Pose T_world_frame of a frame. Raises `UnknownNameError`."""
+        return self._data.oMf[self.robot.frame_id(frame)].copy()
+
+    def point(self, frame: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+        """World position, shape (3,), m, of a point at `offset` (m, in the frame)."""
+        return read_only(self._data.oMf[self.robot.frame_id(frame)].act(np.asarray(offset, dtype=np.float64)))
+
+    def frame_jacobian(self, frame: str) -> Array:
+        """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows, world-aligned."""
+        return read_only(
+            pin.getFrameJacobian(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED)
+        )
+
+    def frame_velocity(self, frame: str) -> Array:
+        """Linear [m/s] and angular [rad/s] velocity of a frame's origin, shape (6,), world-aligned."""
+        return read_only(
+            pin.getFrameVelocity(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED).vector
+        )
+
+    def frame_drift(self, frame: str) -> Array:
+        """J̇ v of a frame's origin, shape (6,): its linear [m/s²] and angular [rad/s²] acceleration when q̈ = 0."""
+        motion = pin.getFrameClassicalAcceleration(
+            self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
+        )
+        return read_only(motion.vector)
+
+    def integrate(self, dv: npt.ArrayLike) -> Array:
+        """The configuration reached by moving along dv, shape (nv,), for one unit of time; shape (nq,)."""
+        return read_only(pin.integrate(self.robot.model, self.q, checked("dv", dv, (self.robot.nv,))))
+
+    def difference(self, q: npt.ArrayLike) -> Array:
+        """The dv, shape (nv,), that leads from configuration q to this state's: `State(robot, q).integrate(dv)` = self.q."""
+        return read_only(pin.difference(self.robot.model, checked("q", q, (self.robot.nq,)), self.q))
+
+    def at(self, q: npt.ArrayLike | None = None, v: npt.ArrayLike | None = None) -> State:
+        """A new state with q or v replaced."""
+        return State(self.robot, self.q if q is None else q, self.v if v is None else v)
+
+    def __repr__(self) -> str:
+        moving = "at rest" if not np.any(self.v) else f"|v|={np.linalg.norm(self.v):.3g}"
+        return f"State({self.robot.name}, com={np.round(self.com, 3).tolist()}, {moving})"

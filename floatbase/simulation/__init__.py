@@ -1,0 +1,1 @@
+"""Physics that shares no code with the controller: MuJoCo, built from the same URDF."""

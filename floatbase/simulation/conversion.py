@@ -1,0 +1,82 @@
+"""Between the two conventions for a state, in one place.
+
+Ours (Pinocchio's): quaternion x y z w, base velocity in the base frame, joints in Pinocchio's order.
+MuJoCo's: quaternion w x y z, linear base velocity in the world and angular in the base frame, joints in the URDF's order.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from floatbase._arrays import Array
+from floatbase.errors import SimulationError
+from floatbase.robots.robot import Robot
+
+
+class Conversion:
+    """Index tables between a robot and a MuJoCo model of it, and the maps made of them."""
+
+    def __init__(self, robot: Robot, model: mujoco.MjModel):
+        self._robot = robot
+        self._floating = 6 if robot.is_floating else 0
+        ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in robot.joint_names]
+        missing = [name for name, i in zip(robot.joint_names, ids, strict=True) if i < 0]
+        if missing:
+            raise SimulationError(f"MuJoCo's model of {robot.name} has no joint {missing[0]!r}.")
+        self._qpos = np.array([model.jnt_qposadr[i] for i in ids], dtype=int)
+        self._qvel = np.array([model.jnt_dofadr[i] for i in ids], dtype=int)
+        joints = [robot.model.getJointId(name) for name in robot.joint_names]
+        self._q = np.array([robot.model.idx_qs[j] for j in joints], dtype=int)
+        # joints without limits are stored as (cos, sin) by Pinocchio
+        self._turning = np.array([robot.model.nqs[j] == 2 for j in joints], dtype=bool)
+
+    def q(self, qpos: Array) -> Array:
+        """Our q, shape (nq,), of MuJoCo's qpos."""
+        q = np.empty(self._robot.nq)
+        angles = qpos[self._qpos]
+        if self._floating:
+            q[:3] = qpos[:3]
+            q[3:6], q[6] = qpos[4:7], qpos[3]
+        q[self._q] = np.where(self._turning, np.cos(angles), angles)
+        q[self._q[self._turning] + 1] = np.sin(angles[self._turning])
+        return q
+
+    def v(self, qpos: Array, qvel: Array) -> Array:
+        """Our v, shape (nv,), of MuJoCo's qpos and qvel."""
+        v = np.empty(self._robot.nv)
+        if self._floating:
+            v[:3] = _rotation(qpos[3:7]).T @ qvel[:3]
+            v[3:6] = qvel[3:6]
+        v[self._floating :] = qvel[self._qvel]
+        return v
+
+    def to_mujoco(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """MuJoCo's qpos and qvel of our q and v."""
+        qpos, qvel = np.empty(self._robot.d + (7 if self._floating else 0)), np.empty(self._robot.nv)
+        if self._floating:
+            qpos[:3] = q[:3]
+            qpos[3], qpos[4:7] = q[6], q[3:6]
+            qvel[:3] = _rotation(qpos[3:7]) @ v[:3]
+            qvel[3:6] = v[3:6]
+        angles = q[self._q].copy()
+        angles[self._turning] = np.arctan2(q[self._q[self._turning] + 1], angles[self._turning])
+        qpos[self._qpos] = angles
+        qvel[self._qvel] = v[self._floating :]
+        return qpos, qvel
+
+    def velocity_map(self, qpos: Array) -> Array:
+        """T, shape (nv, nv), with MuJoCo's qvel = T v: M, h and J of the two are compared through it."""
+        T = np.zeros((self._robot.nv, self._robot.nv))
+        if self._floating:
+            T[:3, :3] = _rotation(qpos[3:7])
+            T[3:6, 3:6] = np.eye(3)
+        T[self._qvel, np.arange(self._floating, self._robot.nv)] = 1.0
+        return T
+
+
+def _rotation(quaternion: Array) -> Array:
+    """Rotation matrix of a unit quaternion w x y z."""
+    R = np.empty(9)
+    mujoco.mju_quat2Mat(R, quaternion)
+    return R.reshape(3, 3)

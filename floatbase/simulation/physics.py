@@ -1,0 +1,313 @@
+"""MuJoCo from the same URDF: ground, feet, torque motors, pushes, measured contact forces."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, positive, read_only, unit_vector
+from floatbase.dynamics.contacts import UP
+from floatbase.errors import InputError, SimulationError
+from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.state import State
+from floatbase.simulation.conversion import Conversion
+
+_CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
+_GROUND = "ground"
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A force on the robot for a while.
+
+    force: (3,) N, world, at the origin of a frame of the robot; "base" is the base link. start, duration: s.
+    """
+
+    force: Array
+    start: float = 0.0
+    duration: float = 0.1
+    frame: str = "base"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "force", checked("force of the push", self.force, (3,), "N"))
+        positive("start of the push", self.start, "s", allow_zero=True)
+        positive("duration of the push", self.duration, "s")
+
+    def acts_at(self, t: float) -> bool:
+        """Whether the push acts in the step that begins at t, s."""
+        return self.start - 1e-9 <= t < self.start + self.duration - 1e-9
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground: a plane through the origin. normal: (3,), world, made unit. mu: coefficient of friction with the feet."""
+
+    mu: float = 1.0
+    normal: Array = field(default_factory=lambda: UP)
+
+    def __post_init__(self) -> None:
+        positive("friction coefficient mu of the ground", self.mu)
+        object.__setattr__(self, "normal", unit_vector("normal of the ground", self.normal))
+
+
+class Simulation:
+    """A robot on the ground in MuJoCo, driven by joint torques.
+
+    The model is edited from the robot's own URDF: free joint for a floating base, a ball at each foot (or at each corner of
+    a flat foot), a plane with friction, a torque motor with its limit on each joint, rotor inertia as in the robot. Joint
+    friction and damping are off, as in (1)-(7). Only feet and ground touch.
+    ground: a `Ground`, or the coefficient of friction of a level one. timestep: s.
+    Raises `SimulationError` when MuJoCo cannot build the robot.
+    """
+
+    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
+        self.robot = robot
+        self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
+        self.timestep = positive("timestep", timestep, "s")
+        self.model = _build(robot, self.ground, self.timestep)
+        self.data = mujoco.MjData(self.model)
+        self._convert = Conversion(robot, self.model)
+        self._motors = np.array([self.model.actuator(name).id for name in robot.joint_names], dtype=int)
+        self._points = {geom: i for i, geom in enumerate(_point_geoms(robot))}
+        self._point_of_geom = {self.model.geom(name).id: i for name, i in self._points.items()}
+        self._wrench = np.zeros(6)
+        self._base = self.model.body(robot.base).id if robot.is_floating else 0
+        self.reset()
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """Names of the points of the robot that can touch the ground: feet, or corners of flat feet."""
+        return tuple(self._points)
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return float(self.data.time)
+
+    @property
+    def q(self) -> Array:
+        """Configuration in the package's convention, shape (nq,)."""
+        return self._convert.q(self.data.qpos)
+
+    @property
+    def v(self) -> Array:
+        """Velocity in the package's convention, shape (nv,)."""
+        return self._convert.v(self.data.qpos, self.data.qvel)
+
+    @property
+    def state(self) -> State:
+        """The robot's state now."""
+        return State(self.robot, self.q, self.v)
+
+    @property
+    def diverged(self) -> bool:
+        """Whether MuJoCo met numbers it could not go on with since the last reset."""
+        kinds = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+        bad = any(self.data.warning[int(kind)].number for kind in kinds)
+        return bad or not np.all(np.isfinite(self.data.qpos)) or not np.all(np.isfinite(self.data.qvel))
+
+    def reset(self, state: State | None = None) -> None:
+        """Put the robot into a state, standing by default, at time 0."""
+        state = self.robot.standing() if state is None else state
+        if state.robot is not self.robot:
+            raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
+        """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and the pushes that act now."""
+        tau = np.asarray(tau, dtype=np.float64)
+        if tau.shape != (self.robot.d,) or not np.all(np.isfinite(tau)):
+            raise InputError(f"torques must be {self.robot.d} finite numbers (N·m); got {tau!r}.")
+        self.data.ctrl[self._motors] = tau
+        self.data.xfrc_applied[:] = 0.0
+        for push in pushes:
+            if push.acts_at(self.time):
+                self._apply(push)
+        mujoco.mj_step(self.model, self.data)
+
+    def contact_forces(self) -> Array:
+        """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world, ordered as `point_names`."""
+        forces = np.zeros((len(self._points), 3))
+        for i in range(self.data.ncon):
+            contact = self.data.contact[i]
+            point = self._point_of_geom.get(contact.geom[1], -1)
+            if point < 0 or contact.efc_address < 0:
+                continue
+            mujoco.mj_contactForce(self.model, self.data, i, self._wrench)
+            # rows of the frame: normal from the ground (geom 0) to the foot (geom 1), then two tangents
+            forces[point] += contact.frame.reshape(3, 3).T @ self._wrench[:3]
+        return forces
+
+    def contact_positions(self) -> Array:
+        """World positions of the points, shape (n_points, 3), m: the lowest point of each ball along the ground's normal."""
+        ids = [self.model.geom(name).id for name in self._points]
+        radii = self.model.geom_size[ids, 0][:, None]
+        return self.data.geom_xpos[ids] - radii * self.ground.normal
+
+    @property
+    def base_position(self) -> Array:
+        """World position of the base's origin, shape (3,), m."""
+        return self.data.xpos[self._base]
+
+    @property
+    def base_rotation(self) -> Array:
+        """World orientation of the base, shape (3, 3)."""
+        return self.data.xmat[self._base].reshape(3, 3)
+
+    def _apply(self, push: Push) -> None:
+        """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""
+        frame = self.robot.model.frames[self.robot.frame_id(push.frame)]
+        joint = self.robot.model.names[frame.parentJoint]
+        body = int(self.model.joint(joint).bodyid[0]) if joint in self.robot.joint_names else self._base
+        at = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ frame.placement.translation
+        self.data.xfrc_applied[body, :3] += push.force
+        self.data.xfrc_applied[body, 3:] += np.cross(at - self.data.xipos[body], push.force)
+
+    def __repr__(self) -> str:
+        return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"
+
+
+def _build(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
+    """The edited model."""
+    spec = _spec(robot)
+    spec.option.timestep = timestep
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 100.0  # friction as stiff as the normal: feet creep less
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if robot.is_floating:
+        spec.body(robot.base).add_freejoint()
+    for joint in spec.joints:
+        if joint.name in robot.joint_names:
+            at = robot.model.idx_vs[robot.model.getJointId(joint.name)]
+            joint.armature = float(robot.model.armature[at])
+            joint.damping[:] = 0.0
+            joint.frictionloss = 0.0
+    _add_ground(spec, ground)
+    for foot in robot.feet:
+        _add_foot(spec, foot, ground.mu)
+    for name, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
+        _add_motor(spec, name, float(limit))
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise SimulationError(f"MuJoCo cannot build {robot.name} from {robot.urdf.name}: {error}") from None
+    if model.nv != robot.nv:
+        raise SimulationError(
+            f"MuJoCo finds {model.nv} degrees of freedom in {robot.urdf.name}, the robot has {robot.nv}: "
+            "its model was changed after it was read from the URDF."
+        )
+    return model
+
+
+def _spec(robot: Robot) -> mujoco.MjSpec:
+    """The URDF without its shapes: they are the viewer's business, and feet are added as balls."""
+    root = ElementTree.parse(robot.urdf).getroot()
+    for link in root.findall("link"):
+        for shape in link.findall("visual") + link.findall("collision"):
+            link.remove(shape)
+    try:
+        spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    except ValueError as error:
+        raise SimulationError(f"MuJoCo cannot read {robot.urdf.name}: {error}") from None
+    spec.compiler.fusestatic = True  # welded links become one body
+    for body in spec.bodies:
+        if not _is_possible(body):
+            _hand_inertia_on(body)
+    return spec
+
+
+def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
+    """A body's inertia in its own frame, as the URDF gives it."""
+    ixx, iyy, izz, ixy, ixz, iyz = body.fullinertia
+    tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    return pin.Inertia(float(body.mass), np.array(body.ipos), tensor)
+
+
+def _is_possible(body: mujoco.MjsBody) -> bool:
+    """Whether some mass distribution has this inertia: principal values positive, none larger than the two others' sum."""
+    if not np.isfinite(body.fullinertia[0]):
+        return True  # the URDF gives none
+    smallest, middle, largest = np.linalg.eigvalsh(_inertia(body).inertia)
+    return bool(smallest > 1e-15 and smallest + middle >= largest * (1.0 - 1e-9))
+
+
+def _hand_inertia_on(body: mujoco.MjsBody) -> None:
+    """Add a placeholder link's impossible inertia to a welded neighbour's: their sum, which is all that moves, is possible."""
+    welded = [child for child in body.bodies if not child.joints and np.isfinite(child.fullinertia[0])]
+    if not welded:
+        return  # MuJoCo will say what is wrong with it
+    child = max(welded, key=lambda c: float(c.mass))
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, np.array(child.quat))
+    placement = pin.SE3(R.reshape(3, 3), np.array(child.pos))
+    total = _inertia(child) + placement.actInv(_inertia(body))
+    tensor = total.inertia
+    child.mass, child.ipos = total.mass, total.lever
+    child.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+    body.mass, body.fullinertia, body.explicitinertial = 0.0, [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], False
+
+
+def _add_ground(spec: mujoco.MjSpec, ground: Ground) -> None:
+    quat = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quat, np.array(ground.normal))
+    plane = spec.worldbody.add_geom(
+        name=_GROUND,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0.0, 0.0, 0.05],
+        quat=quat,
+        contype=1,
+        conaffinity=0,
+    )
+    _set_contact(plane, ground.mu)
+
+
+def _add_foot(spec: mujoco.MjSpec, foot: Foot, mu: float) -> None:
+    body = spec.body(foot.frame)
+    if body is None:
+        raise SimulationError(f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links.")
+    for name, centre, radius in _balls(foot):
+        ball = body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[radius, 0.0, 0.0],
+            pos=centre,
+            mass=0.0,
+            contype=0,
+            conaffinity=1,
+        )
+        _set_contact(ball, mu)
+
+
+def _set_contact(geom: mujoco.MjsGeom, mu: float) -> None:
+    """Friction without spinning or rolling resistance, and a contact as stiff as 1 kHz allows."""
+    geom.condim = 3
+    geom.friction = [mu, 0.0, 0.0]
+    geom.solref = [0.004, 1.0]
+    geom.solimp = [0.95, 0.99, 0.001, 0.5, 2.0]
+
+
+def _balls(foot: Foot) -> list[tuple[str, Array, float]]:
+    """Name, centre in the frame and radius of each ball that a foot stands on."""
+    if foot.corners is None:
+        return [(foot.frame, foot.centre, max(foot.radius, 1e-4))]
+    up = np.array([0.0, 0.0, _CORNER_RADIUS])
+    return [(f"{foot.frame} corner {i}", read_only(c + up), _CORNER_RADIUS) for i, c in enumerate(foot.corners)]
+
+
+def _point_geoms(robot: Robot) -> list[str]:
+    return [name for foot in robot.feet for name, _, _ in _balls(foot)]
+
+
+def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
+    motor = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    motor.set_to_motor()
+    if np.isfinite(limit):
+        motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        motor.ctrlrange = [-limit, limit]

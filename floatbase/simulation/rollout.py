@@ -1,0 +1,190 @@
+"""`rollout`: the one loop that closes a controller with the physics, and the record it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from floatbase._arrays import Array, positive, read_only
+from floatbase.dynamics.contacts import Contacts
+from floatbase.errors import FloatbaseError, InputError
+from floatbase.robots.robot import Robot
+from floatbase.robots.state import State
+from floatbase.simulation.physics import Push, Simulation
+
+Outcome = Literal["completed", "fell", "diverged", "controller failed"]
+
+FALLEN_HEIGHT = 0.4  # part of the starting height of the base over the ground
+FALLEN_TILT = np.deg2rad(60.0)  # between the base's vertical now and at the start
+
+
+class Controller(Protocol):
+    """Anything that gives torques for a state: its answer has `.tau`, shape (d,), N·m, and may have `.forces`, shape (k,)."""
+
+    def __call__(self, q: Array, v: Array, t: float) -> Any:
+        """The command for configuration q and velocity v at time t, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """What happened, one row for each control tick, taken before the tick's torques act.
+
+    time: (n,) s. q: (n, nq). v: (n, nv). tau: (n, d) N·m. planned: (n, k) N, world, the controller's contact forces (NaN where
+    it gave none). measured: (n, k) N, world, those of the physics during the tick. foot_positions: (n, k/3, 3) m, world.
+    outcome: "completed", "fell", "diverged" or "controller failed" (then `error` holds its exception): the record ends there.
+    """
+
+    robot: Robot
+    contacts: Contacts
+    time: Array
+    q: Array
+    v: Array
+    tau: Array
+    planned: Array
+    measured: Array
+    foot_positions: Array
+    pushes: tuple[Push, ...]
+    outcome: Outcome
+    error: FloatbaseError | None = None
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    def state(self, i: int) -> State:
+        """The state at row i."""
+        return State(self.robot, self.q[i], self.v[i])
+
+    @property
+    def final(self) -> State:
+        """The last state on record."""
+        return self.state(-1)
+
+    @property
+    def com(self) -> Array:
+        """Centre of mass at each row, shape (n, 3), m, world."""
+        return read_only([self.state(i).com for i in range(len(self))])
+
+    def slip(self) -> Array:
+        """How far each contact point strayed from where it was first, shape (k/3,), m."""
+        return read_only(np.linalg.norm(self.foot_positions - self.foot_positions[0], axis=2).max(axis=0))
+
+    def __repr__(self) -> str:
+        return f"Rollout({self.robot.name}, {self.time[-1] if len(self) else 0.0:.3f} s, {self.outcome})"
+
+
+def rollout(
+    sim: Simulation,
+    controller: Controller,
+    duration: float,
+    pushes: Sequence[Push] = (),
+    control_period: float | None = None,
+) -> Rollout:
+    """Run a controller on the physics for `duration` s from the simulation's present state.
+
+    pushes: forces on links; their start counts from the beginning of the rollout. control_period: s, a whole multiple of the
+    simulation's timestep, which it is by default. A fall, a divergence of the physics or a controller that finds no answer
+    ends the rollout; the record up to there is returned and says so.
+    Raises `InputError` for a period that does not divide, a push that is none, and a controller without `.tau`.
+    """
+    positive("duration", duration, "s")
+    period = sim.timestep if control_period is None else positive("control_period", control_period, "s")
+    substeps = round(period / sim.timestep)
+    if substeps < 1 or abs(substeps * sim.timestep - period) > 1e-9:
+        raise InputError(
+            f"control_period {period:g} s is not a whole multiple of the simulation's timestep {sim.timestep:g} s."
+        )
+    for push in pushes:
+        if not isinstance(push, Push):
+            raise InputError(f"pushes must hold fb.Push values; {push!r} is none.")
+    run = _Run(sim, controller, tuple(pushes))
+    outcome: Outcome = "completed"
+    error: FloatbaseError | None = None
+    for _ in range(max(1, round(duration / period))):
+        try:
+            command = controller(sim.q, sim.v, sim.time - run.start)
+        except FloatbaseError as failure:
+            outcome, error = "controller failed", failure
+            break
+        run.tick(command, substeps)
+        if sim.diverged:
+            outcome = "diverged"
+            break
+        if run.fallen():
+            outcome = "fell"
+            break
+    return run.record(outcome, error)
+
+
+class _Run:
+    """The rows collected on the way."""
+
+    def __init__(self, sim: Simulation, controller: Controller, pushes: tuple[Push, ...]):
+        self.sim = sim
+        self.start = sim.time
+        self.pushes = pushes
+        self._shifted = tuple(Push(p.force, p.start + self.start, p.duration, p.frame) for p in pushes)
+        contacts = getattr(controller, "contacts", None)
+        self.contacts = contacts if isinstance(contacts, Contacts) else _all_feet(sim.robot)
+        self._columns = _columns(self.contacts, sim.point_names)
+        self._height, self._up = _base_pose(sim)
+        self.rows: list[tuple[Array | float, ...]] = []
+
+    def tick(self, command: Any, substeps: int) -> None:
+        """Apply one command for its period and keep what was there before and during it."""
+        if not hasattr(command, "tau"):
+            raise InputError(f"a controller must answer with .tau (N·m), as fb.Command does; got {command!r}.")
+        sim = self.sim
+        time, q, v, feet = sim.time - self.start, sim.q, sim.v, self._columns @ sim.contact_positions()
+        forces = np.zeros((len(sim.point_names), 3))
+        for _ in range(substeps):
+            sim.step(command.tau, self._shifted)
+            forces += sim.contact_forces() / substeps
+        planned = getattr(command, "forces", None)
+        planned = np.full(self.contacts.k, np.nan) if planned is None else np.asarray(planned, dtype=np.float64)
+        count = np.maximum(self._columns.sum(axis=1, keepdims=True), 1.0)
+        self.rows.append((time, q, v, np.array(command.tau), planned, (self._columns @ forces).ravel(), feet / count))
+
+    def fallen(self) -> bool:
+        """Whether a floating base is too low or too tilted."""
+        if not self.sim.robot.is_floating:
+            return False
+        height, up = _base_pose(self.sim)
+        return height < FALLEN_HEIGHT * self._height or float(up @ self._up) < np.cos(FALLEN_TILT)
+
+    def record(self, outcome: Outcome, error: FloatbaseError | None) -> Rollout:
+        """The finished value."""
+        robot, k = self.sim.robot, self.contacts.k
+        shapes = ((), (robot.nq,), (robot.nv,), (robot.d,), (k,), (k,), (k // 3, 3))
+        columns = [
+            read_only(np.array([row[i] for row in self.rows], dtype=np.float64).reshape((len(self.rows), *shape)))
+            for i, shape in enumerate(shapes)
+        ]
+        return Rollout(robot, self.contacts, *columns, self.pushes, outcome, error)
+
+
+def _all_feet(robot: Robot) -> Contacts:
+    """All feet, flat ones with their corners: what is measured when the controller names no contacts."""
+    flat = [foot.frame for foot in robot.feet if foot.is_flat]
+    points = [foot.frame for foot in robot.feet if not foot.is_flat]
+    contacts = [*(Contacts.points(robot, frames=points) if points else ())]
+    contacts += [*(Contacts.flat_feet(robot, frames=flat) if flat else ())]
+    return Contacts(contacts) if contacts else Contacts.none()
+
+
+def _columns(contacts: Contacts, measured: tuple[str, ...]) -> Array:
+    """Which measured points make up each point of the contacts, shape (n, n_measured), of 0 and 1.
+
+    A point contact in the middle of a flat foot takes all its corners.
+    """
+    match = [
+        [float(name == point or name.startswith(f"{point} corner ")) for name in measured] for point in contacts.point_names
+    ]
+    return np.array(match).reshape(contacts.n_points, len(measured))
+
+
+def _base_pose(sim: Simulation) -> tuple[float, Array]:
+    """Height of the base's origin over the ground, m, and its vertical in the world."""
+    return float(sim.ground.normal @ sim.base_position), sim.base_rotation[:, 2].copy()
