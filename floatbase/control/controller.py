@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,7 @@ from floatbase.robots.robot import Robot
 from floatbase.robots.state import State
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Limits:
     """What the inequalities of (26)(27) are made of.
 
@@ -88,12 +89,14 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
         b=np.concatenate([-eom.h, b]),
         G=G,
         h=np.concatenate([h_force, h_torque]),
-        equality_names=_equality_names(eom),
+        equality_names=_equality_names(eom.robot, eom.contacts),
         inequality_names=force_names + torque_names,
         blocks=blocks,
     )
 
 
+# what does not depend on the state is built once for each contacts, robot and limits (all immutable)
+@lru_cache(maxsize=64)
 def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
     """Friction facets and normal force of every point: G λ ≤ h."""
     per_point = limits.facets + 1
@@ -109,6 +112,7 @@ def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple
     return G, h, tuple(names)
 
 
+@lru_cache(maxsize=64)
 def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
     """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h."""
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
@@ -120,14 +124,13 @@ def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[str,
     return np.vstack([rows, -rows]), np.concatenate([bound, bound]), names
 
 
-def _equality_names(eom: EquationsOfMotion) -> tuple[str, ...]:
+@lru_cache(maxsize=64)
+def _equality_names(robot: Robot, contacts: Contacts) -> tuple[str, ...]:
     """Names of the rows of (7)."""
     base = [f"dynamics base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
-    joints = [f"dynamics {joint}" for joint in eom.robot.joint_names]
-    motion = []
-    for contact in eom.contacts:
-        motion += [f"motion {contact.name} {i}" for i in range(len(contact.constraint(eom.state)[1]))]
-    return tuple((base if eom.robot.is_floating else []) + joints + motion)
+    joints = [f"dynamics {joint}" for joint in robot.joint_names]
+    motion = [f"motion {contact.name} {row}" for contact in contacts for row in contact.row_names]
+    return tuple((base if robot.is_floating else []) + joints + motion)
 
 
 class WholeBodyController:

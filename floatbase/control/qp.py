@@ -211,16 +211,20 @@ def _single_point(qp: QP, x: Array) -> _Found:
 
 
 def _cvxpy(qp: QP) -> _Found:
-    """The whole problem as it stands, by cvxpy and Clarabel at tight tolerances."""
+    """The whole problem, equalities included, by cvxpy and Clarabel at tight tolerances."""
     import cvxpy as cp
 
-    x = cp.Variable(qp.n)
+    # written around the optimum without inequalities: Clarabel's gap is relative to an objective that is then small, which
+    # is what lets it see weights of 1e-6 beside weights of 10
+    origin = _without_inequalities(qp)
+    slope = qp.H @ origin + qp.g
+    step = cp.Variable(qp.n)
     constraints = []
     if len(qp.A):
-        constraints.append(qp.A @ x == qp.b)
+        constraints.append(qp.A @ step == qp.b - qp.A @ origin)
     if len(qp.G):
-        constraints.append(qp.G @ x <= qp.h)
-    problem = cp.Problem(cp.Minimize(0.5 * cp.quad_form(x, cp.psd_wrap(qp.H)) + qp.g @ x), constraints)
+        constraints.append(qp.G @ step <= qp.h - qp.G @ origin)
+    problem = cp.Problem(cp.Minimize(0.5 * cp.quad_form(step, cp.psd_wrap(qp.H)) + slope @ step), constraints)
     try:
         with warnings.catch_warnings():
             # at its last digits Clarabel calls itself inaccurate; how accurate it was, Solution.residuals says
@@ -230,10 +234,17 @@ def _cvxpy(qp: QP) -> _Found:
         raise SolverError(f"Clarabel gave up on {qp!r}: {error}") from None
     if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
         return None
-    if x.value is None:
+    if step.value is None:
         raise SolverError(f"Clarabel ended with status {problem.status!r} on {qp!r}.")
     mu = np.maximum(np.asarray(constraints[-1].dual_value), 0.0) if len(qp.G) else np.zeros(0)
-    return np.asarray(x.value), np.atleast_1d(mu), int(problem.solver_stats.num_iters or 0)
+    return origin + np.asarray(step.value), np.atleast_1d(mu), int(problem.solver_stats.num_iters or 0)
+
+
+def _without_inequalities(qp: QP) -> Array:
+    """A stationary point of the problem without its inequalities, shape (n,), from its KKT system."""
+    m = len(qp.A)
+    kkt = np.block([[qp.H, qp.A.T], [qp.A, np.zeros((m, m))]])
+    return np.linalg.lstsq(kkt, np.concatenate([-qp.g, qp.b]), rcond=None)[0][: qp.n]
 
 
 _SOLVERS: dict[str, Callable[[QP], _Found]] = {"daqp": _daqp, "cvxpy": _cvxpy}

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only, unit_vector
+from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
@@ -48,6 +48,10 @@ class Contact(Protocol):
     @property
     def k(self) -> int:
         """Number of force components."""
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """One name for each row of (5)."""
 
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n_points, 3), m."""
@@ -95,6 +99,11 @@ class PointContact:
         """3."""
         return 3
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """x, y, z: world-aligned."""
+        return ("x", "y", "z")
+
     def positions(self, state: State) -> Array:
         """World position of the contact point, shape (1, 3), m."""
         return read_only([state.point(self.frame, self.centre) - self.radius * self.normal])
@@ -109,8 +118,9 @@ class PointContact:
         drift = state.frame_drift(self.frame)
         omega = state.frame_velocity(self.frame)[3:]
         # J v = v_o + ω × (R c - r n): only R c turns with the foot, the contact point stays below the centre
-        turning = np.cross(omega, np.cross(omega, self._arm(state) + self.radius * self.normal))
-        J_dot_v = drift[:3] + np.cross(drift[3:], self._arm(state)) + turning
+        arm = self._arm(state)
+        turning = cross(omega, cross(omega, arm + self.radius * self.normal))
+        J_dot_v = drift[:3] + cross(drift[3:], arm) + turning
         return self.jacobian(state), read_only(-J_dot_v)
 
     def _arm(self, state: State) -> Array:
@@ -150,6 +160,11 @@ class FlatFootContact:
     def k(self) -> int:
         """3 for each corner."""
         return 3 * len(self.corners)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Linear x, y, z, then angular: world-aligned."""
+        return ("x", "y", "z", "angular x", "angular y", "angular z")
 
     def positions(self, state: State) -> Array:
         """World positions of the corners, shape (n, 3), m."""
@@ -263,9 +278,7 @@ class Contacts:
     @property
     def normals(self) -> Array:
         """Normal of each point, shape (n, 3), world."""
-        return read_only(
-            np.reshape([contact.normal for contact in self._contacts for _ in contact.point_names], (-1, 3))
-        )
+        return read_only(np.reshape([c.normal for c in self._contacts for _ in c.point_names], (-1, 3)))
 
     @property
     def mus(self) -> Array:

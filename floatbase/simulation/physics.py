@@ -19,6 +19,8 @@ from floatbase.simulation.conversion import Conversion
 
 _CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
 _GROUND = "ground"
+FALLEN_HEIGHT = 0.4  # part of the base's height over the ground at the last reset
+FALLEN_TILT = np.deg2rad(60.0)  # between the base's vertical now and at the last reset
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +113,14 @@ class Simulation:
         bad = any(self.data.warning[int(kind)].number for kind in kinds)
         return bad or not np.all(np.isfinite(self.data.qpos)) or not np.all(np.isfinite(self.data.qvel))
 
+    @property
+    def fallen(self) -> bool:
+        """Whether a floating base is far lower or more tilted than at the last reset."""
+        if not self.robot.is_floating:
+            return False
+        height, up = self._base_pose()
+        return height < FALLEN_HEIGHT * self._upright[0] or float(up @ self._upright[1]) < np.cos(FALLEN_TILT)
+
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing by default, at time 0."""
         state = self.robot.standing() if state is None else state
@@ -119,6 +129,7 @@ class Simulation:
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
+        self._upright = self._base_pose()
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and the pushes that act now."""
@@ -151,15 +162,10 @@ class Simulation:
         radii = self.model.geom_size[ids, 0][:, None]
         return self.data.geom_xpos[ids] - radii * self.ground.normal
 
-    @property
-    def base_position(self) -> Array:
-        """World position of the base's origin, shape (3,), m."""
-        return self.data.xpos[self._base]
-
-    @property
-    def base_rotation(self) -> Array:
-        """World orientation of the base, shape (3, 3)."""
-        return self.data.xmat[self._base].reshape(3, 3)
+    def _base_pose(self) -> tuple[float, Array]:
+        """Height of the base's origin over the ground, m, and its vertical in the world, shape (3,)."""
+        vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
+        return float(self.ground.normal @ self.data.xpos[self._base]), vertical.copy()
 
     def _apply(self, push: Push) -> None:
         """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""

@@ -17,9 +17,6 @@ from floatbase.simulation.physics import Push, Simulation
 
 Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
-FALLEN_HEIGHT = 0.4  # part of the starting height of the base over the ground
-FALLEN_TILT = np.deg2rad(60.0)  # between the base's vertical now and at the start
-
 
 class Controller(Protocol):
     """Anything that gives torques for a state: its answer has `.tau`, shape (d,), N·m, and may have `.forces`, shape (k,)."""
@@ -32,7 +29,7 @@ class Controller(Protocol):
 class Rollout:
     """What happened, one row for each control tick, taken before the tick's torques act.
 
-    time: (n,) s. q: (n, nq). v: (n, nv). tau: (n, d) N·m. planned: (n, k) N, world, the controller's contact forces (NaN where
+    time: (n,) s, the simulation's clock. q: (n, nq). v: (n, nv). tau: (n, d) N·m. planned: (n, k) N, world, the controller's contact forces (NaN where
     it gave none). measured: (n, k) N, world, those of the physics during the tick. foot_positions: (n, k/3, 3) m, world.
     outcome: "completed", "fell", "diverged" or "controller failed" (then `error` holds its exception): the record ends there.
     """
@@ -84,7 +81,7 @@ def rollout(
 ) -> Rollout:
     """Run a controller on the physics for `duration` s from the simulation's present state.
 
-    pushes: forces on links; their start counts from the beginning of the rollout. control_period: s, a whole multiple of the
+    pushes: forces on the robot; their start is on the simulation's clock, which a reset sets to 0. control_period: s, a whole multiple of the
     simulation's timestep, which it is by default. A fall, a divergence of the physics or a controller that finds no answer
     ends the rollout; the record up to there is returned and says so.
     Raises `InputError` for a period that does not divide, a push that is none, and a controller without `.tau`.
@@ -104,7 +101,7 @@ def rollout(
     error: FloatbaseError | None = None
     for _ in range(max(1, round(duration / period))):
         try:
-            command = controller(sim.q, sim.v, sim.time - run.start)
+            command = controller(sim.q, sim.v, sim.time)
         except FloatbaseError as failure:
             outcome, error = "controller failed", failure
             break
@@ -112,7 +109,7 @@ def rollout(
         if sim.diverged:
             outcome = "diverged"
             break
-        if run.fallen():
+        if sim.fallen:
             outcome = "fell"
             break
     return run.record(outcome, error)
@@ -123,13 +120,10 @@ class _Run:
 
     def __init__(self, sim: Simulation, controller: Controller, pushes: tuple[Push, ...]):
         self.sim = sim
-        self.start = sim.time
         self.pushes = pushes
-        self._shifted = tuple(Push(p.force, p.start + self.start, p.duration, p.frame) for p in pushes)
         contacts = getattr(controller, "contacts", None)
         self.contacts = contacts if isinstance(contacts, Contacts) else _all_feet(sim.robot)
         self._columns = _columns(self.contacts, sim.point_names)
-        self._height, self._up = _base_pose(sim)
         self.rows: list[tuple[Array | float, ...]] = []
 
     def tick(self, command: Any, substeps: int) -> None:
@@ -137,22 +131,15 @@ class _Run:
         if not hasattr(command, "tau"):
             raise InputError(f"a controller must answer with .tau (N·m), as fb.Command does; got {command!r}.")
         sim = self.sim
-        time, q, v, feet = sim.time - self.start, sim.q, sim.v, self._columns @ sim.contact_positions()
+        time, q, v, feet = sim.time, sim.q, sim.v, self._columns @ sim.contact_positions()
         forces = np.zeros((len(sim.point_names), 3))
         for _ in range(substeps):
-            sim.step(command.tau, self._shifted)
+            sim.step(command.tau, self.pushes)
             forces += sim.contact_forces() / substeps
         planned = getattr(command, "forces", None)
         planned = np.full(self.contacts.k, np.nan) if planned is None else np.asarray(planned, dtype=np.float64)
         count = np.maximum(self._columns.sum(axis=1, keepdims=True), 1.0)
         self.rows.append((time, q, v, np.array(command.tau), planned, (self._columns @ forces).ravel(), feet / count))
-
-    def fallen(self) -> bool:
-        """Whether a floating base is too low or too tilted."""
-        if not self.sim.robot.is_floating:
-            return False
-        height, up = _base_pose(self.sim)
-        return height < FALLEN_HEIGHT * self._height or float(up @ self._up) < np.cos(FALLEN_TILT)
 
     def record(self, outcome: Outcome, error: FloatbaseError | None) -> Rollout:
         """The finished value."""
@@ -183,8 +170,3 @@ def _columns(contacts: Contacts, measured: tuple[str, ...]) -> Array:
         [float(name == point or name.startswith(f"{point} corner ")) for name in measured] for point in contacts.point_names
     ]
     return np.array(match).reshape(contacts.n_points, len(measured))
-
-
-def _base_pose(sim: Simulation) -> tuple[float, Array]:
-    """Height of the base's origin over the ground, m, and its vertical in the world."""
-    return float(sim.ground.normal @ sim.base_position), sim.base_rotation[:, 2].copy()

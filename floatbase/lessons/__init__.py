@@ -1,0 +1,1 @@
+"""What the lessons share: controls that do not block the kernel, and exercises that check themselves."""

@@ -1,0 +1,112 @@
+"""Exercises that check themselves: `check` says right, or what kind of mistake it looks like, without giving the answer.
+
+An exercise stands once, in the module of its lesson: statement, stub, solution, judge. The judge computes the right value
+by other expressions than the one asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from floatbase.errors import unknown_name
+
+LESSONS = ("lesson00",)  # modules with EXERCISES
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `check` answers; a notebook shows it as a line of text."""
+
+    right: bool
+    text: str
+
+    def __repr__(self) -> str:
+        return f"{'✓ Right.' if self.right else '✗ Not yet.'} {self.text}"
+
+
+@dataclass(frozen=True, eq=False)
+class Exercise:
+    """One exercise. stub: the code a learner starts from, which runs. solution: the code that replaces it."""
+
+    name: str
+    statement: str
+    stub: str
+    solution: str
+    judge: Callable[[Any], Verdict]
+    explanation: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Numeric:
+    """A judge of numbers and arrays.
+
+    right: computes the right value. mistakes: for each kind of mistake, the value it leads to and the hint that fits. Values
+    within `tolerance`, relative to the right value's size, count as equal.
+    """
+
+    right: Callable[[], Any]
+    praise: str
+    mistakes: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
+    tolerance: float = 1e-3
+    unit: str = ""
+
+    def __call__(self, answer: Any) -> Verdict:
+        right = np.asarray(self.right(), dtype=np.float64)
+        if answer is None or answer is Ellipsis:
+            return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
+        try:
+            given = np.asarray(answer, dtype=np.float64)
+        except (TypeError, ValueError):
+            return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.")
+        if given.shape != right.shape:
+            return Verdict(False, f"The answer has shape {given.shape}; it should have shape {right.shape}.")
+        if not np.all(np.isfinite(given)):
+            return Verdict(False, "The answer holds numbers that are not finite.")
+        if self._equal(given, right):
+            return Verdict(True, self.praise)
+        for hint, wrong in self.mistakes.items():
+            if self._equal(given, np.asarray(wrong(), dtype=np.float64)):
+                return Verdict(False, hint)
+        if self._equal(given, -right):
+            return Verdict(False, "The size is right, the sign is not: whose force, and in which direction?")
+        if right.ndim == 2 and right.shape[0] == right.shape[1] and self._equal(given, right.T):
+            return Verdict(False, "This is the transpose of the answer.")
+        return Verdict(False, "Neither right nor a mistake this check knows. Look at the units, then at the statement again.")
+
+    def _equal(self, a: Any, b: Any) -> bool:
+        b = np.asarray(b, dtype=np.float64)
+        return a.shape == b.shape and bool(np.max(np.abs(a - b)) <= self.tolerance * (1e-9 + np.max(np.abs(b))))
+
+
+def exercises() -> dict[str, Exercise]:
+    """All exercises by name, such as "00.1"."""
+    found: dict[str, Exercise] = {}
+    for module in LESSONS:
+        for exercise in import_module(f"floatbase.lessons.{module}").EXERCISES:
+            found[exercise.name] = exercise
+    return found
+
+
+def check(name: str, answer: Any) -> Verdict:
+    """Check an answer to the exercise of that name. Raises `UnknownNameError` for a name that does not exist."""
+    return _exercise(name).judge(answer)
+
+
+def reveal(name: str) -> None:
+    """Print the solution of an exercise, and why."""
+    exercise = _exercise(name)
+    print(exercise.solution)
+    if exercise.explanation:
+        print(f"\n{exercise.explanation}")
+
+
+def _exercise(name: str) -> Exercise:
+    known = exercises()
+    if name not in known:
+        raise unknown_name("exercise", name, known)
+    return known[name]
