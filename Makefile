@@ -1,0 +1,80 @@
+# `make lab` opens the course, `make test` checks everything. Both first make .venv, from the exact lock in environment.txt.
+#
+#   PYTHON=…       the Python to use, such as python3.12 or a path; without it the first of python3, python3.13, … that fits
+#   LAB_ARGS=…     more options for JupyterLab, such as --no-browser or --port=9000
+#   PYTEST_ARGS=…  more options for pytest, such as "-k friction"
+#   LOCK_ARGS=…    more options for `uv pip compile`, such as --upgrade
+
+.DEFAULT_GOAL := help
+.PHONY: help lab test setup lock clean python
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+
+# Prints what .venv must have been made for (Python and place, as a key), then the Python that makes it.
+# A Python that does not fit, or has no venv, prints nothing.
+PROBE := import ensurepip, sys, venv, zlib; \
+	(3, 11) <= sys.version_info < (3, 14) or sys.exit(1); \
+	print("%d.%d-%x" % (*sys.version_info[:2], zlib.crc32(sys.argv[1].encode())), sys._base_executable)
+FOUND := $(shell for p in $(or $(PYTHON),python3 python3.13 python3.12 python3.11); do \
+	"$$p" -c '$(PROBE)' "$(CURDIR)" 2>/dev/null && break; done)
+KEY := $(or $(firstword $(FOUND)),none)
+BASE := $(wordlist 2,99,$(FOUND))
+
+NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+FIRST := $(firstword $(wildcard notebooks/00_start_here.ipynb notebooks))
+
+help:
+	@echo "make lab     open the course in JupyterLab"
+	@echo "make test    run ruff, mypy, the tests and the notebooks"
+	@echo "make setup   only make .venv"
+	@echo "make lock    write environment.txt anew from pyproject.toml"
+	@echo "make clean   remove .venv and everything else that was made"
+	@echo
+	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
+
+# Nothing leaves the machine: no news, no look for updates, no list of extensions.
+lab: setup
+	$(BIN)/jupyter lab --ServerApp.ip=127.0.0.1 --LabApp.news_url=None \
+		--LabApp.check_for_updates_class=jupyterlab.handlers.announcements.NeverCheckForUpdate \
+		--LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS) $(FIRST)
+
+test: setup
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest tests $(if $(NOTEBOOKS),--nbval $(NOTEBOOKS)) $(PYTEST_ARGS)
+
+setup: $(VENV)/ready-$(KEY)
+
+# .venv is made from nothing whenever the lock, the Python or the place changed, or the last try did not come to its end
+$(VENV)/locked-$(KEY): environment.txt | python
+	@echo "Making $(VENV) with $(BASE): about 2 GB, a few minutes the first time."
+	@rm -rf $(VENV)
+	@"$(BASE)" -m venv $(VENV)
+	@$(PIP) install -q -r environment.txt
+	@touch $@
+
+$(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
+	@$(PIP) install -q --no-deps --no-build-isolation -e .
+	@touch $@
+
+python:
+	@if [ -z "$(FOUND)" ]; then \
+		echo "floatbase needs Python 3.11, 3.12 or 3.13 with its venv module; $(or $(PYTHON),python3) is not that."; \
+		echo "Install one (on Debian and Ubuntu: apt install python3 python3-venv), or say where it is:"; \
+		echo "    make $(or $(MAKECMDGOALS),lab) PYTHON=/path/to/python3.12"; \
+		exit 1; \
+	fi >&2
+
+# keeps the versions that environment.txt has where they still fit; LOCK_ARGS=--upgrade takes the newest
+lock: | python
+	"$(BASE)" -m venv build/uv
+	build/uv/bin/python -m pip --disable-pip-version-check install -q uv
+	build/uv/bin/uv pip compile -q --universal --python-version 3.11 --fork-strategy fewest \
+		--extra fast --extra test --extra meshes --no-annotate --no-emit-index-url \
+		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
