@@ -173,7 +173,7 @@ class WholeBodyController:
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The problem of one tick, to look at."""
-        return build_qp(equations_of_motion(state, self.contacts), self.tasks, self.limits, t)
+        return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t)
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""

@@ -59,8 +59,8 @@ class Contact(Protocol):
     def jacobian(self, state: State) -> Array:
         """J of (4): Jᵀ λ is the generalised force of λ; shape (k, nv)."""
 
-    def constraint(self, state: State) -> tuple[Array, Array]:
-        """(5) The rows A, shape (m, nv), and b, shape (m,), of A q̈ = b."""
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
+        """(5) The rows A, shape (m, nv), and b, shape (m,), of A q̈ = b at time t, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +110,9 @@ class PointContact:
 
     def jacobian(self, state: State) -> Array:
         """Jacobian of the contact point, shape (3, nv), world-aligned."""
-        J = state.frame_jacobian(self.frame)
-        return read_only(J[:3] - pin.skew(self._arm(state)) @ J[3:])
+        return read_only(point_jacobian(state, self.frame, self._arm(state)))
 
-    def constraint(self, state: State) -> tuple[Array, Array]:
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A = J and b = -J̇ q̇, shapes (3, nv) and (3,), m/s²: the contact point does not accelerate."""
         drift = state.frame_drift(self.frame)
         omega = state.frame_velocity(self.frame)[3:]
@@ -179,9 +178,15 @@ class FlatFootContact:
         """Jacobian of the corners, shape (k, nv), world-aligned; its rank is at most 6."""
         return read_only(self.generators(state).T @ state.frame_jacobian(self.frame))
 
-    def constraint(self, state: State) -> tuple[Array, Array]:
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) The frame's six rows and -J̇ q̇, shapes (6, nv) and (6,), m/s² and rad/s²."""
         return state.frame_jacobian(self.frame), read_only(-state.frame_drift(self.frame))
+
+
+def point_jacobian(state: State, frame: str, arm: Array) -> Array:
+    """Jacobian of the point of a frame's body at `arm` (m, world) from its origin, shape (3, nv), world-aligned."""
+    J = state.frame_jacobian(frame)
+    return J[:3] - pin.skew(arm) @ J[3:]
 
 
 class Contacts:
@@ -294,9 +299,9 @@ class Contacts:
         empty = np.zeros((0, state.robot.nv))
         return read_only(np.vstack([empty] + [contact.jacobian(state) for contact in self._contacts]))
 
-    def constraint(self, state: State) -> tuple[Array, Array]:
-        """(5) A, shape (m, nv), and b, shape (m,)."""
-        rows = [contact.constraint(state) for contact in self._contacts]
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
+        """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
+        rows = [contact.constraint(state, t) for contact in self._contacts]
         A = np.vstack([np.zeros((0, state.robot.nv))] + [row[0] for row in rows])
         return read_only(A), read_only(np.concatenate([np.zeros(0)] + [row[1] for row in rows]))
 

@@ -67,8 +67,8 @@ class EquationsOfMotion:
         return self.M @ qdd + self.h - self.S @ tau - self.J.T @ forces, self.A @ qdd - self.b
 
 
-def equations_of_motion(state: State, contacts: Contacts) -> EquationsOfMotion:
-    """(7) The constrained equations of motion of a state with contacts.
+def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> EquationsOfMotion:
+    """(7) The constrained equations of motion of a state with contacts, at time t in s (which only moving constraints feel).
 
     Raises `InputError` for values of another kind and `UnknownNameError` for a contact on a frame the robot lacks.
     """
@@ -76,5 +76,5 @@ def equations_of_motion(state: State, contacts: Contacts) -> EquationsOfMotion:
         raise InputError(f"equations_of_motion needs a State first, not {type(state).__name__}.")
     if not isinstance(contacts, Contacts):
         raise InputError(f"equations_of_motion needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
-    A, b = contacts.constraint(state)
+    A, b = contacts.constraint(state, t)
     return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, contacts.jacobian(state), A, b)

@@ -1,0 +1,92 @@
+"""The controller of objectives alone (§3.1): no limits, one closed-form minimum each tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, positive
+from floatbase.affine import Quadratic
+from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
+from floatbase.dynamics.subspace import feasible_space
+from floatbase.errors import InputError
+from floatbase.objectives.centroidal import force_bias, wanted_wrench, wrench_objective
+from floatbase.objectives.pullback import cost_on_space
+from floatbase.robots.robot import Robot
+from floatbase.robots.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class AnalyticCommand:
+    """tau: (d,) N·m to apply; forces: (k,) N, world, and qdd: (nv,) planned with them."""
+
+    tau: Array
+    forces: Array
+    qdd: Array
+
+
+class AnalyticController:
+    """(22) + (23) + a little posture and torque, minimised in closed form over β (17).
+
+    Wants the centre of mass at `com` and the base upright as in `state`: f̃_c = m (a - g) with a = -kp e - kd ė, and τ̃_c from the
+    base's rotation and the robot's inertia about its centre of mass. alpha, a: the bias of (23), a in N (the weight's even share
+    by default). posture, torque: weights of the joints' return to `state` [per (rad/s²)²] and of ‖τ‖² [per (N·m)²], which settle
+    what (22)(23) leave open (d > k). Nothing here keeps forces in their cones or torques within limits: lesson 05 shows what
+    comes of that. Source: the document, §3.1.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        contacts: Contacts,
+        state: State,
+        *,
+        com: npt.ArrayLike | None = None,
+        alpha: float = 0.1,
+        a: float | None = None,
+        kp: float = 100.0,
+        kd: float = 20.0,
+        bias_weight: float = 1e-3,
+        posture: float = 1e-3,
+        torque: float = 1e-6,
+    ):
+        if state.robot is not robot:
+            raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
+        self.robot, self.contacts, self._held = robot, contacts, state
+        self.com = checked("com", state.com if com is None else com, (3,), "m")
+        share = robot.weight / max(contacts.n_points, 1)
+        self._bias = positive("bias_weight", bias_weight) * force_bias(contacts, alpha, share if a is None else a)
+        self._kp, self._kd = positive("kp", kp, "1/s²"), positive("kd", kd, "1/s")
+        self._posture, self._torque = positive("posture", posture), positive("torque", torque)
+
+    def objective(self, eom: EquationsOfMotion) -> tuple[Quadratic, Quadratic, Quadratic]:
+        """The costs on q̈, τ and λ whose sum is minimised."""
+        state = eom.state
+        a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
+        R, R_wanted = state.frame_pose("base").rotation, self._held.frame_pose("base").rotation
+        turn = -self._kp * pin.log3(R @ R_wanted.T) - self._kd * state.frame_velocity("base")[3:]
+        wrench = wanted_wrench(state, a, rotational_inertia(state) @ turn)
+        on_forces = wrench_objective(state, eom.contacts, *wrench) + self._bias
+        joints = -self._kp * state.difference(self._held.q)[-eom.d :] - self._kd * state.v[-eom.d :]
+        on_qdd = Quadratic.from_residual(eom.S.T, joints, self._posture)
+        return on_qdd, Quadratic.from_residual(np.eye(eom.d), np.zeros(eom.d), self._torque), on_forces
+
+    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> AnalyticCommand:
+        """The tick: the minimum over β, mapped back to (q̈, τ, λ)."""
+        eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
+        space = feasible_space(eom)
+        on_qdd, on_tau, on_forces = self.objective(eom)
+        beta = cost_on_space(space, on_qdd, on_tau, on_forces).minimiser()
+        qdd, tau, forces = space(beta)
+        return AnalyticCommand(tau, forces, qdd)
+
+
+def rotational_inertia(state: State) -> Array:
+    """Inertia of the whole robot about its centre of mass, joints locked, shape (3, 3), kg·m², world."""
+    data = state.robot.model.createData()
+    pin.ccrba(state.robot.model, data, state.q, state.v)
+    return np.array(data.Ig.inertia)

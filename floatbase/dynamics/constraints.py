@@ -1,0 +1,167 @@
+"""Constraints beyond feet: any A q̈ = b (5), with time (note 6), and the rolling wheel as the nonholonomic case (6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
+from floatbase.dynamics.contacts import UP, point_jacobian
+from floatbase.errors import InputError
+from floatbase.robots.state import State
+
+Rows = Callable[[State, float], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearConstraint:
+    """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the document).
+
+    rows: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,). The constraint's force is Aᵀ λ with one
+    multiplier λ for each row, in the row's own unit; it has no friction cone. Holonomic constraints φ(q, t) = 0 give
+    A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6).
+    """
+
+    name: str
+    m: int
+    rows: Rows
+    mu: float = np.inf
+    normal: Array = field(default_factory=lambda: UP)
+
+    def __post_init__(self) -> None:
+        if int(self.m) != self.m or self.m < 1:
+            raise InputError(f"constraint {self.name!r} has m = {self.m} rows; it must have at least 1.")
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """None: its forces have no point and no cone."""
+        return ()
+
+    @property
+    def k(self) -> int:
+        """One multiplier for each row."""
+        return self.m
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """row 0, row 1, …"""
+        return tuple(f"row {i}" for i in range(self.m))
+
+    def positions(self, state: State) -> Array:
+        """No points: shape (0, 3)."""
+        return np.zeros((0, 3))
+
+    def jacobian(self, state: State) -> Array:
+        """A itself, shape (m, nv): the constraint's force is Aᵀ λ."""
+        return self.constraint(state)[0]
+
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
+        """(5) A, shape (m, nv), and b, shape (m,), checked."""
+        A, b = self.rows(state, t)
+        return (
+            checked(f"A of {self.name}", A, (self.m, state.robot.nv)),
+            checked(f"b of {self.name}", b, (self.m,)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RollingWheel:
+    """(6) A wheel or disc that rolls on a plane without slipping: the nonholonomic case.
+
+    g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest, where c is the wheel's centre and
+    u the unit vector in the wheel's plane that points up from the contact. No g(q) = 0 says the same: where the wheel can
+    go is not limited, only how. Differentiated once, A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
+    frame: the wheel's; its origin is the centre. axis: (3,), the axle in that frame. radius: m. normal: (3,), world, out of
+    the ground. mu: coefficient of friction. Raises `InputError` for a wheel that lies flat: it has no lowest point.
+    """
+
+    frame: str
+    axis: Array
+    radius: float
+    normal: Array = field(default_factory=lambda: UP)
+    mu: float = 0.7
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", unit_vector(f"axis of {self.frame}", self.axis))
+        object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
+        positive(f"radius of {self.frame}", self.radius, "m")
+        positive(f"friction coefficient mu of {self.frame}", self.mu)
+
+    @property
+    def name(self) -> str:
+        """The frame's name."""
+        return self.frame
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The frame's name: one point."""
+        return (self.frame,)
+
+    @property
+    def k(self) -> int:
+        """3."""
+        return 3
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """x, y, z: world-aligned."""
+        return ("x", "y", "z")
+
+    def positions(self, state: State) -> Array:
+        """World position of the contact point, shape (1, 3), m."""
+        return read_only([state.point(self.frame) + self._arm(state)])
+
+    def slip(self, state: State) -> Array:
+        """g(q, q̇), shape (3,), m/s, world: the velocity of the touching point, zero when the wheel rolls."""
+        return self.jacobian(state) @ state.v
+
+    def jacobian(self, state: State) -> Array:
+        """∂g/∂q̇, shape (3, nv): also brings the contact force into (4)."""
+        return read_only(point_jacobian(state, self.frame, self._arm(state)))
+
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
+        """(6) A = ∂g/∂q̇, shape (3, nv), and b = -(∂g/∂q) q̇, shape (3,), m/s²."""
+        drift = state.frame_drift(self.frame)
+        omega = state.frame_velocity(self.frame)[3:]
+        u, u_dot = self._up(state)
+        b = -(drift[:3] + cross(drift[3:], -self.radius * u) + cross(omega, -self.radius * u_dot))
+        return self.jacobian(state), read_only(b)
+
+    def _arm(self, state: State) -> Array:
+        """From the centre to the contact point, shape (3,), m, world."""
+        return -self.radius * self._up(state)[0]
+
+    def _up(self, state: State) -> tuple[Array, Array]:
+        """u and u̇: the normal laid into the wheel's plane, which turns with the axle; shapes (3,), world."""
+        n, axle = self.normal, state.frame_pose(self.frame).rotation @ self.axis
+        axle_dot = cross(state.frame_velocity(self.frame)[3:], axle)
+        w = n - (n @ axle) * axle
+        length = float(np.linalg.norm(w))
+        if length < 1e-6:
+            raise InputError(f"wheel {self.frame} lies flat on its side; it has no single lowest point to roll on.")
+        w_dot = -(n @ axle_dot) * axle - (n @ axle) * axle_dot
+        u = w / length
+        return u, (w_dot - u * (u @ w_dot)) / length
+
+
+def fixed_frame(frame: str) -> LinearConstraint:
+    """A frame welded to the world: six rows, (5) with A = J and b = -J̇ q̇; λ is the wrench of the bolts, N and N·m, world.
+
+    With a floating base bolted by it, λ is what the document's Figure 1 (left) calls the reaction of the ground.
+    """
+
+    def rows(state: State, t: float) -> tuple[Array, Array]:
+        return state.frame_jacobian(frame), -state.frame_drift(frame)
+
+    return LinearConstraint(f"bolts of {frame}", 6, rows)
+
+
+def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
+    """A frame's origin driven with a given acceleration (3,), m/s², world, as a function of t: A q̈ = b(q, q̇, t) (note 6)."""
+
+    def rows(state: State, t: float) -> tuple[Array, Array]:
+        return state.frame_jacobian(frame)[:3], checked("acceleration", acceleration(t), (3,)) - state.frame_drift(frame)[:3]
+
+    return LinearConstraint(f"drive of {frame}", 3, rows)

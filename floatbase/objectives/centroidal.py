@@ -1,0 +1,153 @@
+"""The centre of mass steered by forces: G_f, G_τ, wrenches, force bias, torque redundancy (20)-(25)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, positive, read_only
+from floatbase.affine import Affine, Quadratic
+from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.dynamics.subspace import RANK_TOLERANCE, null_space, torque_force_matrix, torque_force_space
+from floatbase.errors import InputError
+from floatbase.robots.state import State
+
+
+def force_sum(contacts: Contacts) -> Array:
+    """(20) G_f, shape (3, 3n): f_c = G_f λ, one identity block for each point (four for four feet). N, world."""
+    return read_only(np.tile(np.eye(3), contacts.n_points))
+
+
+def moment_sum(state: State, contacts: Contacts) -> Array:
+    """(21) G_τ, shape (3, 3n), m: τ_c = G_τ λ = Σ (x_i - x_c) × f_i, the moment about the centre of mass x_c. World.
+
+    The order matters: footnote 10 of the document prints x_c - x_i, which would give the opposite moment.
+    """
+    blocks = [pin.skew(x - state.com) for x in contacts.positions(state)]
+    return read_only(np.hstack(blocks) if blocks else np.zeros((3, 0)))
+
+
+def com_wrench(state: State, contacts: Contacts) -> Affine:
+    """(20)(21) λ -> (f_c, τ_c), with blocks "force" (3,), N, and "moment" (3,), N·m, both world, about the centre of mass.
+
+    Only contacts whose forces act at points count. Raises `InputError` for others (`LinearConstraint`).
+    """
+    _only_points(contacts)
+    G_f, G_tau = force_sum(contacts), moment_sum(state, contacts)
+    return Affine.stack(force=Affine.linear(G_f), moment=Affine.linear(G_tau))
+
+
+def wrench_objective(state: State, contacts: Contacts, force: npt.ArrayLike, moment: npt.ArrayLike) -> Quadratic:
+    """(22) ½ ‖f̃_c - G_f λ‖² + ½ ‖τ̃_c - G_τ λ‖² as a cost on λ.
+
+    force: f̃_c, shape (3,), N; moment: τ̃_c, shape (3,), N·m; world, about the centre of mass: what the ground should do to the
+    robot, so standing still asks for minus the weight of gravity, (0, 0, m g).
+    """
+    wanted = np.concatenate([checked("force", force, (3,), "N"), checked("moment", moment, (3,), "N·m")])
+    return Quadratic.of(com_wrench(state, contacts) - wanted)
+
+
+def wanted_wrench(
+    state: State, com_acceleration: npt.ArrayLike, angular_momentum_rate: npt.ArrayLike = (0.0, 0.0, 0.0)
+) -> tuple[Array, Array]:
+    """The (f̃_c, τ̃_c) of (22) for a wanted motion: f = m (a - g), Newton; τ = L̇, Euler. Shapes (3,), N and N·m, world.
+
+    com_acceleration: a, shape (3,), m/s². angular_momentum_rate: L̇ about the centre of mass, shape (3,), N·m.
+    """
+    a = checked("com_acceleration", com_acceleration, (3,), "m/s²")
+    gravity = state.robot.model.gravity.linear
+    return read_only(state.robot.mass * (a - gravity)), checked("angular_momentum_rate", angular_momentum_rate, (3,))
+
+
+def tangential_bias(contacts: Contacts) -> Quadratic:
+    """(23), first part: Σ ½ ‖(I - n nᵀ) f_i‖², the friction that each foot asks for, squared; a cost on λ.
+
+    The document prints the norm without its square; only squared is it quadratic.
+    """
+    return _per_point(contacts, lambda n: (np.eye(3) - np.outer(n, n), np.zeros(3)))
+
+
+def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
+    """(23), second part without its α: Σ ½ ‖n nᵀ f_i - a n‖², which draws each normal force towards a, N; a cost on λ.
+
+    a: one number for all points or shape (n,).
+    """
+    wanted = np.broadcast_to(np.asarray(a, dtype=np.float64), (contacts.n_points,))
+    if not np.all(np.isfinite(wanted)):
+        raise InputError("the nominal normal force a must be finite, N.")
+    values = iter(wanted)
+    return _per_point(contacts, lambda n: (np.outer(n, n), next(values) * n))
+
+
+def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
+    """(23) Σ h_i(f_i) = Σ ½ ‖tangential part‖² + (α/2) ‖normal part - a‖², as a cost on λ. α ≥ 0; a in N.
+
+    A preference, not a limit: nothing keeps a force in its cone or from pulling. Source: the document, §3.1.1.
+    """
+    return tangential_bias(contacts) + positive("alpha", alpha, allow_zero=True) * normal_bias(contacts, a)
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueForForces:
+    """(25) The smallest torques that give wanted forces, in closed form.
+
+    torque: `Affine` λ -> τ, the pseudo-inverse solution, shape (k,) N to (d,) N·m. reachable: the forces that any torques can
+    give, as an `Affine` β̂ -> λ with orthonormal columns. free_torques: (d, f), torques that change no force: the redundancy.
+    With fewer torques than forces not every λ is reachable: `torque` then answers for the nearest reachable accelerations.
+    """
+
+    torque: Affine
+    reachable: Affine
+    free_torques: Array
+
+    def gap(self, forces: npt.ArrayLike) -> float:
+        """Distance, N, of wanted forces (k,) from those that torques can give; 0 when reachable."""
+        wanted = checked("forces", np.ravel(forces), (self.reachable.n_out,), "N") - self.reachable.b
+        return float(np.linalg.norm(wanted - self.reachable.A @ (self.reachable.A.T @ wanted)))
+
+    def nearest(self, forces: npt.ArrayLike) -> Array:
+        """The reachable forces nearest to wanted ones, shape (k,), N."""
+        wanted = checked("forces", np.ravel(forces), (self.reachable.n_out,), "N") - self.reachable.b
+        return self.reachable(self.reachable.A.T @ wanted)
+
+
+def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
+    """(24)(25) min ½ ‖f^τ(β)‖² subject to λ = f^λ(β), for every λ at once.
+
+    f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k: forces out of reach, one τ for
+    each λ, and a choice among many. Source: the document, §3.1.2.
+    """
+    C, a = torque_force_matrix(eom)
+    C_tau, C_forces = C[:, : eom.d], C[:, eom.d :]
+    inverse = np.linalg.pinv(C_tau, rcond=RANK_TOLERANCE)
+    space = torque_force_space(eom)["forces"]
+    U, s, _ = np.linalg.svd(space.A, full_matrices=False)
+    reach = U[:, s > RANK_TOLERANCE * s[0]] if s.size else U
+    return TorqueForForces(
+        torque=Affine(-inverse @ C_forces, inverse @ a),
+        reachable=Affine(reach, space.b),
+        free_torques=null_space(C_tau),
+    )
+
+
+def _per_point(contacts: Contacts, part: Callable[[Array], tuple[Array, Array]]) -> Quadratic:
+    """Σ ½ ‖P f_i - r‖² over the points, where part(normal) gives (P, r)."""
+    _only_points(contacts)
+    H, g, c = np.zeros((contacts.k, contacts.k)), np.zeros(contacts.k), 0.0
+    for i, normal in enumerate(contacts.normals):
+        P, r = part(normal)
+        one = Quadratic.from_residual(P, r)
+        at = slice(3 * i, 3 * i + 3)
+        H[at, at], g[at], c = one.H, one.g, c + one.c
+    return Quadratic(H, g, c)
+
+
+def _only_points(contacts: Contacts) -> None:
+    if contacts.k != 3 * contacts.n_points:
+        names = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
+        raise InputError(f"{', '.join(names)} has forces that do not act at points; leave it out: contacts.without(…).")

@@ -1,0 +1,98 @@
+"""Costs moved between spaces: pullbacks (15)(18), and a cost seen from fewer variables (19) in its two readings."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from floatbase._arrays import Array
+from floatbase.affine import Affine, Quadratic
+from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.dynamics.subspace import RANK_TOLERANCE, FeasibleSpace, accelerations_from_torques, null_space
+from floatbase.errors import InputError
+
+Block = Literal["qdd", "tau", "forces"]
+
+
+def pullback(cost: Quadratic, f: Affine) -> Quadratic:
+    """(15)(18) The cost seen from the space that f starts in: x -> cost(f(x)). Source: the document, §3."""
+    return cost.pullback(f)
+
+
+def cost_on_torques(cost_on_qdd: Quadratic, eom: EquationsOfMotion) -> Quadratic:
+    """(15) A cost on q̈ seen from the torques: Q̃(τ) = Q(η(τ)), with η of (14)."""
+    return cost_on_qdd.pullback(accelerations_from_torques(eom))
+
+
+def cost_on_space(
+    space: FeasibleSpace,
+    qdd: Quadratic | None = None,
+    tau: Quadratic | None = None,
+    forces: Quadratic | None = None,
+) -> Quadratic:
+    """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β. A cost on all three at once: `cost.pullback(space.map)`."""
+    total = Quadratic.zero(space.dimension)
+    for cost, part in ((qdd, space.qdd), (tau, space.tau), (forces, space.forces)):
+        if cost is not None:
+            total = total + cost.pullback(part)
+    return total
+
+
+def smallest_coordinates(space: FeasibleSpace, block: Block) -> Affine:
+    """The β that (19) takes: the smallest β that gives a value of the block, β = V† (x - v)."""
+    f = _block(space, block)
+    V_pinv = np.linalg.pinv(f.A, rcond=RANK_TOLERANCE)
+    return Affine(V_pinv, -V_pinv @ f.b)
+
+
+def seen_from_smallest(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
+    """(19) as written: the cost on β seen from one block, with the smallest β that gives the block's value.
+
+    Answers "what does this motion cost, if everything it leaves open is set to zero in β?". That choice depends on the origin v
+    of β and has no physical meaning where V of the block loses rank (four point feet: 12 columns, rank 6).
+    """
+    return cost.pullback(smallest_coordinates(space, block))
+
+
+def best_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> Affine:
+    """The β of least cost that gives a value of the block: β = V† (x - v) + N z*(x), N spanning what the block leaves open.
+
+    Raises `InputError` where the cost has no minimum over what is left open.
+    """
+    start = smallest_coordinates(space, block)
+    return minimised_over(cost, null_space(_block(space, block).A)) @ start
+
+
+def seen_from_best(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
+    """(19) made honest: the cost on β seen from one block, minimised over what the block leaves free (a Schur complement).
+
+    Answers "what does this motion cost at least?". Never above `seen_from_smallest`, and equal to it where V of the block has
+    full column rank.
+    """
+    return cost.pullback(best_coordinates(cost, space, block))
+
+
+def minimised_over(cost: Quadratic, N: Array) -> Affine:
+    """x -> the point of least cost on x + span N; N: orthonormal columns, shape (n, p).
+
+    Raises `InputError` where the cost falls for ever along a column of N. A direction that costs nothing is left alone.
+    """
+    if N.shape[1] == 0:
+        return Affine.identity(cost.n)
+    H = N.T @ cost.H @ N
+    H_pinv = np.linalg.pinv(H, rcond=RANK_TOLERANCE, hermitian=True)
+    flat = np.eye(len(H)) - H @ H_pinv
+    slope = N.T @ cost.g
+    if np.max(np.abs(flat @ slope)) > 1e-7 * (1.0 + float(np.max(np.abs(cost.g)))):
+        raise InputError("the cost falls for ever along a direction that it should be minimised over; add a cost there.")
+    return Affine(np.eye(cost.n) - N @ H_pinv @ N.T @ cost.H, -N @ H_pinv @ slope)
+
+
+def minimise_on(cost: Quadratic, subspace: Affine) -> Array:
+    """The point of least cost on an affine subspace x = subspace(β), shape (n,): unconstrained in β."""
+    return subspace(cost.pullback(subspace).minimiser())
+
+
+def _block(space: FeasibleSpace, block: Block) -> Affine:
+    return space.map[block]
