@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase.errors import InputError
 
-Array = npt.NDArray[np.float64]
+Array: TypeAlias = npt.NDArray[np.floating[Any]]
 
 
 def read_only(value: Any) -> Array:
@@ -28,9 +28,7 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
         array = read_only(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} must be numbers of shape {_shape_text(shape)}, not {value!r}.") from None
-    fits = array.ndim == len(shape) and all(
-        want is None or have == want for have, want in zip(array.shape, shape, strict=True)
-    )
+    fits = array.ndim == len(shape) and all(want is None or have == want for have, want in zip(array.shape, shape, strict=True))
     if not fits:
         unit_text = f" ({unit})" if unit else ""
         raise InputError(f"{name} has shape {array.shape}; it must have shape {_shape_text(shape)}{unit_text}.")

@@ -60,9 +60,7 @@ class Affine:
         if len(set(widths.values())) > 1:
             raise InputError(f"maps that are stacked must start from the same space; input sizes: {widths}.")
         ends = np.cumsum([f.n_out for f in parts.values()])
-        blocks = {
-            name: slice(int(end) - f.n_out, int(end)) for (name, f), end in zip(parts.items(), ends, strict=True)
-        }
+        blocks = {name: slice(int(end) - f.n_out, int(end)) for (name, f), end in zip(parts.items(), ends, strict=True)}
         A = np.vstack([f.A for f in parts.values()])
         return Affine(A, np.concatenate([f.b for f in parts.values()]), blocks)
 
@@ -111,7 +109,7 @@ class Affine:
 
     def __rmul__(self, scale: float) -> Affine:
         """The map x -> scale (A x + b)."""
-        if not np.isscalar(scale):
+        if not isinstance(scale, (int, float)):
             return NotImplemented
         return Affine(float(scale) * self.A, float(scale) * self.b, self.blocks)
 
@@ -206,6 +204,6 @@ class Quadratic:
         return Quadratic(self.H + other.H, self.g + other.g, self.c + other.c)
 
     def __rmul__(self, scale: float) -> Quadratic:
-        if not np.isscalar(scale):
+        if not isinstance(scale, (int, float)):
             return NotImplemented
         return Quadratic(float(scale) * self.H, float(scale) * self.g, float(scale) * self.c)

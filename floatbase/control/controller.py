@@ -38,8 +38,8 @@ class Limits:
 class Command:
     """One answer of the controller.
 
-    tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the contact
-    forces planned with them. active: names of the inequality rows that push; multipliers: theirs, by name.
+    tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the
+    contact forces planned with them. active: names of the inequality rows that push; multipliers: theirs, by name.
     """
 
     tau: Array
@@ -61,11 +61,13 @@ class Command:
 def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
-    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: the
-    friction polyhedron (28) and normal force of every contact point, and the torque limits. Source: the document, §4.1.
+    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities:
+    the friction polyhedron (28) and normal force of every contact point, and the torque limits. Source: the document,
+    §4.1.
 
-    Where A of (5) loses rank (solo8 on four feet, straight knees) and the measured velocity is not quite one the contacts
-    allow, its rows contradict each other; then they are met as nearly as possible (least squares). Otherwise b stays as it is.
+    Where A of (5) loses rank (solo8 on four feet, straight knees) and the measured velocity is not quite one the
+    contacts allow, its rows contradict each other; then they are met as nearly as possible (least squares). Otherwise b
+    stays as it is.
     """
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
@@ -118,9 +120,7 @@ def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[str,
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
     rows = np.eye(robot.d)[limited]
     bound = limits.torque_limits[limited]
-    names = tuple(
-        f"torque limit {robot.joint_names[i]} {side}" for side in ("upper", "lower") for i in limited
-    )
+    names = tuple(f"torque limit {robot.joint_names[i]} {side}" for side in ("upper", "lower") for i in limited)
     return np.vstack([rows, -rows]), np.concatenate([bound, bound]), names
 
 
@@ -136,11 +136,12 @@ def _equality_names(robot: Robot, contacts: Contacts) -> tuple[str, ...]:
 class WholeBodyController:
     """(26)(27) every tick: the torques that serve the tasks best while (7), friction, contact and motors allow them.
 
-    tasks: values of `floatbase.objectives.tasks` or anything of that form. When none of them regularises forces or torques,
-    a `ForceTask()` and a `TorqueTask()` with their small default weights are added, so that the answer is unique; `tasks`
-    shows all. facets, inside: the friction polyhedron. min_normal_force: N, at every contact point. torque_limits: N·m, one
-    number or (d,), the robot's by default; np.inf switches them off. solver: one of `floatbase.control.qp.solvers()`.
-    Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError` with the rows in conflict.
+    tasks: values of `floatbase.objectives.tasks` or anything of that form. When none of them regularises forces or
+    torques, a `ForceTask()` and a `TorqueTask()` with their small default weights are added, so that the answer is
+    unique; `tasks` shows all. facets, inside: the friction polyhedron. min_normal_force: N, at every contact point.
+    torque_limits: N·m, one number or (d,), the robot's by default; np.inf switches them off. solver: one of
+    `floatbase.control.qp.solvers()`. Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError`
+    with the rows in conflict.
     """
 
     def __init__(

@@ -19,9 +19,9 @@ Rows = Callable[[State, float], tuple[Array, Array]]
 class LinearConstraint:
     """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the document).
 
-    rows: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,). The constraint's force is Aᵀ λ with one
-    multiplier λ for each row, in the row's own unit; it has no friction cone. Holonomic constraints φ(q, t) = 0 give
-    A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6).
+    rows: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,). The constraint's force is Aᵀ λ
+    with one multiplier λ for each row, in the row's own unit; it has no friction cone. Holonomic constraints φ(q, t) =
+    0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6).
     """
 
     name: str
@@ -70,11 +70,11 @@ class LinearConstraint:
 class RollingWheel:
     """(6) A wheel or disc that rolls on a plane without slipping: the nonholonomic case.
 
-    g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest, where c is the wheel's centre and
-    u the unit vector in the wheel's plane that points up from the contact. No g(q) = 0 says the same: where the wheel can
-    go is not limited, only how. Differentiated once, A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
-    frame: the wheel's; its origin is the centre. axis: (3,), the axle in that frame. radius: m. normal: (3,), world, out of
-    the ground. mu: coefficient of friction. Raises `InputError` for a wheel that lies flat: it has no lowest point.
+    g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest, where c is the wheel's
+    centre and u the unit vector in the wheel's plane that points up from the contact. No g(q) = 0 says the same: where
+    the wheel can go is not limited, only how. Differentiated once, A = ∂g/∂q̇ and b = -(∂g/∂q) q̇. frame: the wheel's;
+    its origin is the centre. axis: (3,), the axle in that frame. radius: m. normal: (3,), world, out of the ground. mu:
+    coefficient of friction. Raises `InputError` for a wheel that lies flat: it has no lowest point.
     """
 
     frame: str

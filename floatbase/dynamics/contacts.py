@@ -67,9 +67,9 @@ class Contact(Protocol):
 class PointContact:
     """A point of the robot that does not move on the ground: A = J, b = -J̇ q̇ (5).
 
-    frame: the frame that carries it. normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction.
-    radius, centre: the ball foot, m (see `Foot`). The contact point is the ball's lowest point, centre - radius · normal;
-    as the ball rolls that point moves on the ball, which b takes into account.
+    frame: the frame that carries it. normal: shape (3,), world, out of the ground, made unit. mu: coefficient of
+    friction. radius, centre: the ball foot, m (see `Foot`). The contact point is the ball's lowest point, centre -
+    radius · normal; as the ball rolls that point moves on the ball, which b takes into account.
     """
 
     frame: str
@@ -131,8 +131,8 @@ class PointContact:
 class FlatFootContact:
     """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note 9 of the document).
 
-    corners: shape (n, 3), m, in the frame. Twelve corner motion rows would have rank 6 and contradict each other when the
-    foot turns, so motion is kept by the six rows of the frame and the corners only carry forces.
+    corners: shape (n, 3), m, in the frame. Twelve corner motion rows would have rank 6 and contradict each other when
+    the foot turns, so motion is kept by the six rows of the frame and the corners only carry forces.
     """
 
     frame: str
@@ -223,16 +223,14 @@ class Contacts:
     ) -> Contacts:
         """Point contacts at the robot's feet.
 
-        mu: coefficient of friction. frames: which frames; all feet by default. normals: shape (3,) for all, (n, 3) in the
-        order of the frames, or a mapping from frame to (3,); straight up by default. A flat foot touches at the middle of
-        its corners here; `Contacts.flat_feet` uses its area.
+        mu: coefficient of friction. frames: which frames; all feet by default. normals: shape (3,) for all, (n, 3) in
+        the order of the frames, or a mapping from frame to (3,); straight up by default. A flat foot touches at the
+        middle of its corners here; `Contacts.flat_feet` uses its area.
         """
         feet = _feet(robot, frames)
         return Contacts(
             [
-                PointContact(
-                    foot.frame, n, mu, foot.radius, foot.centre if foot.corners is None else foot.corners.mean(axis=0)
-                )
+                PointContact(foot.frame, n, mu, foot.radius, foot.centre if foot.corners is None else foot.corners.mean(axis=0))
                 for foot, n in zip(feet, _normals(feet, normals), strict=True)
             ]
         )
@@ -351,7 +349,7 @@ def _feet(robot: Robot, frames: Sequence[str] | None) -> tuple[Foot, ...]:
         raise InputError(f'frames must be a list of names, as in frames=["{frames}"].')
     feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in frames)
     if not feet:
-        raise InputError(f"{robot.name} has no feet; name the frames that touch: frames=[\"…\"] (robot.frames lists them).")
+        raise InputError(f'{robot.name} has no feet; name the frames that touch: frames=["…"] (robot.frames lists them).')
     return feet
 
 

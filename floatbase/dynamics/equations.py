@@ -18,9 +18,9 @@ from floatbase.robots.state import State
 class EquationsOfMotion:
     """(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
 
-    M: (nv, nv) inertia. h: (nv,) Coriolis, centrifugal and gravity forces. S: (nv, d) actuation (3).
-    J: (k, nv) Jacobian of the points where λ acts, world-aligned. A: (m, nv), b: (m,) the rows of (5), in m/s²; for point
-    contacts A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed base (1).
+    M: (nv, nv) inertia. h: (nv,) Coriolis, centrifugal and gravity forces. S: (nv, d) actuation (3). J: (k, nv)
+    Jacobian of the points where λ acts, world-aligned. A: (m, nv), b: (m,) the rows of (5), in m/s²; for point contacts
+    A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed base (1).
     Source: the document, §1-§2.1.
     """
 

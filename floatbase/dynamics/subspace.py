@@ -47,8 +47,8 @@ def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     """(9) ζ: τ -> λ, from (8) A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ).
 
-    Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet, straight knees,
-    corners of a flat foot) the pseudo-inverse picks the smallest λ. Source: the document, §2.2.1.
+    Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet,
+    straight knees, corners of a flat foot) the pseudo-inverse picks the smallest λ. Source: the document, §2.2.1.
     """
     inverse = np.linalg.pinv(contact_inertia_inverse(eom), rcond=RANK_TOLERANCE)
     h, S = _inverse_inertia(eom, eom.h), _inverse_inertia(eom, eom.S)
@@ -140,8 +140,8 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
 def internal_forces(eom: EquationsOfMotion) -> Array:
     """Forces that torques can squeeze in without moving anything: orthonormal columns of null(J_bᵀ), shape (k, n).
 
-    J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint columns. n = k - rank J_b: 6 for
-    four point feet. With a fixed base every λ is internal.
+    J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint columns. n = k -
+    rank J_b: 6 for four point feet. With a fixed base every λ is internal.
     """
     return null_space(_base_columns(eom).T) if eom.k else np.zeros((0, 0))
 
@@ -155,9 +155,9 @@ def undetermined_forces(eom: EquationsOfMotion) -> Array:
 class Dimensions:
     """Sizes, ranks and dimensions of (7) at one state, by singular values.
 
-    d, k, nv: lengths of τ, λ, q̈. rank_J, rank_J_base: of J and of its base columns. null_B, null_C: dimensions of the null spaces of
-    (12) and (10), both d + k - rank J. internal: of null(J_bᵀ). undetermined: of null(Jᵀ). rank_V_qdd: how many
-    of the directions of β move the robot at all: d - rank J + rank J_b.
+    d, k, nv: lengths of τ, λ, q̈. rank_J, rank_J_base: of J and of its base columns. null_B, null_C: dimensions of the
+    null spaces of (12) and (10), both d + k - rank J. internal: of null(J_bᵀ). undetermined: of null(Jᵀ). rank_V_qdd:
+    how many of the directions of β move the robot at all: d - rank J + rank J_b.
     """
 
     nv: int

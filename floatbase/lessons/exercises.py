@@ -1,7 +1,7 @@
 """Exercises that check themselves: `check` says right, or what kind of mistake it looks like, without giving the answer.
 
-An exercise stands once, in the module of its lesson: statement, stub, solution, judge. The judge computes the right value
-by other expressions than the one asked for.
+An exercise stands once, in the module of its lesson: statement, stub, solution, judge. The judge computes the right
+value by other expressions than the one asked for.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Exercise:
 class Numeric:
     """A judge of numbers and arrays.
 
-    right: computes the right value. mistakes: for each kind of mistake, the value it leads to and the hint that fits. Values
-    within `tolerance`, relative to the right value's size, count as equal.
+    right: computes the right value. mistakes: for each kind of mistake, the value it leads to and the hint that fits.
+    Values within `tolerance`, relative to the right value's size, count as equal.
     """
 
     right: Callable[[], Any]

@@ -6,10 +6,11 @@ from functools import cache
 
 import floatbase as fb
 from floatbase.lessons.exercises import Exercise, Numeric
+from floatbase.robots.robot import Robot
 
 
 @cache
-def _go2() -> fb.robots.Robot:
+def _go2() -> Robot:
     return fb.load("go2")
 
 

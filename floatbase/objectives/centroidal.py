@@ -45,8 +45,8 @@ def com_wrench(state: State, contacts: Contacts) -> Affine:
 def wrench_objective(state: State, contacts: Contacts, force: npt.ArrayLike, moment: npt.ArrayLike) -> Quadratic:
     """(22) ½ ‖f̃_c - G_f λ‖² + ½ ‖τ̃_c - G_τ λ‖² as a cost on λ.
 
-    force: f̃_c, shape (3,), N; moment: τ̃_c, shape (3,), N·m; world, about the centre of mass: what the ground should do to the
-    robot, so standing still asks for minus the weight of gravity, (0, 0, m g).
+    force: f̃_c, shape (3,), N; moment: τ̃_c, shape (3,), N·m; world, about the centre of mass: what the ground should
+    do to the robot, so standing still asks for minus the weight of gravity, (0, 0, m g).
     """
     wanted = np.concatenate([checked("force", force, (3,), "N"), checked("moment", moment, (3,), "N·m")])
     return Quadratic.of(com_wrench(state, contacts) - wanted)
@@ -96,9 +96,10 @@ def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
 class TorqueForForces:
     """(25) The smallest torques that give wanted forces, in closed form.
 
-    torque: `Affine` λ -> τ, the pseudo-inverse solution, shape (k,) N to (d,) N·m. reachable: the forces that any torques can
-    give, as an `Affine` β̂ -> λ with orthonormal columns. free_torques: (d, f), torques that change no force: the redundancy.
-    With fewer torques than forces not every λ is reachable: `torque` then answers for the nearest reachable accelerations.
+    torque: `Affine` λ -> τ, the pseudo-inverse solution, shape (k,) N to (d,) N·m. reachable: the forces that any
+    torques can give, as an `Affine` β̂ -> λ with orthonormal columns. free_torques: (d, f), torques that change no
+    force: the redundancy. With fewer torques than forces not every λ is reachable: `torque` then answers for the
+    nearest reachable accelerations.
     """
 
     torque: Affine
@@ -119,8 +120,8 @@ class TorqueForForces:
 def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
     """(24)(25) min ½ ‖f^τ(β)‖² subject to λ = f^λ(β), for every λ at once.
 
-    f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k: forces out of reach, one τ for
-    each λ, and a choice among many. Source: the document, §3.1.2.
+    f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k: forces out of reach,
+    one τ for each λ, and a choice among many. Source: the document, §3.1.2.
     """
     C, a = torque_force_matrix(eom)
     C_tau, C_forces = C[:, : eom.d], C[:, eom.d :]

@@ -31,7 +31,10 @@ def cost_on_space(
     tau: Quadratic | None = None,
     forces: Quadratic | None = None,
 ) -> Quadratic:
-    """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β. A cost on all three at once: `cost.pullback(space.map)`."""
+    """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β.
+
+    A cost on all three at once is moved by `cost.pullback(space.map)`.
+    """
     total = Quadratic.zero(space.dimension)
     for cost, part in ((qdd, space.qdd), (tau, space.tau), (forces, space.forces)):
         if cost is not None:
@@ -49,8 +52,8 @@ def smallest_coordinates(space: FeasibleSpace, block: Block) -> Affine:
 def seen_from_smallest(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
     """(19) as written: the cost on β seen from one block, with the smallest β that gives the block's value.
 
-    Answers "what does this motion cost, if everything it leaves open is set to zero in β?". That choice depends on the origin v
-    of β and has no physical meaning where V of the block loses rank (four point feet: 12 columns, rank 6).
+    Answers "what does this motion cost, if everything it leaves open is set to zero in β?". That choice depends on the
+    origin v of β and has no physical meaning where V of the block loses rank (four point feet: 12 columns, rank 6).
     """
     return cost.pullback(smallest_coordinates(space, block))
 
@@ -67,8 +70,8 @@ def best_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> Aff
 def seen_from_best(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
     """(19) made honest: the cost on β seen from one block, minimised over what the block leaves free (a Schur complement).
 
-    Answers "what does this motion cost at least?". Never above `seen_from_smallest`, and equal to it where V of the block has
-    full column rank.
+    Answers "what does this motion cost at least?". Never above `seen_from_smallest`, and equal to it where V of the
+    block has full column rank.
     """
     return cost.pullback(best_coordinates(cost, space, block))
 

@@ -1,7 +1,8 @@
 """Tasks: what a controller should bring about, each a weighted affine residual in q̈, τ or λ.
 
-Residual = actual - desired. A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of
-position and velocity, so its residual is J q̈ + J̇ q̇ - a. Its cost is (weight / 2) ‖residual‖², a term of ψ in (26).
+Residual = actual - desired. A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the
+errors of position and velocity, so its residual is J q̈ + J̇ q̇ - a. Its cost is (weight / 2) ‖residual‖², a term of ψ
+in (26).
 
 A target is a value, or a function of the time t in s that gives one.
 """
@@ -70,8 +71,8 @@ def _damping(kp: float, kd: float | None) -> float:
 class CoMTask:
     """Bring the centre of mass to a position, shape (3,), m, world; residual in q̈, m/s².
 
-    velocity [m/s] and acceleration [m/s²], shape (3,), world: those of a moving target. kp [1/s²], kd [1/s]: gains; kd is
-    critically damped by default.
+    velocity [m/s] and acceleration [m/s²], shape (3,), world: those of a moving target. kp [1/s²], kd [1/s]: gains; kd
+    is critically damped by default.
     """
 
     position: Target
@@ -244,9 +245,7 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
     return (CoMTask(state.com), OrientationTask("base", rotation), PostureTask(state.q))
 
 
-def _motion_residual(
-    J: Array, drift: Array, feed: Array, kp: float, kd: float | None, e: Array, e_dot: Array
-) -> Affine:
+def _motion_residual(J: Array, drift: Array, feed: Array, kp: float, kd: float | None, e: Array, e_dot: Array) -> Affine:
     """J q̈ + J̇ q̇ - (a_ff - kp e - kd ė)."""
     return Affine(J, drift - feed + kp * e + _damping(kp, kd) * e_dot)
 

@@ -94,19 +94,17 @@ def load(
 ) -> Robot:
     """Load a robot by name.
 
-    name: one of `robots()`, or any other robot of example-robot-data that has a URDF.
-    feet: frames (or `Foot` values) that can touch the ground; by default as the catalogue has them. A floating-base robot
-    outside the catalogue needs them. foot_radius: radius of the feet given as frames, m, 0 by default.
-    torque_limits: one number or shape (d,), N·m; by default those of the catalogue or the URDF.
-    posture: shape (nq,), a configuration to stand in; by default the one that comes with the robot.
-    Raises `UnknownNameError` with the near names, and `InputError` for feet or limits that do not fit.
+    name: one of `robots()`, or any other robot of example-robot-data that has a URDF. feet: frames (or `Foot` values)
+    that can touch the ground; by default as the catalogue has them. A floating-base robot outside the catalogue needs
+    them. foot_radius: radius of the feet given as frames, m, 0 by default. torque_limits: one number or shape (d,),
+    N·m; by default those of the catalogue or the URDF. posture: shape (nq,), a configuration to stand in; by default
+    the one that comes with the robot. Raises `UnknownNameError` with the near names, and `InputError` for feet or
+    limits that do not fit.
     """
     loader = _loader(name)
     entry = CATALOGUE.get(name)
     root = Path(loader.model_root)
-    model = pin.buildModelFromUrdf(
-        str(root / loader.urdf), *([pin.JointModelFreeFlyer()] if loader.free_flyer else [])
-    )
+    model = pin.buildModelFromUrdf(str(root / loader.urdf), *([pin.JointModelFreeFlyer()] if loader.free_flyer else []))
     posture = _posture(model, loader, entry, posture)
     limits = _torque_limits(model, loader.free_flyer, entry, torque_limits)
     robot = Robot(
@@ -172,9 +170,7 @@ def _posture(model: pin.Model, loader: _Loader, entry: Entry | None, asked: npt.
     return read_only(pin.normalize(model, np.array(q)))
 
 
-def _torque_limits(
-    model: pin.Model, free_flyer: bool, entry: Entry | None, asked: npt.ArrayLike | None
-) -> Array:
+def _torque_limits(model: pin.Model, free_flyer: bool, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:
     d = model.nv - (6 if free_flyer else 0)
     if asked is not None:
         limits = np.broadcast_to(np.asarray(asked, dtype=np.float64), (d,)) if np.ndim(asked) == 0 else asked

@@ -157,8 +157,8 @@ class Robot:
         """A state at rest with every foot on the ground z = 0.
 
         height: how far above the ground the base's origin should be, m; by default as the posture has it. Found by
-        Gauss-Newton steps of smallest size from the robot's posture. Raises `InputError` when the feet cannot get there.
-        A fixed-base robot, or one without feet, gets its posture.
+        Gauss-Newton steps of smallest size from the robot's posture. Raises `InputError` when the feet cannot get
+        there. A fixed-base robot, or one without feet, gets its posture.
         """
         from floatbase.robots.standing import stand
 
@@ -167,8 +167,8 @@ class Robot:
     def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:
         """A random state around standing, the same for the same seed.
 
-        spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with that
-        deviation in rad/s and m/s. Joint limits are kept.
+        spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with
+        that deviation in rad/s and m/s. Joint limits are kept.
         """
         from floatbase.robots.state import State
 

@@ -96,21 +96,15 @@ class State:
 
     def frame_jacobian(self, frame: str) -> Array:
         """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows, world-aligned."""
-        return read_only(
-            pin.getFrameJacobian(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED)
-        )
+        return read_only(pin.getFrameJacobian(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED))
 
     def frame_velocity(self, frame: str) -> Array:
         """Linear [m/s] and angular [rad/s] velocity of a frame's origin, shape (6,), world-aligned."""
-        return read_only(
-            pin.getFrameVelocity(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED).vector
-        )
+        return read_only(pin.getFrameVelocity(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED).vector)
 
     def frame_drift(self, frame: str) -> Array:
         """J̇ v of a frame's origin, shape (6,): its linear [m/s²] and angular [rad/s²] acceleration when q̈ = 0."""
-        motion = pin.getFrameClassicalAcceleration(
-            self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
-        )
+        motion = pin.getFrameClassicalAcceleration(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED)
         return read_only(motion.vector)
 
     def integrate(self, dv: npt.ArrayLike) -> Array:

@@ -1,7 +1,7 @@
 """Between the two conventions for a state, in one place.
 
-Ours (Pinocchio's): quaternion x y z w, base velocity in the base frame, joints in Pinocchio's order.
-MuJoCo's: quaternion w x y z, linear base velocity in the world and angular in the base frame, joints in the URDF's order.
+Ours (Pinocchio's): quaternion x y z w, base velocity in the base frame, joints in Pinocchio's order. MuJoCo's:
+quaternion w x y z, linear base velocity in the world and angular in the base frame, joints in the URDF's order.
 """
 
 from __future__ import annotations

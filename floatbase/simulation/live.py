@@ -19,9 +19,10 @@ FRAME = 1.0 / 30.0  # s between pictures, about
 class Live:
     """Runs `rollout` in slices of a 30th of a second in a thread of its own and hands each slice to `show`.
 
-    show: called with each slice, in that thread. control_period: s. idle: s without a word from outside after which the run
-    pauses by itself, so that a forgotten page costs nothing. A fall or a failed controller pauses it too; `status` says why.
-    Everything that has to do with the simulation happens between slices; no call here waits for physics or pictures.
+    show: called with each slice, in that thread. control_period: s. idle: s without a word from outside after which the
+    run pauses by itself, so that a forgotten page costs nothing. A fall or a failed controller pauses it too; `status`
+    says why. Everything that has to do with the simulation happens between slices; no call here waits for physics or
+    pictures.
     """
 
     def __init__(
@@ -122,7 +123,9 @@ class Live:
                 due = time.monotonic()
                 continue
             self._slice()
-            due = max(due + self._frame / self._speed, time.monotonic() - FRAME)  # a slow machine falls behind, it does not race
+            due = max(
+                due + self._frame / self._speed, time.monotonic() - FRAME
+            )  # a slow machine falls behind, it does not race
             time.sleep(max(0.0, due - time.monotonic()))
 
     def _slice(self) -> None:

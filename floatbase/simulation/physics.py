@@ -60,11 +60,10 @@ class Ground:
 class Simulation:
     """A robot on the ground in MuJoCo, driven by joint torques.
 
-    The model is edited from the robot's own URDF: free joint for a floating base, a ball at each foot (or at each corner of
-    a flat foot), a plane with friction, a torque motor with its limit on each joint, rotor inertia as in the robot. Joint
-    friction and damping are off, as in (1)-(7). Only feet and ground touch.
-    ground: a `Ground`, or the coefficient of friction of a level one. timestep: s.
-    Raises `SimulationError` when MuJoCo cannot build the robot.
+    The model is edited from the robot's own URDF: free joint for a floating base, a ball at each foot (or at each
+    corner of a flat foot), a plane with friction, a torque motor with its limit on each joint, rotor inertia as in the
+    robot. Joint friction and damping are off, as in (1)-(7). Only feet and ground touch. ground: a `Ground`, or the
+    coefficient of friction of a level one. timestep: s. Raises `SimulationError` when MuJoCo cannot build the robot.
     """
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
@@ -132,7 +131,7 @@ class Simulation:
         self._upright = self._base_pose()
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
-        """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and the pushes that act now."""
+        """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
         tau = np.asarray(tau, dtype=np.float64)
         if tau.shape != (self.robot.d,) or not np.all(np.isfinite(tau)):
             raise InputError(f"torques must be {self.robot.d} finite numbers (N·m); got {tau!r}.")
