@@ -1,0 +1,1 @@
+"""The viewer: the picture of a state in the page, played, plotted and saved."""

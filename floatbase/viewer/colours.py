@@ -1,0 +1,47 @@
+"""The one colour code, in 3-D and in plots: colour-blind safe (Okabe and Ito), RGB from 0 to 1.
+
+Dark blue is what was measured, light blue what was planned. A friction cone is green while its force is inside, orange when
+a facet or the cone's surface is reached, and vermilion when the force is outside.
+"""
+
+from __future__ import annotations
+
+RGB = tuple[float, float, float]
+RGBA = tuple[float, float, float, float]
+
+
+def _rgb(code: str) -> RGB:
+    red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return red, green, blue
+
+
+MEASURED = _rgb("#0072B2")
+PLANNED = _rgb("#56B4E9")
+COM = _rgb("#AA3377")
+CALM = _rgb("#009E73")
+WARNING = _rgb("#E69F00")
+ALARM = _rgb("#D55E00")
+PUSH = _rgb("#222222")
+LIMIT = _rgb("#888888")
+ROBOT = _rgb("#9EA3AB")
+GHOST = _rgb("#7A86A8")
+PATCH = _rgb("#444444")
+
+X_AXIS = _rgb("#D55E00")
+Y_AXIS = _rgb("#009E73")
+Z_AXIS = _rgb("#0072B2")
+
+# cone status -> colour, in the order of growing worry
+CONE = {"inside": CALM, "active": WARNING, "outside": ALARM}
+
+# background -> (top, bottom) of the page, colour of the ground's lines, colour of text
+BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
+    "white": (_rgb("#FFFFFF"), _rgb("#FFFFFF"), _rgb("#DDDDDD"), _rgb("#222222")),
+    "light": (_rgb("#FBFCFE"), _rgb("#DFE5EC"), _rgb("#BCC5CF"), _rgb("#222222")),
+    "dark": (_rgb("#1E2227"), _rgb("#33393F"), _rgb("#59616A"), _rgb("#F2F2F2")),
+}
+
+
+def with_alpha(colour: RGB, alpha: float) -> RGBA:
+    """The colour, so opaque: 0 is not seen, 1 hides what is behind."""
+    return (*colour, alpha)

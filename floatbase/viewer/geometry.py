@@ -1,0 +1,97 @@
+"""Plain triangle meshes: vertices, shape (n, 3), and faces, shape (m, 3), counted from the vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+Vertices = npt.NDArray[np.float32]
+Faces = npt.NDArray[np.uint32]
+Mesh = tuple[Vertices, Faces]
+
+
+def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
+    """Several meshes as one."""
+    starts = np.cumsum([0] + [len(np.asarray(vertices)) for vertices, _ in meshes])
+    faces = [np.asarray(part) + start for (_, part), start in zip(meshes, starts, strict=False)]
+    vertices = [np.asarray(part) for part, _ in meshes]
+    return np.vstack(vertices).astype(np.float32), np.vstack(faces).astype(np.uint32)
+
+
+def revolved(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
+    """The surface that (radius, height) pairs sweep around the z axis; a profile listed upwards faces outwards.
+
+    Each stretch of the profile has vertices of its own, so that its edges stay sharp.
+    """
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
+    bands = []
+    for (r0, z0), (r1, z1) in pairwise(profile):
+        low, high = circle * [r0, r0, 0] + [0, 0, z0], circle * [r1, r1, 0] + [0, 0, z1]
+        bands.append((np.vstack([low, high]), _band(sides, r0 > 0, r1 > 0)))
+    return merged(bands)
+
+
+def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
+    """Faces between two circles; a circle that shrank to a point needs none on its side."""
+    i = np.arange(sides)
+    j = (i + 1) % sides
+    up = np.stack([i, j, j + sides], axis=1) if low else np.zeros((0, 3), int)
+    down = np.stack([i, j + sides, i + sides], axis=1) if high else np.zeros((0, 3), int)
+    return np.vstack([up, down])
+
+
+def ball(radius: float, sides: int = 20) -> Mesh:
+    """A ball around the origin."""
+    heights = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 1)
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    rings = [
+        radius * np.stack([np.cos(h) * np.cos(angles), np.cos(h) * np.sin(angles), np.full(sides, np.sin(h))], axis=1)
+        for h in heights
+    ]
+    bands = [_band(sides, k > 0, k < len(rings) - 2) + k * sides for k in range(len(rings) - 1)]
+    return np.vstack(rings).astype(np.float32), np.vstack(bands).astype(np.uint32)
+
+
+def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 14) -> Mesh:
+    """A closed cylinder from one point to another."""
+    a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    length = float(np.linalg.norm(b - a))
+    vertices, faces = revolved([(0, 0), (radius, 0), (radius, length), (0, length)], sides)
+    return (vertices @ frame_along((b - a) / length).T + a).astype(np.float32), faces
+
+
+def frame_along(direction: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """A rotation, shape (3, 3), whose z axis is the unit vector `direction`."""
+    x, y, z = np.asarray(direction, dtype=float)
+    # Duff et al., Building an orthonormal basis, revisited (2017)
+    sign = 1.0 if z >= 0 else -1.0
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    return np.array([[1.0 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
+
+
+def fan(corners: npt.ArrayLike) -> Mesh:
+    """A flat convex polygon, seen from the side its corners run counter-clockwise on."""
+    points = np.asarray(corners, dtype=np.float32)
+    i = np.arange(1, len(points) - 1)
+    return points, np.stack([np.zeros_like(i), i, i + 1], axis=1).astype(np.uint32)
+
+
+def pyramid(rays: npt.ArrayLike) -> Mesh:
+    """The sides of the cone of rays, from the origin to the rays' ends; each side has vertices of its own."""
+    ends = np.asarray(rays, dtype=np.float32)
+    return merged([fan([np.zeros(3), a, b]) for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)])
+
+
+def torus_arc(radius: float, tube: float, start: float, end: float, sides: int = 40) -> Mesh:
+    """Part of a ring around z, from one angle to the other (rad)."""
+    around = np.linspace(start, end, sides + 1)
+    across = 2.0 * np.pi * np.arange(10) / 10
+    reach = radius + tube * np.cos(across)
+    rings = [np.stack([reach * np.cos(a), reach * np.sin(a), tube * np.sin(across)], axis=1) for a in around]
+    bands = [_band(10, True, True)[:, ::-1] + k * 10 for k in range(sides)]
+    return np.vstack(rings).astype(np.float32), np.vstack(bands).astype(np.uint32)

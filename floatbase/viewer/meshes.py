@@ -1,0 +1,124 @@
+"""Robot meshes: the light ones in `assets/`, else the URDF's own, else primitives along the kinematic tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import floatbase
+from floatbase.robots.robot import Robot
+from floatbase.viewer import geometry
+from floatbase.viewer.colours import ROBOT
+
+
+@dataclass(frozen=True, eq=False)
+class JointMesh:
+    """What one joint moves.
+
+    joint: Pinocchio's number of the joint. vertices: (n, 3), m, in the joint's frame. faces: (m, 3), into the vertices.
+    colours: (n, 3), 0-255.
+    """
+
+    joint: int
+    vertices: npt.NDArray[np.float32]
+    faces: npt.NDArray[np.uint32]
+    colours: npt.NDArray[np.uint8]
+
+
+def assets_root() -> Path:
+    """The folder `assets/`: inside an installed package, else at the top of the repository."""
+    package = Path(floatbase.__file__).parent
+    installed = package / "_assets"
+    return installed if installed.is_dir() else package.parent / "assets"
+
+
+def robot_meshes(robot: Robot) -> list[JointMesh]:
+    """The meshes of a robot, one for each joint that moves something visible; fixed parts belong to joint 0, the world."""
+    asset = assets_root() / "meshes" / f"{robot.name}.npz"
+    if asset.is_file():
+        return [mesh for part in _parts(asset) for mesh in _placed(robot, *part)]
+    try:
+        meshes = _from_urdf(robot)
+    except (ImportError, ValueError, OSError):  # no trimesh, or files that it or Pinocchio cannot read
+        meshes = []
+    return meshes or _from_tree(robot)
+
+
+Part = tuple[str, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[np.uint8]]
+
+
+@lru_cache(maxsize=8)
+def _parts(asset: Path) -> list[Part]:
+    """Joint name, vertices, faces and colours of each part of a file; its layout stands in assets/build_meshes.py."""
+    parts = []
+    with np.load(asset) as held:
+        data = {name: held[name] for name in held.files}
+    vertex, face = data["vertex_start"], data["face_start"]
+    for i, joint in enumerate(data["joints"]):
+        rows = slice(vertex[i], vertex[i + 1])
+        vertices = (data["vertices"][rows] * data["steps"][i]).astype(np.float32)
+        faces = data["faces"][face[i] : face[i + 1]].astype(np.uint32)
+        parts.append((str(joint), vertices, faces, data["palette"][data["colours"][rows]]))
+    return parts
+
+
+def _placed(
+    robot: Robot,
+    joint: str,
+    vertices: npt.NDArray[np.float32],
+    faces: npt.NDArray[np.uint32],
+    colours: npt.NDArray[np.uint8],
+) -> list[JointMesh]:
+    """The part on its joint; on the joint above when this one was locked; nowhere when the model lacks it."""
+    model = robot.model
+    if model.existJointName(joint):
+        return [JointMesh(int(model.getJointId(joint)), vertices, faces, colours)]
+    if model.existFrame(joint):
+        frame = model.frames[model.getFrameId(joint)]
+        moved = vertices @ frame.placement.rotation.T + frame.placement.translation
+        return [JointMesh(int(frame.parentJoint), moved.astype(np.float32), faces, colours)]
+    return []
+
+
+def _from_urdf(robot: Robot) -> list[JointMesh]:
+    """The URDF's own visuals, merged joint by joint. Raises `ImportError` without trimesh."""
+    from floatbase.viewer.visuals import urdf_visuals
+
+    pieces = urdf_visuals(robot)
+    meshes = []
+    for joint in sorted({piece.joint for piece in pieces}):
+        own = [piece for piece in pieces if piece.joint == joint]
+        colours = [np.tile(np.round(255 * piece.colour), (len(piece.mesh.vertices), 1)) for piece in own]
+        vertices, faces = geometry.merged([(piece.mesh.vertices, piece.mesh.faces) for piece in own])
+        meshes.append(JointMesh(joint, vertices, faces, np.vstack(colours).astype(np.uint8)))
+    return meshes
+
+
+def _from_tree(robot: Robot) -> list[JointMesh]:
+    """A ball at every joint and a rod to each of its children."""
+    model = robot.model
+    lengths = [float(np.linalg.norm(placement.translation)) for placement in list(model.jointPlacements)[1:]]
+    radius = 0.12 * float(np.median([length for length in lengths if length > 1e-3] or [0.2]))
+    meshes = []
+    for joint in range(model.njoints):
+        ends = [model.jointPlacements[child].translation for child in model.children[joint]]
+        ends += [foot_frame.placement.translation for foot_frame in _feet(robot, joint)]
+        if joint == 0 and robot.is_floating:
+            continue
+        shapes = [geometry.ball(1.6 * radius)]
+        shapes += [geometry.rod(np.zeros(3), end, radius) for end in ends if np.linalg.norm(end) > 1e-6]
+        vertices, faces = geometry.merged(shapes)
+        colours = np.tile(np.round(255 * np.array(ROBOT)), (len(vertices), 1)).astype(np.uint8)
+        meshes.append(JointMesh(joint, vertices, faces, colours))
+    return meshes
+
+
+def _feet(robot: Robot, joint: int) -> list[Any]:
+    """Frames of the feet that a joint carries."""
+    frames = [robot.model.frames[robot.frame_id(foot.frame)] for foot in robot.feet]
+    return [frame for frame in frames if frame.parentJoint == joint]

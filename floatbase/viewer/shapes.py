@@ -1,0 +1,190 @@
+"""What is drawn beside the robot: force arrows, friction cones, contact patches, the centre of mass, ground, labels.
+
+Each function gives items: a shape of unit size, and the pose and scale that make it this one. So a force that changes costs
+one matrix, and the scene itself says how long an arrow is and how wide a cone opens.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array
+from floatbase.control.friction import FrictionPolyhedron, tangents
+from floatbase.viewer import geometry, three
+from floatbase.viewer.colours import COM, CONE, PATCH, RGB, RGBA, WARNING, with_alpha
+from floatbase.viewer.three import Shape
+
+CONE_ALPHA = 0.28
+FACET_ALPHA = 0.75
+ARROW_SLENDERNESS = 0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
+ARROW_LENGTH = 0.2  # m
+
+
+class Item(NamedTuple):
+    """One thing in the picture: a shape, its pose and scale as a matrix (4, 4) in the world, its colour if that may change."""
+
+    shape: Shape
+    matrix: Array
+    colour: RGBA | None = None
+
+
+# path below the scene's root -> item; no path may lie below another, because a pose moves all that is below it
+Picture = dict[str, Item]
+
+
+def placed(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0) -> Array:
+    """The matrix that scales along a shape's own axes, turns it, and puts it at `position`."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = (np.eye(3) if rotation is None else np.asarray(rotation)) * np.asarray(scale)
+    matrix[:3, 3] = position
+    return matrix
+
+
+def arrow(start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False) -> Item:
+    """An arrow from `start` along `vector`, as long as the vector, both in m, world.
+
+    size: of the robot, m; the shaft is wide enough to be seen beside it, and wider the longer the arrow, by the square root.
+    halo: wider and translucent, so that it shows around another arrow at the same place.
+    """
+    vector = np.asarray(vector, dtype=np.float64)
+    length = float(np.linalg.norm(vector))
+    reference = ARROW_LENGTH * size
+    width = min(ARROW_SLENDERNESS * float(np.sqrt(length * reference)), 0.35 * length) * (1.8 if halo else 1.0)
+    rotation = geometry.frame_along(vector / length)
+    return Item(_unit_arrow(colour, 0.6 if halo else 1.0), placed(start, rotation, (width / 2, width / 2, length)))
+
+
+def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str) -> Item:
+    """(28) The cone ‖f_tangent‖ ≤ μ f_normal, up to the normal force that `height` m stand for.
+
+    status: "inside", "active" or "outside", which gives the colour.
+    """
+    rotation = _surface_frame(normal)
+    return Item(
+        _unit_cone(), placed(position, rotation, (mu * height, mu * height, height)), with_alpha(CONE[status], CONE_ALPHA)
+    )
+
+
+def friction_polyhedron(
+    position: npt.ArrayLike,
+    polyhedron: FrictionPolyhedron,
+    height: float,
+    status: str,
+    active: npt.ArrayLike = (),
+) -> Picture:
+    """The polyhedron that stands in for the cone, as the cone of its rays; facets in `active` (numbers) light up."""
+    matrix = placed(position, _surface_frame(polyhedron.normal), height)
+    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside))
+    picture = {"/sides": Item(_unit_polyhedron(*key), matrix, with_alpha(CONE[status], CONE_ALPHA))}
+    for facet in np.atleast_1d(np.asarray(active, dtype=int)):
+        picture[f"/facet {facet}"] = Item(_facet(*key, int(facet)), matrix)
+    return picture
+
+
+def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
+    """A disc on the ground where a contact is."""
+    return Item(_unit_disc(PATCH), placed(position, _surface_frame(normal), (radius, radius, 0.12 * radius)))
+
+
+def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Picture:
+    """A ball at the centre of mass, its shadow point on the ground at height `ground`, and the line between."""
+    x, y, z = np.asarray(position, dtype=np.float64)
+    radius = 0.04 * size
+    foot = np.array([x, y, ground])
+    return {
+        "/ball": Item(_unit_ball(COM, True), placed([x, y, z], scale=radius)),
+        "/line": Item(_unit_rod(COM), placed(foot, scale=(0.1 * radius, 0.1 * radius, max(z - ground, 1e-4)))),
+        "/projection": Item(_unit_disc(COM), placed(foot, scale=(0.8 * radius, 0.8 * radius, 0.12 * radius))),
+    }
+
+
+def label(position: npt.ArrayLike, text: str, height: float, colour: RGB = (0.13, 0.13, 0.13), plate: bool = True) -> Item:
+    """Text that faces the reader, letters `height` m high, centred on `position`."""
+    return Item(_label(text, height, plate, colour), placed(position))
+
+
+def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB) -> Picture:
+    """A bar on the ground as long as a force of `force` N is drawn, and what it stands for."""
+    start = np.asarray(position, dtype=np.float64)
+    along = geometry.frame_along([0.0, 1.0, 0.0])
+    thick = 0.012 * size
+    text_at = start + np.array([0.0, length / 2, 2.2 * thick + 0.07 * size])
+    picture = {"/bar": Item(_unit_rod(colour), placed(start, along, (thick / 2, thick / 2, length)))}
+    for end, y in (("/start", 0.0), ("/end", length)):
+        where = start + np.array([0.0, y, 0.0])
+        picture[end] = Item(_unit_rod(colour), placed(where, along, (2.2 * thick, 2.2 * thick, thick / 2)))
+    return picture | {"/label": label(text_at, f"{force:g} N", 0.055 * size, colour)}
+
+
+def ground(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
+    """Lines on the ground z = 0 every `step` m."""
+    return Item(_grid(colour, step, half), np.eye(4))
+
+
+def _surface_frame(normal: npt.ArrayLike) -> Array:
+    """Axes of a contact: the tangents that the friction rows use, and the normal."""
+    t1, t2 = tangents(normal)
+    return np.stack([t1, t2, np.cross(t1, t2)], axis=1)
+
+
+@lru_cache(maxsize=64)
+def _unit_arrow(colour: RGB, opacity: float) -> Shape:
+    """Along z, 1 long, its shaft of radius 1."""
+    profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.78), (2.1, 0.78), (0.0, 1.0)]
+    return three.mesh(*geometry.revolved(profile), colour, opacity=opacity)
+
+
+@lru_cache(maxsize=64)
+def _unit_rod(colour: RGB) -> Shape:
+    """Along z, 1 long, of radius 1."""
+    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14), colour)
+
+
+@lru_cache(maxsize=64)
+def _unit_disc(colour: RGB) -> Shape:
+    """A flat cylinder around z, of radius 1, its middle at 0."""
+    return three.mesh(*geometry.revolved([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32), colour)
+
+
+@lru_cache(maxsize=64)
+def _unit_ball(colour: RGB, through: bool = False) -> Shape:
+    return three.mesh(*geometry.ball(1.0), colour, through=through)
+
+
+@lru_cache(maxsize=1)
+def _unit_cone() -> Shape:
+    """Point down at 0, 1 high, opening to radius 1."""
+    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 1.0)], 48), (1.0, 1.0, 1.0), opacity=CONE_ALPHA)
+
+
+@lru_cache(maxsize=64)
+def _unit_polyhedron(mu: float, facets: int, inside: bool) -> Shape:
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside).rays
+    return three.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA, flat=True)
+
+
+@lru_cache(maxsize=256)
+def _facet(mu: float, facets: int, inside: bool, facet: int) -> Shape:
+    """One side of the polyhedron: facet i lies between rays i - 1 and i."""
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside).rays
+    corners = [np.zeros(3), rays[facet - 1], rays[facet]]
+    return three.mesh(*geometry.fan(corners), WARNING, opacity=FACET_ALPHA, flat=True)
+
+
+@lru_cache(maxsize=256)
+def _label(text: str, height: float, plate: bool, colour: RGB) -> Shape:
+    return three.label(text, height, plate, colour)
+
+
+@lru_cache(maxsize=8)
+def _grid(colour: RGB, step: float, half: float) -> Shape:
+    at = np.arange(-half, half + step / 2, step)
+    # in pieces of one step: software renderers lose lines that begin far behind the camera
+    start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
+    along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
+    points = np.vstack([along_x, along_x[:, ::-1]])
+    return three.lines(np.hstack([points, np.zeros((len(points), 1))]), colour)

@@ -1,0 +1,81 @@
+"""A robot's own visuals, as its URDF names them: what the light meshes are made from, and what other robots are shown with.
+
+meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with wrong triangles; so the
+files are read here by trimesh, material by material. Needs trimesh, and pycollada for .dae files.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase.robots.robot import Robot
+
+if TYPE_CHECKING:
+    import trimesh
+
+GREY = (0.62, 0.64, 0.67)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One coloured piece of a robot: the joint that moves it, its RGB colour 0-1, its mesh in m in the joint's frame."""
+
+    joint: int
+    colour: npt.NDArray[np.float64]
+    mesh: trimesh.Trimesh
+    source: str
+
+
+def urdf_visuals(robot: Robot) -> list[Piece]:
+    """Every coloured piece of the URDF's visuals. Raises `ImportError` without trimesh."""
+    import trimesh  # noqa: F401  before the slow part, so that its absence shows at once
+
+    folders = [str(folder) for folder in robot.package_dirs]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        geometry = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.VISUAL, package_dirs=folders)
+    return [piece for item in geometry.geometryObjects for piece in _pieces(item)]
+
+
+def _pieces(item: pin.GeometryObject) -> list[Piece]:
+    """The pieces of one visual, one for each of its materials."""
+    import trimesh
+
+    if not Path(item.meshPath).is_file():
+        meshes = [_primitive(item.geometry)]
+    else:
+        dump = trimesh.load_scene(item.meshPath).dump()
+        meshes = [mesh for mesh in dump if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+    pieces = []
+    for mesh in meshes:
+        plain = trimesh.Trimesh(mesh.vertices, mesh.faces)
+        plain.apply_scale(np.asarray(item.meshScale).ravel())
+        plain.apply_transform(item.placement.homogeneous)
+        pieces.append(Piece(int(item.parentJoint), _colour(item, mesh), plain, Path(item.meshPath).stem))
+    return pieces
+
+
+def _primitive(shape: Any) -> trimesh.Trimesh:
+    """A box, cylinder or sphere of the URDF as a mesh."""
+    import trimesh
+
+    if hasattr(shape, "halfSide"):
+        return trimesh.creation.box(2.0 * np.asarray(shape.halfSide).ravel())
+    if hasattr(shape, "halfLength"):
+        return trimesh.creation.cylinder(shape.radius, 2.0 * shape.halfLength, sections=24)
+    return trimesh.creation.icosphere(2, shape.radius)
+
+
+def _colour(item: pin.GeometryObject, mesh: trimesh.Trimesh) -> npt.NDArray[np.float64]:
+    """The material's colour where the file has one, else the URDF's, else grey."""
+    material = getattr(mesh.visual, "material", None)
+    if Path(item.meshPath).suffix.lower() in (".dae", ".obj") and material is not None:
+        return np.asarray(material.main_color[:3]) / 255.0
+    return np.asarray(item.meshColor).ravel()[:3] if item.overrideMaterial else np.array(GREY)

@@ -1,0 +1,88 @@
+"""Robots and windows for the viewer's tests, and a real browser where there is one."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from floatbase.dynamics.contacts import Contacts
+from floatbase.robots import Robot, State, load
+from floatbase.viewer.scene import Viewer
+from floatbase.viewer.window import Window
+
+SCREENSHOTS = Path(__file__).parents[2] / "build" / "screenshots"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+]
+
+
+@pytest.fixture(scope="session")
+def go2() -> Robot:
+    return load("go2")
+
+
+@pytest.fixture(scope="session")
+def standing(go2: Robot) -> State:
+    return go2.standing()
+
+
+@pytest.fixture
+def contacts(go2: Robot) -> Contacts:
+    return Contacts.points(go2, mu=0.6)
+
+
+@pytest.fixture
+def forces(go2: Robot) -> np.ndarray:
+    """A quarter of the weight on each foot: one inside its cone, one on it, one outside, one inside."""
+    quarter = go2.weight / 4
+    tangent = np.array([0.1, 0.6, 0.9, 0.0])
+    return quarter * np.stack([tangent, np.zeros(4), np.ones(4)], axis=1)
+
+
+@pytest.fixture
+def window() -> Iterator[Window]:
+    with Window() as opened:
+        yield opened
+
+
+@pytest.fixture
+def viewer(go2: Robot) -> Iterator[Viewer]:
+    view = Viewer(go2)
+    yield view
+    view.close()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A headless Chromium; ended with the module, because playwright keeps an event loop running in this thread."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium found on the path")
+    with playwright.sync_playwright() as started:
+        chromium = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(browser):
+    """A page that fails the test when its script fails."""
+    opened = browser.new_page(viewport={"width": 900, "height": 600})
+    errors: list[str] = []
+    opened.on("pageerror", lambda error: errors.append(str(error)))
+    opened.on("console", lambda line: errors.append(line.text) if line.text.startswith("floatbase") else None)
+    yield opened
+    opened.close()
+    assert errors == []

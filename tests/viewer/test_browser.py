@@ -1,0 +1,118 @@
+"""A real browser looks at the page. Screenshots go to build/screenshots."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from floatbase.dynamics.contacts import Contacts
+from floatbase.robots import Robot, State
+from floatbase.viewer.colours import ALARM, CALM, COM, MEASURED, WARNING
+from floatbase.viewer.scene import Viewer
+from floatbase.viewer.window import Window
+
+from .conftest import SCREENSHOTS
+
+# world position of a node, in our coordinates
+WHERE = """(path) => {
+  const node = viewer.scene_tree.find(path.split("/")).object, at = new MeshCat.THREE.Vector3();
+  node.getWorldPosition(at);
+  return [at.x, -at.z, at.y];
+}"""
+
+
+def settle(page, viewer: Viewer, frames: int = 1) -> None:
+    """Wait until the page has drawn."""
+    page.wait_for_function(f"window.viewer && viewer.num_messages_received >= {frames}")
+    page.wait_for_function("!viewer.needs_render")
+
+
+def picture(page, name: str) -> np.ndarray:
+    """A screenshot, kept, as (height, width, 3)."""
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    data = page.screenshot(path=str(SCREENSHOTS / f"{name}.png"))
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+
+
+def hue_pixels(image: np.ndarray, colour: tuple[float, float, float]) -> int:
+    """How many pixels have the colour's hue, whatever the light."""
+    wanted = np.array(colour) - np.mean(colour)
+    have = image - image.mean(axis=2, keepdims=True)
+    length = np.linalg.norm(have, axis=2)
+    aligned = (have @ wanted) / np.maximum(length * np.linalg.norm(wanted), 1e-9)
+    return int(np.sum((aligned > 0.97) & (length > 25)))
+
+
+def test_robot_arrows_and_cones_are_in_the_page(
+    page, viewer: Viewer, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    viewer.show(standing, contacts, forces=forces, title="go2 stands")
+    page.goto(viewer.url)
+    settle(page, viewer)
+    tree = page.evaluate(
+        "Object.fromEntries(Object.entries(viewer.scene_tree.children.meshcat.children)"
+        ".map(([name, node]) => [name, Object.keys(node.children).length]))"
+    )
+    assert tree["robot"] == 13
+    assert tree["measured"] == tree["cone"] == tree["patch"] == 4
+    for name, position in zip(contacts.point_names, contacts.positions(standing), strict=True):
+        np.testing.assert_allclose(page.evaluate(WHERE, f"meshcat/measured/{name}"), position, atol=1e-5)
+    assert page.evaluate("document.getElementById('title').textContent") == "go2 stands"
+    image = picture(page, "go2_standing")
+    for colour in (MEASURED, CALM, WARNING, ALARM, COM):
+        assert hue_pixels(image, colour) > 100
+    background = image[5, 300]
+    robot_rows, robot_columns = np.nonzero(np.abs(image - background).sum(axis=2) > 150)
+    assert np.ptp(robot_columns) > 300 and np.ptp(robot_rows) > 250
+
+
+def test_the_page_follows_and_forgets(page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+    viewer.show(standing, contacts, forces=forces)
+    page.goto(viewer.url)
+    settle(page, viewer)
+    viewer.show(standing, com=False)
+    page.wait_for_function("Object.keys(viewer.scene_tree.children.meshcat.children.measured.children).length == 0")
+    page.wait_for_function("!viewer.needs_render")
+    image = picture(page, "go2_bare")
+    for colour in (MEASURED, WARNING, ALARM, COM):
+        assert hue_pixels(image, colour) < 30
+
+
+def test_the_page_comes_back_when_the_window_does(page, go2: Robot) -> None:
+    first = Window()
+    page.goto(first.web_url)
+    first.wait()
+    first.close()
+    page.wait_for_function("getComputedStyle(document.getElementById('notice')).display == 'block'")
+    with Window(port=first.port) as second:
+        second.wait(timeout=10)
+        assert second.browsers == 1
+
+
+def test_get_image_is_the_picture_in_the_page(page, viewer: Viewer, standing: State) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    viewer.show(standing)
+    page.goto(viewer.url)
+    settle(page, viewer)
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(viewer.window.get_image)
+        while not asked.done():
+            page.wait_for_timeout(10)
+    image = asked.result()
+    assert image.size == (900, 600)
+    assert hue_pixels(np.asarray(image.convert("RGB")).astype(int), COM) > 50
+
+
+@pytest.mark.parametrize("background", ["white", "light", "dark"])
+def test_backgrounds(page, go2: Robot, standing: State, background: str) -> None:
+    viewer = Viewer(go2, background=background)
+    viewer.show(standing, title=background)
+    page.goto(viewer.url)
+    settle(page, viewer)
+    corner = picture(page, f"background_{background}")[590, 5]
+    assert (corner.mean() > 200) == (background != "dark")
+    viewer.close()

@@ -1,0 +1,52 @@
+"""Light meshes: their size, their likeness to the originals, and what robots without them are shown with."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+
+from floatbase.robots import load, robots
+from floatbase.viewer.meshes import assets_root, robot_meshes
+
+
+@pytest.mark.parametrize("name", robots())
+def test_light_meshes_are_under_400_kb_and_good_triangles(name: str) -> None:
+    assert (assets_root() / "meshes" / f"{name}.npz").stat().st_size < 400_000
+    for mesh in robot_meshes(load(name)):
+        assert mesh.faces.max() < len(mesh.vertices) == len(mesh.colours)
+        assert np.all(np.isfinite(mesh.vertices))
+
+
+@pytest.mark.parametrize("name", robots())
+def test_light_meshes_fill_the_same_box_as_the_originals(name: str) -> None:
+    pytest.importorskip("trimesh", reason="the originals are read with trimesh")
+    pytest.importorskip("collada", reason="the originals are read with pycollada")
+    from floatbase.viewer.visuals import urdf_visuals
+
+    robot = load(name)
+    pieces = urdf_visuals(robot)
+    light = robot_meshes(robot)
+    assert {mesh.joint for mesh in light} == {piece.joint for piece in pieces}
+    for mesh in light:
+        own = np.vstack([piece.mesh.vertices for piece in pieces if piece.joint == mesh.joint])
+        np.testing.assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=0.006)
+        np.testing.assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=0.006)
+
+
+def test_a_robot_outside_the_catalogue_shows_its_own_meshes() -> None:
+    pytest.importorskip("trimesh", reason="other robots' meshes are read with trimesh")
+    robot = load("hyq", feet=["lf_foot", "rf_foot", "lh_foot", "rh_foot"])
+    assert sum(len(mesh.faces) for mesh in robot_meshes(robot)) > 1000
+
+
+def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    robot = dataclasses.replace(load("go2"), name="unheard of")
+    meshes = robot_meshes(robot)
+    assert [mesh.joint for mesh in meshes] == list(range(1, robot.model.njoints))
+    calf = meshes[-1].vertices
+    foot = robot.model.frames[robot.model.getFrameId("RR_foot")].placement.translation
+    assert np.linalg.norm(calf - foot, axis=1).min() < 0.03

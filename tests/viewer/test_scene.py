@@ -1,0 +1,247 @@
+"""The picture of a state, read from the scene's own commands rather than from the code that drew them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from floatbase.dynamics.contacts import Contacts
+from floatbase.errors import InputError, ViewerError
+from floatbase.robots import Robot, State, load, robots
+from floatbase.viewer.camera import PRESETS
+from floatbase.viewer.colours import ALARM, CALM, MEASURED, PLANNED, WARNING
+from floatbase.viewer.scene import Viewer
+from floatbase.viewer.three import code
+
+
+def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
+    """Placements in the scene, by what follows `start` in the path."""
+    return {
+        path.removeprefix(start): np.reshape(command["matrix"], (4, 4)).T
+        for (path, kind, _), command in viewer.window.scene.commands().items()
+        if kind == "set_transform" and path.startswith(start)
+    }
+
+
+def colours(viewer: Viewer, start: str) -> dict[str, tuple[float, ...]]:
+    """Colours set in the scene, without the alpha."""
+    return {
+        path.removeprefix(start).removesuffix("/surface").removesuffix("/sides"): tuple(command["value"][:3])
+        for (path, _, name), command in viewer.window.scene.commands().items()
+        if name == "color" and path.startswith(start)
+    }
+
+
+def paths(viewer: Viewer) -> set[str]:
+    return {path for path, kind, _ in viewer.window.scene.commands() if kind == "set_object"}
+
+
+def material(viewer: Viewer, path: str) -> dict[str, Any]:
+    return viewer.window.scene.commands()[path, "set_object", ""]["object"]["materials"][0]
+
+
+def test_every_joint_stands_where_the_state_says(viewer: Viewer, go2: Robot) -> None:
+    state = go2.random_state(3)
+    viewer.show(state)
+    placed = matrices(viewer, "/meshcat/robot/")
+    assert len(placed) == go2.model.njoints - 1
+    for name, matrix in placed.items():
+        np.testing.assert_allclose(matrix, state.joint_transforms[go2.model.getJointId(name)], atol=1e-6)
+
+
+@pytest.mark.parametrize("factor", [0.02, 1.0, 7.0])
+def test_arrows_start_at_the_contact_and_are_force_times_scale_long(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray, factor: float
+) -> None:
+    viewer.show(standing, contacts, forces=factor * forces, planned=0.5 * factor * forces)
+    for kind, share in (("measured", 1.0), ("planned", 0.5)):
+        arrows = matrices(viewer, f"/meshcat/{kind}/")
+        assert tuple(arrows) == contacts.point_names
+        for matrix, force, position in zip(arrows.values(), forces, contacts.positions(standing), strict=True):
+            np.testing.assert_allclose(matrix[:3, 2], viewer.scale * factor * share * force, rtol=1e-5, atol=1e-6)
+            np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
+
+
+def test_arrows_are_never_hair_thin_nor_thicker_than_long(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    for factor in (0.01, 0.1, 1.0, 10.0):
+        viewer.show(standing, contacts, forces=factor * forces)
+        for matrix in matrices(viewer, "/meshcat/measured/").values():
+            width, length = 2 * np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
+            assert 0.01 * length < width < 0.4 * length
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0.3, -0.2, 0.9), (1, 0, 0), (0, 0, -1)])
+@pytest.mark.parametrize("mu", [0.2, 0.6, 1.3])
+def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
+    viewer: Viewer, go2: Robot, standing: State, normal: tuple[float, ...], mu: float
+) -> None:
+    contacts = Contacts.points(go2, mu=mu, normals=normal)
+    viewer.show(standing, contacts)
+    cones = matrices(viewer, "/meshcat/cone/")
+    assert len(cones) == 4
+    for matrix, position in zip(cones.values(), contacts.positions(standing), strict=True):
+        across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
+        assert across / along == pytest.approx(mu, rel=1e-5)
+        np.testing.assert_allclose(matrix[:3, 2] / along, np.asarray(normal) / np.linalg.norm(normal), atol=1e-6)
+        np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
+
+
+def test_the_unit_cone_and_arrow_are_of_unit_size(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+    viewer.show(standing, contacts, forces=np.tile([0, 0, 40.0], 4))
+    scene = viewer.window.scene.commands()
+    for path, radius in (("cone/FL_foot/surface", 1.0), ("measured/FL_foot", None)):
+        lowered = scene[f"/meshcat/{path}", "set_object", ""]["object"]
+        position = lowered["geometries"][0]["data"]["attributes"]["position"]
+        points = np.frombuffer(position["array"].data, "<i2").reshape(-1, 3) * lowered["object"]["matrix"][0]
+        assert points[:, 2].min() == pytest.approx(0.0, abs=1e-4)
+        assert points[:, 2].max() == pytest.approx(1.0, abs=1e-4)
+        if radius is not None:
+            assert np.linalg.norm(points[:, :2], axis=1).max() == pytest.approx(radius, abs=1e-3)
+
+
+def test_a_cone_says_whether_its_force_is_inside_on_the_surface_or_outside(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    wanted = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
+    viewer.show(standing, contacts, forces=forces)
+    assert colours(viewer, "/meshcat/cone/") == wanted
+    viewer.show(standing, contacts, planned=forces)
+    assert colours(viewer, "/meshcat/cone/") == wanted
+    viewer.show(standing, contacts, forces=forces, planned=np.tile([0, 0, 30.0], 4))
+    assert colours(viewer, "/meshcat/cone/") == wanted
+    viewer.show(standing, contacts, forces=-forces)
+    assert set(colours(viewer, "/meshcat/cone/").values()) == {ALARM}
+
+
+def test_polyhedra_light_the_facets_that_are_reached(go2: Robot, standing: State, contacts: Contacts) -> None:
+    viewer = Viewer(go2, facets=4)
+    force = np.tile([0.0, 0.0, 40.0], (4, 1))
+    force[0, 0] = 40 * 0.6 * np.cos(np.pi / 4)  # facet 0 looks along x
+    force[1, :2] = -40 * 0.6 * np.cos(np.pi / 4)  # the edge between facets 2 and 3
+    viewer.show(standing, contacts, forces=force)
+    assert {path for path in paths(viewer) if "facet" in path} == {
+        "/meshcat/cone/FL_foot/facet 0",
+        "/meshcat/cone/FR_foot/facet 2",
+        "/meshcat/cone/FR_foot/facet 3",
+    }
+    assert colours(viewer, "/meshcat/cone/")["FL_foot"] == WARNING
+    viewer.show(standing, contacts, forces=0.5 * force + [0, 0, 20.0])
+    assert not {path for path in paths(viewer) if "facet" in path}
+    viewer.close()
+
+
+def test_what_is_not_passed_is_not_drawn_and_nothing_old_remains(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    viewer.show(standing, com=False)
+    bare = paths(viewer)
+    viewer.show(standing, contacts, forces=forces, planned=forces, title="full")
+    full = paths(viewer)
+    assert len([path for path in full if "/measured/" in path]) == 4
+    assert len([path for path in full if "/planned/" in path]) == 4
+    assert len([path for path in full if "/cone/" in path]) == 4
+    assert any("/com/" in path for path in full - bare)
+    viewer.show(standing, contacts.only("FL_foot"), forces=forces[0], com=False, cones=False)
+    assert {path for path in paths(viewer) - bare if "/scale/" not in path} == {
+        "/meshcat/measured/FL_foot",
+        "/meshcat/patch/FL_foot",
+    }
+    viewer.show(standing, com=False)
+    assert paths(viewer) == bare
+    assert viewer.window.scene.commands()["/", "set_title", ""]["text"] == ""
+
+
+def test_showing_twice_sends_nothing(viewer: Viewer, go2: Robot, contacts: Contacts, forces: np.ndarray) -> None:
+    viewer.show(go2.standing(), contacts, forces=forces, title="twice")
+    newest = viewer.window.scene.newest
+    viewer.show(go2.standing(), contacts, forces=forces.ravel(), title="twice")
+    assert viewer.window.scene.newest == newest
+
+
+def test_a_change_sends_only_what_changed(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+    viewer.show(standing, contacts, forces=forces)
+    newest = viewer.window.scene.newest
+    viewer.show(standing, contacts, forces=forces + [[0, 0, 1.0]] + 0 * forces)
+    assert viewer.window.scene.newest - newest == 4 + 1  # four arrows, and a cone that is no longer on its surface
+
+
+def test_an_interrupted_picture_is_drawn_afresh(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+    viewer.show(standing)
+    put, viewer.window.put = viewer.window.put, lambda updates: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore
+    with pytest.raises(KeyboardInterrupt):
+        viewer.show(standing, contacts)
+    viewer.window.put = put  # type: ignore[method-assign]
+    viewer.show(standing)
+    assert not any("/cone/" in path for path in paths(viewer))
+    assert "/meshcat/robot/root_joint" in paths(viewer)
+
+
+def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+    viewer.show(standing, contacts)
+    label = viewer.picture(standing, contacts)["scale/label"].shape.name
+    force = float(re.fullmatch(r"([\d.]+) N", label)[1])  # type: ignore[index]
+    assert np.linalg.norm(matrices(viewer, "/meshcat/scale/bar")[""][:3, 2]) == pytest.approx(viewer.scale * force, rel=1e-5)
+
+
+def test_the_colours_are_those_of_the_code(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+    viewer.show(standing, contacts, forces=forces, planned=forces)
+    assert material(viewer, "/meshcat/measured/FL_foot")["color"] == code(MEASURED)
+    assert material(viewer, "/meshcat/planned/FL_foot")["color"] == code(PLANNED)
+
+
+def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer: Viewer, go2: Robot) -> None:
+    state = go2.random_state(1)
+    viewer.show(state)
+    drawn = matrices(viewer, "/meshcat/com/")
+    np.testing.assert_allclose(drawn["ball"][:3, 3], state.com, atol=1e-6)
+    np.testing.assert_allclose(drawn["projection"][:3, 3], [*state.com[:2], 0.0], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", robots())
+def test_every_robot_is_shown_from_every_side(name: str) -> None:
+    robot = load(name)
+    viewer = Viewer(robot)
+    viewer.show(robot.standing())
+    assert 1 <= len([path for path in paths(viewer) if "/robot/" in path]) <= robot.model.njoints
+    eyes = set()
+    for view in PRESETS:
+        viewer.camera(view)
+        eyes.add(tuple(viewer.window.scene.commands()["/", "set_camera", ""]["position"]))
+    assert len(eyes) == len(PRESETS)
+    viewer.close()
+
+
+def test_a_notebook_shows_the_live_page(viewer: Viewer) -> None:
+    assert f'<iframe src="{viewer.url}"' in viewer._repr_html_()
+    viewer.close()
+    assert "closed" in viewer._repr_html_()
+    assert "closed" in repr(viewer)
+
+
+def test_wrong_input_is_explained(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
+    other = load("solo12").standing()
+    for wrong, words in (
+        (lambda: viewer.show(other), "this viewer shows go2, but the state is one of solo12; make a Viewer"),
+        (lambda: viewer.show(standing.q), "show needs a State, as in robot.standing.., not ndarray"),
+        (lambda: viewer.show(standing, forces=np.zeros(12)), "forces were given without contacts.*pass contacts="),
+        (
+            lambda: viewer.show(standing, contacts, np.zeros(9)),
+            r"forces has shape \(9,\); 4 contact points .* \(12,\) or \(4, 3\)",
+        ),
+        (lambda: viewer.show(standing, contacts, planned=np.full(12, np.nan)), r"planned holds nan at index \[0, 0\]"),
+        (lambda: viewer.camera("above"), "camera view is 'above'; it must be one of default, front"),
+        (lambda: Viewer("go2"), "Viewer needs a Robot, as in fb.Viewer"),
+        (lambda: Viewer(go2, background="pink"), "background is 'pink'; it must be one of white, light, dark"),
+        (lambda: Viewer(go2, facets=2), "facets is 2; .* whole number ≥ 3"),
+        (lambda: Viewer(go2, scale=-1), "scale is -1; it must be > 0 m/N"),
+    ):
+        with pytest.raises(InputError, match=words):
+            wrong()
+    viewer.close()
+    with pytest.raises(ViewerError, match="window is closed"):
+        viewer.show(standing)

@@ -1,0 +1,290 @@
+"""The window: life cycle, many threads, interrupts, slow pages, strangers."""
+
+from __future__ import annotations
+
+import _thread
+import asyncio
+import gc
+import json
+import os
+import socket
+import struct
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import meshcat
+import meshcat.geometry
+import numpy as np
+import pytest
+import tornado.httpclient
+import tornado.websocket
+import umsgpack
+
+from floatbase.errors import FloatbaseError, ViewerError
+from floatbase.viewer import wire
+from floatbase.viewer.window import Window
+
+
+def window_threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name.startswith("floatbase-window")]
+
+
+def commands_in(frame: bytes) -> list[dict]:
+    """The commands of a frame."""
+    commands, at = [], 0
+    while at < len(frame):
+        (length,) = struct.unpack_from("<I", frame, at)
+        commands.append(umsgpack.unpackb(frame[at + 4 : at + 4 + length]))
+        at += 4 + length
+    return commands
+
+
+def in_a_loop(coroutine: Coroutine[Any, Any, Any]) -> Any:
+    """The result of a coroutine, run in a thread of its own."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, coroutine).result()
+
+
+async def connect(window: Window, origin: str | None = None) -> tornado.websocket.WebSocketClientConnection:
+    headers = {} if origin is None else {"Origin": origin}
+    url = window.web_url.replace("http", "ws") + "socket"
+    return await tornado.websocket.websocket_connect(tornado.httpclient.HTTPRequest(url, headers=headers))
+
+
+def test_meshcat_draws_into_the_window(window: Window) -> None:
+    visualizer = meshcat.Visualizer(window=window)
+    visualizer["box"].set_object(meshcat.geometry.Box([1, 2, 3]))
+    visualizer["box"].set_transform(np.diag([2.0, 2.0, 2.0, 1.0]))
+    visualizer["box"].set_property("visible", False)
+    scene = window.scene.commands()
+    assert scene["/meshcat/box", "set_object", ""]["object"]["geometries"][0]["depth"] == 3
+    assert scene["/meshcat/box", "set_transform", ""]["matrix"][:6] == [2, 0, 0, 0, 0, 2]
+    assert scene["/meshcat/box", "set_property", "visible"]["value"] is False
+    assert visualizer.url() == window.web_url
+
+
+def test_the_fast_transform_is_the_same_command_as_meshcats(window: Window) -> None:
+    matrix = np.arange(16.0).reshape(4, 4)
+    meshcat.Visualizer(window=window)["a"].set_transform(matrix)
+    window.put([wire.set_transform("/meshcat/b", matrix)])
+    scene = window.scene.commands()
+    ours, theirs = (scene[f"/meshcat/{name}", "set_transform", ""] for name in "ba")
+    assert ours | {"path": ""} == theirs | {"path": ""}
+
+
+def test_the_scene_does_not_grow_when_things_are_drawn_again(window: Window) -> None:
+    visualizer = meshcat.Visualizer(window=window)
+    for i in range(100):
+        visualizer["a"].set_object(meshcat.geometry.Sphere(0.1))
+        visualizer["a"].set_transform(np.eye(4) * i)
+        visualizer["a"].set_property("visible", True)
+        visualizer[f"b{i}"].set_object(meshcat.geometry.Sphere(0.1))
+        visualizer[f"b{i}"].delete()
+    assert len(window.scene) <= 4
+
+
+def test_what_is_deleted_is_gone_with_all_below_it_and_may_come_back(window: Window) -> None:
+    visualizer = meshcat.Visualizer(window=window)
+    visualizer["a/b"].set_object(meshcat.geometry.Sphere(0.1))
+    visualizer["ab"].set_object(meshcat.geometry.Sphere(0.1))
+    visualizer["a"].delete()
+    assert [path for path, *_ in window.scene.commands()] == ["/meshcat/ab"]
+    visualizer["a/b"].set_object(meshcat.geometry.Sphere(0.2))
+    assert [path for path, *_ in window.scene.commands()] == ["/meshcat/ab", "/meshcat/a/b"]
+    visualizer.delete()
+    assert window.scene.commands() == {}
+
+
+def test_the_window_listens_on_loopback_only(window: Window) -> None:
+    lines = Path("/proc/net/tcp").read_text().splitlines()
+    listening = [line.split()[1] for line in lines if line.split()[3] == "0A"]
+    assert f"0100007F:{window.port:04X}" in listening
+    assert f"00000000:{window.port:04X}" not in listening
+    # another address of this machine's loopback network is already too far away
+    with pytest.raises(OSError):
+        socket.create_connection(("127.0.0.2", window.port), timeout=2)
+
+
+def test_fifty_windows_opened_and_dropped_leave_no_thread_and_no_port() -> None:
+    before = len(window_threads())
+    files = len(os.listdir("/proc/self/fd"))
+    for _ in range(50):
+        window = Window()
+        port = window.port
+        meshcat.Visualizer(window=window)["a"].set_object(meshcat.geometry.Sphere(0.1))
+        del window
+        gc.collect()
+        with pytest.raises(OSError):
+            socket.create_connection(("127.0.0.1", port), timeout=2)
+    assert len(window_threads()) == before
+    assert len(os.listdir("/proc/self/fd")) <= files + 2
+
+
+def test_windows_leave_no_child_process(window: Window) -> None:
+    children = Path(f"/proc/self/task/{threading.get_native_id()}/children")
+    before = children.read_text()
+    with Window():
+        assert children.read_text() == before
+
+
+def test_a_closed_window_says_so() -> None:
+    window = Window()
+    window.close()
+    window.close()
+    assert not window.is_open
+    with pytest.raises(ViewerError, match=r"window is closed.*open a new one"):
+        meshcat.Visualizer(window=window)["a"].set_object(meshcat.geometry.Sphere(0.1))
+
+
+def test_a_taken_port_is_an_error_that_names_it(window: Window) -> None:
+    with pytest.raises(ViewerError, match=rf"port {window.port} .* cannot be used .*choose another port"):
+        Window(port=window.port)
+    assert issubclass(ViewerError, FloatbaseError)
+
+
+@pytest.mark.parametrize("port", [-1, 65536, 3.5, "8000", True])
+def test_a_port_that_is_none_is_an_error(port: object) -> None:
+    with pytest.raises(ViewerError, match=r"from 0 .a free one. to 65535"):
+        Window(port=port)  # type: ignore[arg-type]
+
+
+def test_a_port_is_free_at_once_after_close() -> None:
+    with Window() as first:
+        port = first.port
+    with Window(port=port) as second:
+        assert second.port == port
+
+
+def test_no_browser_is_an_error_at_once(window: Window) -> None:
+    start = time.monotonic()
+    with pytest.raises(ViewerError, match=r"no browser shows this window.*open http://127.0.0.1"):
+        window.get_image()
+    with pytest.raises(ViewerError, match=r"no browser opened http://127.0.0.1.* within 0.1 s"):
+        window.wait(timeout=0.1)
+    assert time.monotonic() - start < 1.0
+
+
+def test_unknown_commands_are_refused(window: Window) -> None:
+    class Nonsense:
+        def lower(self) -> dict:
+            return {"type": "nonsense", "path": ""}
+
+    with pytest.raises(ViewerError, match=r"unknown viewer command 'nonsense'; known: set_object"):
+        window.send(Nonsense())
+
+
+def test_another_origin_is_refused(window: Window) -> None:
+    async def tries() -> None:
+        with pytest.raises(tornado.httpclient.HTTPClientError, match="403"):
+            await connect(window, origin="http://evil.example")
+        own = await connect(window, origin=window.web_url.rstrip("/"))
+        own.close()
+
+    in_a_loop(tries())
+
+
+def test_another_host_name_is_refused(window: Window) -> None:
+    for path in ("", "main.min.js", "socket"):
+        request = urllib.request.Request(window.web_url + path, headers={"Host": "evil.example"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(request, timeout=5)
+    assert urllib.request.urlopen(window.web_url, timeout=5).status == 200
+
+
+def test_a_page_that_opens_late_gets_the_whole_scene_in_one_frame(window: Window) -> None:
+    for i in range(5):
+        window.put([wire.set_transform(f"/meshcat/{i}", np.eye(4) * (i + 1))])
+
+    async def look() -> list[dict]:
+        client = await connect(window)
+        return commands_in(await asyncio.wait_for(client.read_message(), 5))
+
+    assert [command["path"] for command in in_a_loop(look())] == [f"/meshcat/{i}" for i in range(5)]
+
+
+def test_a_page_that_does_not_read_costs_nothing_and_gets_the_newest_values(window: Window) -> None:
+    updates = 100_000
+
+    async def sleepy() -> list[dict]:
+        client = await connect(window)
+        await asyncio.sleep(0.05)
+        for i in range(updates):
+            window.put([wire.set_transform(f"/meshcat/{i % 7}", np.eye(4) * i)])
+        assert len(window.scene) == 7
+        first = commands_in(await asyncio.wait_for(client.read_message(), 5))
+        await client.write_message(json.dumps({"type": "done"}))
+        second = commands_in(await asyncio.wait_for(client.read_message(), 5))
+        assert len(first) <= 7
+        return second
+
+    start = time.monotonic()
+    last = in_a_loop(sleepy())
+    assert sorted(command["matrix"][0] for command in last) == list(range(updates - 7, updates))
+    assert time.monotonic() - start < 60
+
+
+def test_deletes_and_objects_keep_their_order_on_the_way_to_a_busy_page(window: Window) -> None:
+    async def sleepy() -> list[str]:
+        client = await connect(window)
+        window.put([wire.set_object("/meshcat/a", {"n": 1})])
+        await asyncio.wait_for(client.read_message(), 5)
+        for n in range(5):
+            window.put([wire.delete("/meshcat/a")])
+            window.put([wire.set_object("/meshcat/a", {"n": n})])
+        await asyncio.sleep(0.1)
+        await client.write_message(json.dumps({"type": "done"}))
+        return [command["type"] for command in commands_in(await asyncio.wait_for(client.read_message(), 5))]
+
+    assert in_a_loop(sleepy()) == ["delete", "set_object"]
+
+
+def test_threads_draw_at_the_same_time(window: Window) -> None:
+    def draw(name: str) -> None:
+        for i in range(500):
+            window.put([wire.set_transform(f"/meshcat/{name}", np.eye(4) * i)])
+
+    threads = [threading.Thread(target=draw, args=(f"t{k}",)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {command["matrix"][0] for command in window.scene.commands().values()} == {499.0}
+    assert window.scene.newest == 8 * 500
+
+
+def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) -> None:
+    seen = 0
+
+    async def follow() -> None:
+        nonlocal seen
+        client = await connect(window)
+        while (message := await client.read_message()) is not None:
+            seen = max([seen, *(command["matrix"][0] for command in commands_in(message))])
+            await client.write_message(json.dumps({"type": "done"}))
+
+    page = threading.Thread(target=lambda: asyncio.run(follow()), daemon=True)
+    page.start()
+    window.wait(5)
+    interrupted, i = 0, 0
+    stop = time.monotonic() + 20
+    while interrupted < 50 and time.monotonic() < stop:
+        timer = threading.Timer(0.002 + 0.0001 * interrupted, _thread.interrupt_main)
+        timer.start()
+        try:
+            while True:
+                i += 1
+                window.put([wire.set_transform("/meshcat/a", np.eye(4) * i)])
+        except KeyboardInterrupt:
+            interrupted += 1
+    assert interrupted == 50
+    window.put([wire.set_transform("/meshcat/a", np.eye(4) * (i + 1))])
+    deadline = time.monotonic() + 5
+    while seen != i + 1 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert seen == i + 1
