@@ -1,0 +1,235 @@
+"""Contacts: Jacobians against MuJoCo, drifts by finite differences, how they are named, chosen and stacked."""
+
+from __future__ import annotations
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.dynamics import FlatFootContact, PointContact
+
+N = 10
+
+
+@pytest.fixture(params=judges.FLOATING)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+def tilted(name: str, seed: int) -> fb.Contacts:
+    """A robot's stance on grounds that lean every which way."""
+    robot = judges.load(name)
+    normals = judges.random_normals(len(robot.feet), seed)
+    make = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
+    return make(robot, normals=normals)
+
+
+def owners(contacts: fb.Contacts) -> list[str]:
+    return [contact.name for contact in contacts for _ in contact.point_names]
+
+
+def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str) -> None:
+    from floatbase.simulation.physics import Ground
+
+    robot = judges.load(name)
+    for seed, state in enumerate(judges.states(name, 3)):
+        normal = judges.random_normals(1, seed)[0] if name in judges.BALLS else np.array([0.0, 0.0, 1.0])
+        sim = fb.Simulation(robot, Ground(normal=normal))
+        if name in judges.FLAT:
+            state = robot.standing()  # corners are balls' lowest points, so only level soles can be compared
+        sim.reset(state)
+        make = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
+        contacts = make(robot, normals=normal)
+        assert contacts.point_names == sim.point_names
+        assert np.allclose(contacts.positions(state), sim.contact_positions(), atol=1e-9)
+
+
+def test_the_contact_jacobian_is_mujocos_at_the_contact_point(name: str) -> None:
+    judge = judges.mujoco_of(name)
+    for seed, state in enumerate(judges.states(name, N)):
+        contacts = tilted(name, seed)
+        judge.at(state)
+        points = zip(owners(contacts), contacts.positions(state), strict=True)
+        wanted = np.vstack([judge.jacobian(frame, point)[0] for frame, point in points])
+        assert np.allclose(contacts.jacobian(state), wanted, atol=1e-9)
+
+
+def test_b_is_minus_the_change_of_a_v_along_v(name: str) -> None:
+    for seed, state in enumerate(judges.states(name, N, spread=0.6)):
+        contacts = tilted(name, seed)
+        wanted = -judges.drift_of(lambda s, c=contacts: c.constraint(s)[0], state)
+        assert np.max(np.abs(wanted)) > 1e-3
+        assert np.allclose(contacts.constraint(state)[1], wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0, 0.0), (0.03, -0.02, 0.05)])
+@pytest.mark.parametrize("radius", [0.0, 0.06])
+def test_the_drift_of_a_rolling_ball_is_right_wherever_its_centre_lies(radius: float, centre: tuple[float, ...]) -> None:
+    robot = judges.load("go2")
+    for seed, state in enumerate(judges.states("go2", 5, spread=1.0)):
+        contact = PointContact("FL_foot", judges.random_normals(1, seed)[0], 0.7, radius, centre)
+        A, b = contact.constraint(state)
+        assert np.array_equal(A, contact.jacobian(state))
+        assert np.allclose(b, -judges.drift_of(lambda s, c=contact: c.jacobian(s), state), atol=1e-6)
+    assert robot.foot("FL_foot").radius == 0.022
+
+
+def test_a_ball_rolls_without_slipping_over_its_lowest_point() -> None:
+    """A ball whose contact rows hold moves its centre by ω × (r n): the closed form of rolling."""
+    robot = judges.load("go2")
+    n = judges.random_normals(1, 4)[0]
+    contact = PointContact("FL_foot", n, 0.7, 0.05)
+    state = robot.random_state(0)
+    J, still = contact.jacobian(state), np.zeros(robot.nv)
+    still[:] = state.v - np.linalg.pinv(J) @ (J @ state.v)
+    rolling = state.at(v=still)
+    velocity = rolling.frame_velocity("FL_foot")
+    assert np.linalg.norm(velocity[:3]) > 1e-3
+    assert np.allclose(velocity[:3], np.cross(velocity[3:], 0.05 * n), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", judges.FLAT)
+def test_corner_forces_make_the_wrench_of_their_generators(name: str) -> None:
+    rng = np.random.default_rng(0)
+    for state in judges.states(name, N):
+        for contact in judges.stance(state.robot):
+            forces = rng.normal(size=(len(contact.corners), 3))
+            origin = state.point(contact.frame)
+            moment = sum(np.cross(p - origin, f) for p, f in zip(contact.positions(state), forces, strict=True))
+            wrench = contact.generators(state) @ forces.ravel()
+            assert np.allclose(wrench, np.concatenate([forces.sum(axis=0), moment]), atol=1e-12)
+            A, _ = contact.constraint(state)
+            assert np.allclose(contact.jacobian(state).T @ forces.ravel(), A.T @ wrench, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", judges.FLAT)
+def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None:
+    for state in judges.states(name, N):
+        for contact in judges.stance(state.robot):
+            A, b = contact.constraint(state)
+            assert contact.k == 3 * len(contact.corners) > 6
+            assert A.shape == (6, state.robot.nv)
+            assert b.shape == (6,)
+            assert np.linalg.matrix_rank(contact.jacobian(state)) <= 6
+            assert np.linalg.matrix_rank(A) == 6
+
+
+@pytest.mark.parametrize("name", judges.FLAT)
+def test_corner_motion_rows_would_contradict_each_other_when_a_foot_turns(name: str) -> None:
+    """Why a flat foot is 6 rows: J q̈ = -J̇ q̇ at the corners has no solution where the foot turns."""
+    state = judges.load(name).random_state(0, spread=1.0)
+    contact = next(iter(judges.stance(state.robot)))
+    J = contact.jacobian(state)
+    drift = judges.drift_of(lambda s: contact.jacobian(s), state)
+    left = drift + J @ np.linalg.lstsq(J, -drift, rcond=1e-10)[0]
+    assert np.max(np.abs(left)) > 1e-3
+
+
+def test_four_point_feet_have_six_internal_forces() -> None:
+    state = judges.load("go2").standing()
+    contacts = fb.Contacts.points(state.robot)
+    for feet, dimension in ((4, 6), (3, 3), (2, 1), (1, 0)):
+        J = contacts.only(*contacts.names[:feet]).jacobian(state)
+        assert J.shape[0] - np.linalg.matrix_rank(J[:, :6]) == dimension
+
+
+def test_solo8_on_four_feet_loses_rank_of_its_jacobian() -> None:
+    """Two joints a leg leave the sideways distance of the feet to the base: one row in general, two in its symmetric stance."""
+    robot = judges.load("solo8")
+    contacts = fb.Contacts.points(fb.load("solo8", foot_radius=0.0, feet=[foot.frame for foot in robot.feet]))
+    for seed in range(5):
+        state = fb.State(robot, robot.random_state(seed).q)
+        assert np.linalg.matrix_rank(contacts.jacobian(state), tol=1e-9) == 11
+
+
+# names, choices, order --------------------------------------------------------------------------------------------------
+
+
+def test_all_feet_touch_by_default_in_the_robots_order(name: str) -> None:
+    robot = judges.load(name)
+    contacts = judges.stance(robot)
+    assert contacts.names == tuple(foot.frame for foot in robot.feet)
+    assert len(contacts) == len(robot.feet)
+    assert contacts.k == 3 * contacts.n_points == len(contacts.jacobian(robot.standing()))
+
+
+def test_each_contact_has_its_own_slice_of_forces_and_rows(name: str) -> None:
+    state = judges.load(name).random_state(0)
+    contacts = judges.stance(state.robot)
+    J, stop = contacts.jacobian(state), 0
+    for contact in contacts:
+        part = contacts.force_slice(contact.name)
+        assert part == slice(stop, stop + contact.k)
+        assert np.array_equal(J[part], contact.jacobian(state))
+        stop = part.stop
+    assert stop == contacts.k
+
+
+def test_only_and_without_keep_the_order_and_plus_puts_contacts_behind() -> None:
+    contacts = fb.Contacts.points(judges.load("go2"))
+    a, b, c, d = contacts.names
+    assert contacts.only(c, a).names == (a, c)
+    assert contacts.without(b).names == (a, c, d)
+    assert contacts.without(*contacts.names).names == ()
+    assert (contacts.only(d) + contacts.only(a, b)).names == (d, a, b)
+    assert (fb.Contacts.none() + contacts).names == contacts.names
+    assert contacts.names == (a, b, c, d)
+    assert contacts["FR_foot"].name == "FR_foot"
+    assert "FR_foot" in repr(contacts)
+
+
+def test_normals_can_be_one_for_all_one_for_each_or_by_name() -> None:
+    robot = judges.load("go2")
+    names = fb.Contacts.points(robot).names
+    lean = judges.random_normals(4, 0)
+    assert np.allclose(fb.Contacts.points(robot).normals, [[0.0, 0.0, 1.0]] * 4)
+    assert np.allclose(fb.Contacts.points(robot, normals=5.0 * lean[0]).normals, [lean[0]] * 4)
+    assert np.allclose(fb.Contacts.points(robot, normals=lean).normals, lean)
+    assert np.allclose(fb.Contacts.points(robot, frames=names[::-1], normals=lean).normals, lean)
+    by_name = fb.Contacts.points(robot, normals={names[2]: lean[2]})
+    assert np.allclose(by_name.normals, [[0, 0, 1], [0, 0, 1], lean[2], [0, 0, 1]])
+
+
+def test_friction_is_that_of_each_contact_at_each_of_its_points() -> None:
+    talos = judges.load("talos")
+    left, right = (foot.frame for foot in talos.feet)
+    mixed = fb.Contacts.flat_feet(talos, mu=0.4, frames=[left]) + fb.Contacts.points(talos, mu=0.9, frames=[right])
+    assert np.array_equal(mixed.mus, [0.4, 0.4, 0.4, 0.4, 0.9])
+    assert mixed.point_names == (*(f"{left} corner {i}" for i in range(4)), right)
+    assert mixed.k == 15
+
+
+def test_a_flat_foot_taken_as_a_point_touches_in_the_middle_of_its_corners() -> None:
+    talos = judges.load("talos")
+    state = talos.random_state(0)
+    points = fb.Contacts.points(talos).positions(state)
+    corners = fb.Contacts.flat_feet(talos).positions(state).reshape(2, 4, 3)
+    assert np.allclose(points, corners.mean(axis=1), atol=1e-12)
+
+
+def test_a_frame_that_is_no_foot_can_touch_at_its_origin() -> None:
+    robot = judges.load("anymal_kinova")
+    hand = robot.frames[-1]
+    state = robot.random_state(0)
+    contacts = fb.Contacts.points(robot, frames=[hand])
+    assert np.allclose(contacts.positions(state), [state.point(hand)])
+
+
+def test_no_contacts_give_empty_rows() -> None:
+    state = judges.load("go2").random_state(0)
+    none = fb.Contacts.none()
+    assert none.jacobian(state).shape == (0, 18)
+    assert none.constraint(state)[0].shape == (0, 18)
+    assert none.constraint(state)[1].shape == (0,)
+    assert none.normals.shape == (0, 3)
+    assert none.positions(state).shape == (0, 3)
+    assert none.k == none.n_points == len(none) == 0
+
+
+def test_contacts_can_be_made_by_hand() -> None:
+    robot = judges.load("talos")
+    square = [[0.05, 0.05, 0.0], [0.05, -0.05, 0.0], [-0.05, -0.05, 0.0], [-0.05, 0.05, 0.0]]
+    contacts = fb.Contacts([FlatFootContact("left_sole_link", square), PointContact("gripper_left_base_link")])
+    assert contacts.k == 15
+    assert contacts.constraint(robot.standing())[0].shape == (9, robot.nv)

@@ -1,0 +1,194 @@
+"""Judges that share no code with the package: MuJoCo's dynamics in our coordinates, finite differences, brute force.
+
+Lists of robots are collected from the package, so a robot that joins the catalogue joins the tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+import floatbase as fb
+from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.robots.robot import Robot
+from floatbase.robots.state import State
+from floatbase.simulation.conversion import Conversion
+
+Array = npt.NDArray[np.float64]
+
+ROBOTS = tuple(fb.robots())
+
+
+@cache
+def load(name: str) -> Robot:
+    """A catalogue robot, loaded once."""
+    return fb.load(name)
+
+
+FLOATING = tuple(name for name in ROBOTS if load(name).is_floating)
+FLAT = tuple(name for name in ROBOTS if load(name).feet and all(foot.is_flat for foot in load(name).feet))
+BALLS = tuple(name for name in FLOATING if name not in FLAT)
+
+
+def states(name: str, n: int, spread: float = 0.3) -> list[State]:
+    """n random states of a robot, the same ones every time."""
+    return [load(name).random_state(seed, spread) for seed in range(n)]
+
+
+def stance(robot: Robot, mu: float = 0.7) -> fb.Contacts:
+    """The contacts a robot stands on: flat feet by their corners, balls by their lowest points, none for a fixed base."""
+    if not robot.feet:
+        return fb.Contacts.none()
+    flat = all(foot.is_flat for foot in robot.feet)
+    return fb.Contacts.flat_feet(robot, mu) if flat else fb.Contacts.points(robot, mu)
+
+
+def random_normals(n: int, seed: int, tilt: float = 0.6) -> Array:
+    """n unit normals within about `tilt` rad of the vertical."""
+    rng = np.random.default_rng(seed)
+    raw = np.hstack([tilt * rng.uniform(-1.0, 1.0, (n, 2)), np.ones((n, 1))])
+    return raw / np.linalg.norm(raw, axis=1, keepdims=True)
+
+
+def rotation(axis_angle: npt.ArrayLike) -> Array:
+    """Rotation matrix of a rotation vector, by Rodrigues' formula written out."""
+    w = np.asarray(axis_angle, dtype=np.float64)
+    angle = float(np.linalg.norm(w))
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = w / angle
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+
+
+def quaternion_rotation(xyzw: npt.ArrayLike) -> Array:
+    """Rotation matrix of a unit quaternion x y z w, written out."""
+    x, y, z, w = np.asarray(xyzw, dtype=np.float64)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def turn_between(R_to: Array, R_from: Array) -> Array:
+    """The world rotation vector that turns R_from into R_to, for small turns: log(R_to R_fromᵀ) to third order."""
+    R = R_to @ R_from.T
+    sine = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return sine * (1.0 + float(sine @ sine) / 6.0)
+
+
+class Mujoco:
+    """MuJoCo's M, h and Jacobians of a robot's state, in our coordinates: qvel = T v."""
+
+    def __init__(self, robot: Robot):
+        self.robot = robot
+        self.model = fb.Simulation(robot).model
+        self.data = mujoco.MjData(self.model)
+        self.convert = Conversion(robot, self.model)
+
+    def at(self, state: State) -> Mujoco:
+        """Move MuJoCo's model to a state."""
+        self.data.qpos[:], self.data.qvel[:] = self.convert.to_mujoco(state.q, state.v)
+        mujoco.mj_fwdPosition(self.model, self.data)
+        mujoco.mj_fwdVelocity(self.model, self.data)
+        self.state, self.T = state, self.convert.velocity_map(self.data.qpos)
+        return self
+
+    @property
+    def M(self) -> Array:
+        full = np.zeros((self.model.nv, self.model.nv))
+        mujoco.mj_fullM(self.model, self.data, full)
+        return self.T.T @ full @ self.T
+
+    @property
+    def h(self) -> Array:
+        # a base velocity constant in the base frame turns in the world: Ṫ v = R (ω × v)
+        turning = np.zeros(self.model.nv)
+        if self.robot.is_floating:
+            turning[:3] = quaternion_rotation(self.state.q[3:7]) @ np.cross(self.state.v[3:6], self.state.v[:3])
+        full = np.zeros((self.model.nv, self.model.nv))
+        mujoco.mj_fullM(self.model, self.data, full)
+        return self.T.T @ (self.data.qfrc_bias + full @ turning)
+
+    def body(self, frame: str) -> int:
+        """The MuJoCo body that carries a frame."""
+        joint = self.robot.model.frames[self.robot.frame_id(frame)].parentJoint
+        name = self.robot.model.names[joint]
+        if name in self.robot.joint_names:
+            return int(self.model.joint(name).bodyid[0])
+        return int(self.model.body(self.robot.base).id) if self.robot.is_floating else 0
+
+    def jacobian(self, frame: str, point: npt.ArrayLike) -> tuple[Array, Array]:
+        """Linear and angular Jacobian, each (3, nv), of a world point carried by a frame's body."""
+        linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jac(self.model, self.data, linear, angular, np.asarray(point, dtype=np.float64), self.body(frame))
+        return linear @ self.T, angular @ self.T
+
+
+@cache
+def mujoco_of(name: str) -> Mujoco:
+    """One judge for each catalogue robot."""
+    return Mujoco(load(name))
+
+
+def along(state: State, direction: npt.ArrayLike, step: float) -> State:
+    """The state moved along a velocity direction for a time `step`; v stays as it is."""
+    return state.at(q=state.integrate(step * np.asarray(direction, dtype=np.float64)))
+
+
+def derivative(f: Callable[[State], Array], state: State, direction: npt.ArrayLike, step: float = 1e-5) -> Array:
+    """d/dt f along a velocity direction, by central differences."""
+    return (f(along(state, direction, step)) - f(along(state, direction, -step))) / (2.0 * step)
+
+
+def jacobian_of(f: Callable[[State], Array], state: State, step: float = 1e-6) -> Array:
+    """The derivative of f with respect to v's directions, column by column, by central differences."""
+    return np.column_stack([derivative(f, state, e, step) for e in np.eye(state.robot.nv)])
+
+
+def drift_of(J: Callable[[State], Array], state: State) -> Array:
+    """J̇ v: the derivative of J(q) v along v with v constant, by central differences."""
+    return derivative(lambda s: J(s) @ state.v, state, state.v)
+
+
+def moved(state: State, qdd: Array, t: float) -> State:
+    """The configuration a short time t away (either way) when the robot accelerates with q̈: right to third order in t."""
+    return state.at(q=state.integrate(t * state.v + 0.5 * t * t * qdd))
+
+
+def acceleration_of(f: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4) -> Array:
+    """d²/dt² f under the acceleration q̈, by central differences."""
+    return (f(moved(state, qdd, step)) - 2.0 * f(state) + f(moved(state, qdd, -step))) / step**2
+
+
+def turning_acceleration_of(R: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4) -> Array:
+    """The angular acceleration in the world of a rotation matrix under q̈, by differences of small turns."""
+    before, now, after = R(moved(state, qdd, -step)), R(state), R(moved(state, qdd, step))
+    return (turn_between(after, now) - turn_between(now, before)) / step**2
+
+
+def aba(eom: EquationsOfMotion, tau: Array, forces: Array) -> Array:
+    """q̈ by Pinocchio's articulated-body algorithm, with contact forces as wrenches on the links that carry the points."""
+    state, robot = eom.state, eom.robot
+    model, data = robot.model, robot.model.createData()
+    pin.forwardKinematics(model, data, state.q)
+    wrenches = [pin.Force.Zero() for _ in range(model.njoints)]
+    owners = [contact.name for contact in eom.contacts for _ in contact.point_names]
+    for frame, point, force in zip(owners, eom.contacts.positions(state), np.reshape(forces, (-1, 3)), strict=True):
+        joint = model.frames[model.getFrameId(frame)].parentJoint
+        wrenches[joint] += data.oMi[joint].actInv(pin.Force(force, np.cross(point, force)))
+    return np.asarray(pin.aba(model, data, state.q, state.v, robot.S @ tau, wrenches))
+
+
+def relative(found: npt.ArrayLike, wanted: npt.ArrayLike) -> float:
+    """Largest difference, relative to the largest entry wanted."""
+    found, wanted = np.asarray(found, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
+    return float(np.max(np.abs(found - wanted), initial=0.0) / max(float(np.max(np.abs(wanted), initial=0.0)), 1e-12))

@@ -1,0 +1,167 @@
+"""Tasks: each residual is actual minus desired acceleration, judged by moving the robot a little."""
+
+from __future__ import annotations
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.dynamics.equations import EquationsOfMotion
+
+N = 5
+
+
+@pytest.fixture(params=judges.ROBOTS)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+def cases(name: str) -> list[tuple[EquationsOfMotion, np.ndarray, np.random.Generator]]:
+    """Equations at random states with a random acceleration each."""
+    found = []
+    for seed, state in enumerate(judges.states(name, N)):
+        rng = np.random.default_rng(seed)
+        eom = fb.equations_of_motion(state, judges.stance(state.robot))
+        found.append((eom, rng.normal(size=eom.nv), rng))
+    return found
+
+
+def test_the_centre_of_mass_residual_is_its_acceleration_less_the_one_asked_for(name: str) -> None:
+    for eom, qdd, rng in cases(name):
+        target, velocity, feed = rng.normal(size=(3, 3))
+        task = fb.CoMTask(target, velocity, feed, kp=7.0, kd=3.0)
+        actual = judges.acceleration_of(lambda s: s.com, eom.state, qdd)
+        moving = judges.derivative(lambda s: s.com, eom.state, eom.state.v)
+        wanted = feed - 7.0 * (eom.state.com - target) - 3.0 * (moving - velocity)
+        assert np.allclose(task.residual(eom)(qdd), actual - wanted, atol=2e-5)
+
+
+def test_the_frame_residual_is_its_acceleration_less_the_one_asked_for(name: str) -> None:
+    for eom, qdd, rng in cases(name):
+        frame = eom.robot.frames[-1]
+        target, velocity, feed = rng.normal(size=(3, 3))
+        task = fb.FrameTask(frame, target, velocity, feed, kp=7.0, kd=3.0)
+        actual = judges.acceleration_of(lambda s, f=frame: s.point(f), eom.state, qdd)
+        moving = judges.derivative(lambda s, f=frame: s.point(f), eom.state, eom.state.v)
+        wanted = feed - 7.0 * (eom.state.point(frame) - target) - 3.0 * (moving - velocity)
+        assert np.allclose(task.residual(eom)(qdd), actual - wanted, atol=2e-5)
+
+
+def test_the_orientation_residual_is_the_angular_acceleration_less_the_one_asked_for(name: str) -> None:
+    for eom, qdd, rng in cases(name):
+        frame = eom.robot.frames[-1]
+        R = eom.state.frame_pose(frame).rotation
+        error, velocity, feed = 0.5 * rng.normal(size=(3, 3))
+        # R R_dᵀ = exp(error): the frame is ahead of its target by `error`, about axes of the world
+        task = fb.OrientationTask(frame, judges.rotation(-error) @ R, velocity, feed, kp=7.0, kd=3.0)
+        actual = judges.turning_acceleration_of(lambda s, f=frame: s.frame_pose(f).rotation, eom.state, qdd)
+        step = 1e-5
+        ahead, behind = (judges.along(eom.state, eom.state.v, t).frame_pose(frame).rotation for t in (step, -step))
+        moving = judges.turn_between(ahead, behind) / (2.0 * step)
+        wanted = feed - 7.0 * error - 3.0 * (moving - velocity)
+        assert np.allclose(task.residual(eom)(qdd), actual - wanted, atol=5e-5)
+
+
+def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(name: str) -> None:
+    for eom, qdd, rng in cases(name):
+        robot, state = eom.robot, eom.state
+        target = robot.random_state(int(rng.integers(1000)), 0.2)
+        task = fb.PostureTask(target.q, kp=7.0, kd=3.0)
+        e = state.q[-robot.d :] - target.q[-robot.d :]
+        wanted = qdd[-robot.d :] + 7.0 * e + 3.0 * state.v[-robot.d :]
+        assert np.allclose(task.residual(eom)(qdd), wanted, atol=1e-9)
+
+
+def test_the_posture_of_the_base_does_not_count() -> None:
+    eom = fb.equations_of_motion(judges.load("go2").random_state(0), fb.Contacts.none())
+    q = eom.state.q.copy()
+    q[:3] += 1.0
+    q[3:7] = [0.0, 0.0, 0.0, 1.0]
+    residuals = [fb.PostureTask(p).residual(eom) for p in (eom.state.q, q)]
+    assert np.array_equal(residuals[0].b, residuals[1].b)
+    assert not np.any(residuals[0].A[:, :6])
+
+
+def test_a_body_turned_to_the_left_is_asked_to_turn_to_the_right() -> None:
+    robot = judges.load("go2")
+    q = robot.standing().q.copy()
+    q[3:7] = [0.0, 0.0, np.sin(0.1), np.cos(0.1)]  # 0.2 rad about z
+    eom = fb.equations_of_motion(fb.State(robot, q), fb.Contacts.none())
+    residual = fb.OrientationTask(kp=50.0).residual(eom)
+    asked = np.linalg.lstsq(residual.A, -residual.b)[0]
+    assert np.allclose(residual.A @ asked, [0.0, 0.0, -50.0 * 0.2], atol=1e-9)
+
+
+def test_a_body_that_sinks_is_asked_to_rise() -> None:
+    robot = judges.load("go2")
+    state = robot.standing(height=0.95 * robot.standing().q[2])
+    eom = fb.equations_of_motion(state, fb.Contacts.none())
+    goal = robot.standing().com
+    for task in (fb.CoMTask(goal), fb.FrameTask("base", robot.standing().point("base"))):
+        residual = task.residual(eom)
+        assert -residual.b[2] > 0.1
+
+
+def test_force_and_torque_residuals_are_actual_minus_target(name: str) -> None:
+    for eom, _, rng in cases(name):
+        forces, tau = rng.normal(size=eom.k), rng.normal(size=eom.d)
+        assert np.array_equal(fb.ForceTask().residual(eom)(forces), forces)
+        assert np.array_equal(fb.TorqueTask().residual(eom)(tau), tau)
+        assert np.allclose(fb.ForceTask(np.ones(eom.k)).residual(eom)(forces), forces - 1.0)
+        assert np.allclose(fb.TorqueTask(np.ones(eom.d)).residual(eom)(tau), tau - 1.0)
+
+
+def test_a_resting_robot_that_stands_where_it_should_is_asked_for_no_acceleration(name: str) -> None:
+    state = judges.load(name).standing()
+    eom = fb.equations_of_motion(state, judges.stance(state.robot))
+    for task in fb.standing_tasks(state):
+        assert np.allclose(task.residual(eom)(np.zeros(eom.nv)), 0.0, atol=1e-9), task.name
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_standing_tasks_all_see_a_displaced_robot(name: str) -> None:
+    goal = judges.load(name).standing()
+    for eom, _, _ in cases(name):
+        residuals = [task.residual(eom).b for task in fb.standing_tasks(goal)]
+        assert all(np.linalg.norm(b) > 0.1 for b in residuals)
+
+
+def test_targets_may_be_functions_of_time() -> None:
+    state = judges.load("go2").random_state(0)
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    path = fb.CoMTask(lambda t: [t, 0.0, 0.0], lambda t: [1.0, t, 0.0], lambda t: [0.0, 1.0, t], kp=4.0)
+    still = fb.CoMTask([2.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 2.0], kp=4.0)
+    assert np.allclose(path.residual(eom, 2.0).b, still.residual(eom, 0.0).b)
+    assert not np.allclose(path.residual(eom, 1.0).b, still.residual(eom, 0.0).b)
+    turn = fb.OrientationTask("base", lambda t: judges.rotation([0.0, 0.0, t]))
+    there = fb.OrientationTask("base", judges.rotation([0.0, 0.0, 0.3]))
+    assert np.allclose(turn.residual(eom, 0.3).b, there.residual(eom).b)
+
+
+def test_damping_is_critical_unless_it_is_given() -> None:
+    """ë + kd ė + kp e = 0 with kd = 2 √kp has the double root -√kp: the fastest return without overshoot."""
+    state = judges.load("go2").random_state(0)
+    eom = fb.equations_of_motion(state, fb.Contacts.none())
+    for make in (
+        lambda **g: fb.CoMTask(np.zeros(3), **g),
+        lambda **g: fb.FrameTask("FL_foot", np.zeros(3), **g),
+        lambda **g: fb.OrientationTask("base", **g),
+        lambda **g: fb.PostureTask(state.q, **g),
+    ):
+        assert np.allclose(make(kp=25.0).residual(eom).b, make(kp=25.0, kd=10.0).residual(eom).b)
+        assert not np.allclose(make(kp=25.0).residual(eom).b, make(kp=25.0, kd=0.0).residual(eom).b)
+
+
+def test_a_target_is_copied_when_a_task_is_made() -> None:
+    state = judges.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.none())
+    goal = state.com.copy()
+    task = fb.CoMTask(goal)
+    goal += 1.0
+    assert np.allclose(task.residual(eom).b, 0.0, atol=1e-9)
+    forces = np.zeros(12)
+    hold = fb.ForceTask(forces)
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    forces += 1.0
+    assert np.array_equal(hold.residual(eom)(np.zeros(12)), np.zeros(12))

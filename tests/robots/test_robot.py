@@ -1,0 +1,133 @@
+"""A robot: its numbers, its feet, its actuation matrix, the postures it stands in."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+
+
+@pytest.fixture(params=judges.ROBOTS)
+def robot(request: pytest.FixtureRequest) -> fb.robots:
+    return judges.load(request.param)
+
+
+@pytest.fixture(params=judges.FLOATING)
+def floating(request: pytest.FixtureRequest):
+    return judges.load(request.param)
+
+
+def test_the_catalogue_holds_the_robots_of_the_course_and_says_what_each_is_for() -> None:
+    assert {"go2", "solo12", "solo8", "anymal_kinova", "talos", "ur5"} <= set(fb.robots())
+    assert all(len(text) > 10 for text in fb.robots().values())
+
+
+def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot) -> None:
+    assert robot.nv - robot.d == (6 if robot.is_floating else 0)
+    tau = np.random.default_rng(0).normal(size=robot.d)
+    generalised = robot.S @ tau
+    assert np.array_equal(generalised[: robot.nv - robot.d], np.zeros(robot.nv - robot.d))
+    assert np.array_equal(generalised[robot.nv - robot.d :], tau)
+
+
+def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot) -> None:
+    root = ElementTree.parse(robot.urdf).getroot()
+    masses = [float(mass.get("value")) for link in root.findall("link") for mass in link.findall("inertial/mass")]
+    assert robot.mass == pytest.approx(sum(masses), rel=1e-9)
+    assert robot.weight == pytest.approx(9.81 * sum(masses), rel=1e-9)
+
+
+def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot) -> None:
+    tau = np.zeros(robot.d)
+    for i, joint in enumerate(robot.joint_names):
+        tau[i] = 1.0
+        at = robot.model.idx_vs[robot.model.getJointId(joint)]
+        assert (robot.S @ tau)[at] == 1.0
+        tau[i] = 0.0
+
+
+def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says_otherwise(robot) -> None:
+    assert np.all(robot.torque_limits > 0)
+    assert robot.torque_limits.shape == (robot.d,)
+    joints = {j.get("name"): j for j in ElementTree.parse(robot.urdf).getroot().findall("joint")}
+    urdf = [float(joints[name].find("limit").get("effort")) for name in robot.joint_names]
+    if robot.sources["torque limits" if "torque limits" in robot.sources else "torque limit"] == "URDF":
+        assert np.allclose(robot.torque_limits, urdf)
+    else:
+        assert np.all(robot.torque_limits < urdf)
+
+
+def test_a_standing_robot_has_every_foot_on_the_ground_and_rests(floating) -> None:
+    state = floating.standing()
+    judge = judges.mujoco_of(floating.name).at(state)
+    for foot in floating.feet:
+        body = judge.body(foot.frame)
+        R, p = judge.data.xmat[body].reshape(3, 3), judge.data.xpos[body]
+        placement = floating.model.frames[floating.frame_id(foot.frame)].placement
+        for local in [foot.centre] if foot.corners is None else foot.corners:
+            point = p + R @ (placement.rotation @ local + placement.translation)
+            assert point[2] - foot.radius == pytest.approx(0.0, abs=1e-9)
+    assert not np.any(state.v)
+
+
+def test_a_standing_robot_has_its_centre_of_mass_over_its_feet(floating) -> None:
+    from scipy.spatial import ConvexHull
+
+    state = floating.standing()
+    polygon = judges.stance(floating).positions(state)[:, :2]
+    hull = ConvexHull(polygon)
+    assert np.all(hull.equations @ np.append(state.com[:2], 1.0) < -0.01)
+
+
+def test_a_robot_stands_at_the_height_asked_for(floating) -> None:
+    usual = floating.standing()
+    state = floating.standing(height=0.97 * usual.q[2])
+    assert state.q[2] == pytest.approx(0.97 * usual.q[2], abs=1e-9)
+    assert np.allclose(judges.stance(floating).positions(state)[:, 2], 0.0, atol=1e-9)
+
+
+def test_joints_of_standing_and_random_states_keep_their_limits(robot) -> None:
+    model = robot.model
+    for state in [robot.standing(), *judges.states(robot.name, 10, spread=0.5)]:
+        for joint in range(1, model.njoints):
+            if model.nqs[joint] == 1:
+                at = model.idx_qs[joint]
+                assert model.lowerPositionLimit[at] - 1e-9 <= state.q[at] <= model.upperPositionLimit[at] + 1e-9
+
+
+def test_random_states_are_the_same_for_the_same_seed_and_differ_for_others(robot) -> None:
+    assert np.array_equal(robot.random_state(3).q, robot.random_state(3).q)
+    assert np.array_equal(robot.random_state(3).v, robot.random_state(3).v)
+    assert not np.allclose(robot.random_state(3).q, robot.random_state(4).q)
+    assert not np.allclose(robot.random_state(3).v, robot.random_state(4).v)
+
+
+def test_nothing_in_a_robot_can_be_written_to(robot) -> None:
+    for array in (robot.S, robot.torque_limits, robot.posture):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+    with pytest.raises(AttributeError):
+        robot.name = "another"
+
+
+def test_any_quadruped_of_example_robot_data_loads_once_its_feet_are_given() -> None:
+    robot = fb.load("anymal", feet=["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"], foot_radius=0.03)
+    assert [foot.radius for foot in robot.feet] == [0.03] * 4
+    positions = fb.Contacts.points(robot).positions(robot.standing())
+    assert np.allclose(positions[:, 2], 0.0, atol=1e-9)
+
+
+def test_limits_and_postures_that_are_given_replace_those_of_the_catalogue() -> None:
+    go2 = judges.load("go2")
+    q = go2.posture.copy()
+    q[7:] += 0.01
+    robot = fb.load("go2", torque_limits=5.0, posture=q)
+    assert np.array_equal(robot.torque_limits, np.full(12, 5.0))
+    assert np.allclose(robot.posture, q)
+    assert robot.torque_violation(np.full(12, 7.0)) == pytest.approx(2.0)
+    assert robot.torque_violation(np.full(12, -7.0)) == pytest.approx(2.0)
+    assert robot.torque_violation(np.full(12, 4.0)) == pytest.approx(-1.0)

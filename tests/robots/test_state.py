@@ -1,0 +1,131 @@
+"""States: validated, immutable, and with frames in the world where MuJoCo has them."""
+
+from __future__ import annotations
+
+import judges
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import floatbase as fb
+
+N = 10
+
+
+@pytest.fixture(params=judges.ROBOTS)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+def test_frames_lie_in_the_world_where_mujoco_has_them(name: str) -> None:
+    robot, judge = judges.load(name), judges.mujoco_of(name)
+    frames = [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]
+    for state in judges.states(name, N):
+        judge.at(state)
+        for frame in frames:
+            placement = robot.model.frames[robot.frame_id(frame)].placement
+            body = judge.body(frame)
+            R, p = judge.data.xmat[body].reshape(3, 3), judge.data.xpos[body]
+            assert np.allclose(state.frame_pose(frame).rotation, R @ placement.rotation, atol=1e-9)
+            assert np.allclose(state.point(frame), p + R @ placement.translation, atol=1e-9)
+            offset = np.array([0.1, -0.2, 0.3])
+            local = placement.rotation @ offset + placement.translation
+            assert np.allclose(state.point(frame, offset), p + R @ local, atol=1e-9)
+
+
+def test_frame_jacobians_agree_with_mujoco_in_the_world_aligned_frame(name: str) -> None:
+    robot, judge = judges.load(name), judges.mujoco_of(name)
+    for state in judges.states(name, N):
+        judge.at(state)
+        for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
+            linear, angular = judge.jacobian(frame, state.point(frame))
+            assert np.allclose(state.frame_jacobian(frame), np.vstack([linear, angular]), atol=1e-9)
+            assert np.allclose(state.frame_velocity(frame), np.concatenate([linear, angular]) @ state.v, atol=1e-9)
+
+
+def test_frame_drift_is_the_change_of_j_v_along_v(name: str) -> None:
+    robot = judges.load(name)
+    for state in judges.states(name, N):
+        for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
+            wanted = judges.drift_of(lambda s, f=frame: s.frame_jacobian(f), state)
+            assert np.allclose(state.frame_drift(frame), wanted, atol=1e-7), frame
+
+
+def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_derivatives(name: str) -> None:
+    judge = judges.mujoco_of(name)
+    for state in judges.states(name, N):
+        judge.at(state)
+        if judge.robot.is_floating:  # MuJoCo counts a fixed base's bolted links in, Pinocchio does not
+            assert np.allclose(state.com, judge.data.subtree_com[1], atol=1e-9)
+        assert np.allclose(state.com_jacobian, judges.jacobian_of(lambda s: s.com, state), atol=1e-7)
+        assert np.allclose(state.com_velocity, judges.derivative(lambda s: s.com, state, state.v), atol=1e-7)
+        assert np.allclose(state.com_drift, judges.drift_of(lambda s: s.com_jacobian, state), atol=1e-7)
+
+
+def test_base_velocity_is_given_in_the_base_frame() -> None:
+    robot = judges.load("go2")
+    q = robot.standing().q.copy()
+    q[3:7] = [0.0, 0.0, np.sin(np.pi / 4), np.cos(np.pi / 4)]  # a quarter turn about z
+    v = np.zeros(robot.nv)
+    v[0], v[3] = 1.0, 2.0  # forwards, and rolling about the body's own x
+    state = fb.State(robot, q, v)
+    assert np.allclose(state.frame_velocity("base"), [0.0, 1.0, 0.0, 0.0, 2.0, 0.0], atol=1e-12)
+
+
+def test_the_base_quaternion_is_ordered_x_y_z_w() -> None:
+    robot = judges.load("go2")
+    q = robot.neutral().q.copy()
+    q[3:7] = [np.sin(0.2), 0.0, 0.0, np.cos(0.2)]
+    R = fb.State(robot, q).frame_pose("base").rotation
+    assert np.allclose(R, judges.rotation([0.4, 0.0, 0.0]), atol=1e-12)
+
+
+@given(seed=st.integers(0, 10_000), which=st.sampled_from(judges.ROBOTS))
+def test_difference_undoes_integrate(seed: int, which: str) -> None:
+    robot = judges.load(which)
+    rng = np.random.default_rng(seed)
+    state, dv = robot.random_state(seed), rng.uniform(-0.5, 0.5, robot.nv)
+    reached = state.at(q=state.integrate(dv))
+    assert np.allclose(reached.difference(state.q), dv, atol=1e-9)
+    assert not np.allclose(state.difference(reached.q), dv, atol=1e-3)
+
+
+def test_a_state_computes_from_a_copy_and_can_not_be_written_to(name: str) -> None:
+    robot = judges.load(name)
+    q, v = robot.standing().q.copy(), np.zeros(robot.nv)
+    state = fb.State(robot, q, v)
+    com = state.com.copy()
+    q += 1.0
+    v += 1.0
+    assert np.array_equal(fb.State(robot, state.q, state.v).com, com)
+    for array in (state.q, state.v, state.M, state.h, state.com, state.com_jacobian, state.joint_transforms):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+    pose = state.frame_pose("base")
+    pose.translation = pose.translation + 1.0
+    assert not np.allclose(state.frame_pose("base").translation, pose.translation)
+
+
+def test_a_state_gives_the_same_answers_in_whatever_order_it_is_asked(name: str) -> None:
+    one, other = judges.load(name).random_state(5), judges.load(name).random_state(5)
+    first = (one.M, one.h, one.com_drift, one.frame_drift("base"), one.frame_jacobian("base"))
+    second = (
+        other.frame_jacobian("base"),
+        other.frame_drift("base"),
+        other.com_drift,
+        other.h,
+        other.M,
+    )[::-1]
+    assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+
+
+def test_joint_transforms_are_where_mujoco_has_the_joints(name: str) -> None:
+    robot, judge = judges.load(name), judges.mujoco_of(name)
+    state = robot.random_state(1)
+    judge.at(state)
+    for joint in robot.joint_names:
+        T = state.joint_transforms[robot.model.getJointId(joint)]
+        body = int(judge.model.joint(joint).bodyid[0])
+        assert np.allclose(T[:3, 3], judge.data.xpos[body], atol=1e-9)
+        assert np.allclose(T[:3, :3], judge.data.xmat[body].reshape(3, 3), atol=1e-9)

@@ -1,0 +1,69 @@
+"""Between our convention for a state and MuJoCo's."""
+
+from __future__ import annotations
+
+import judges
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+import floatbase as fb
+
+seeds = st.integers(0, 100_000)
+any_robot = st.sampled_from(judges.ROBOTS)
+
+
+@given(seed=seeds, name=any_robot)
+def test_a_state_survives_the_way_to_mujoco_and_back(seed: int, name: str) -> None:
+    state, convert = judges.load(name).random_state(seed, 0.7), judges.mujoco_of(name).convert
+    qpos, qvel = convert.to_mujoco(state.q, state.v)
+    assert np.allclose(convert.q(qpos), state.q, atol=1e-12)
+    assert np.allclose(convert.v(qpos, qvel), state.v, atol=1e-12)
+
+
+@given(seed=seeds, name=any_robot)
+def test_the_velocity_map_is_the_conversion_of_velocities(seed: int, name: str) -> None:
+    state, convert = judges.load(name).random_state(seed, 0.7), judges.mujoco_of(name).convert
+    qpos, qvel = convert.to_mujoco(state.q, state.v)
+    assert np.allclose(convert.velocity_map(qpos) @ state.v, qvel, atol=1e-12)
+
+
+@given(seed=seeds, name=st.sampled_from(judges.FLOATING))
+def test_mujoco_gets_the_scalar_of_the_quaternion_first_and_the_linear_velocity_in_the_world(seed: int, name: str) -> None:
+    state, convert = judges.load(name).random_state(seed, 0.7), judges.mujoco_of(name).convert
+    qpos, qvel = convert.to_mujoco(state.q, state.v)
+    assert np.array_equal(qpos[3:7], state.q[[6, 3, 4, 5]])
+    assert np.allclose(qvel[:3], judges.quaternion_rotation(state.q[3:7]) @ state.v[:3], atol=1e-12)
+    assert np.array_equal(qvel[3:6], state.v[3:6])
+
+
+@given(seed=seeds, name=any_robot)
+def test_joints_keep_their_names_on_the_way_to_mujoco(seed: int, name: str) -> None:
+    robot, judge = judges.load(name), judges.mujoco_of(name)
+    state = robot.random_state(seed, 0.7)
+    qpos, qvel = judge.convert.to_mujoco(state.q, state.v)
+    for joint in robot.joint_names:
+        number = robot.model.getJointId(joint)
+        assert qvel[judge.model.joint(joint).dofadr[0]] == state.v[robot.model.idx_vs[number]]
+        if robot.model.nqs[number] == 1:
+            assert qpos[judge.model.joint(joint).qposadr[0]] == state.q[robot.model.idx_qs[number]]
+
+
+def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us() -> None:
+    robot = fb.load("kinova")
+    turning = [j for j in range(1, robot.model.njoints) if robot.model.nqs[j] == 2]
+    assert turning, "the Kinova arm has joints that turn without limit"
+    judge = judges.Mujoco(robot)
+    q, v = robot.standing().q.copy(), np.arange(robot.nv) + 1.0
+    for angle in (-3.0, -0.4, 0.0, 1.9):
+        for k, joint in enumerate(turning):
+            at = robot.model.idx_qs[joint]
+            q[at : at + 2] = np.cos(angle + 0.1 * k), np.sin(angle + 0.1 * k)
+        qpos, qvel = judge.convert.to_mujoco(fb.State(robot, q).q, v)
+        for k, joint in enumerate(turning):
+            assert np.isclose(qpos[judge.model.joint(robot.model.names[joint]).qposadr[0]], angle + 0.1 * k)
+        assert np.allclose(judge.convert.q(qpos), q, atol=1e-12)
+        assert np.allclose(judge.convert.v(qpos, qvel), v, atol=1e-12)
+        state = fb.State(robot, q, v)
+        assert judges.relative(state.M, judge.at(state).M) < 1e-9
+        assert judges.relative(state.h, judge.h) < 1e-9

@@ -1,0 +1,197 @@
+"""The laws of `Affine` and `Quadratic`: composition, stacking, pullback, minimisers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import floatbase as fb
+from floatbase.errors import InputError
+
+seeds = st.integers(0, 100_000)
+sizes = st.integers(1, 5)
+
+
+def affine(rng: np.random.Generator, n_out: int, n_in: int) -> fb.Affine:
+    return fb.Affine(rng.normal(size=(n_out, n_in)), rng.normal(size=n_out))
+
+
+def quadratic(rng: np.random.Generator, n: int) -> fb.Quadratic:
+    root = rng.normal(size=(n, n))
+    return fb.Quadratic(root @ root.T + 0.1 * np.eye(n), rng.normal(size=n), float(rng.normal()))
+
+
+@given(seeds, sizes, sizes, sizes, sizes)
+def test_composition_is_one_map_after_the_other_and_associative(seed: int, a: int, b: int, c: int, d: int) -> None:
+    rng = np.random.default_rng(seed)
+    f, g, h, x = affine(rng, a, b), affine(rng, b, c), affine(rng, c, d), rng.normal(size=d)
+    assert np.allclose((f @ g @ h)(x), f(g(h(x))))
+    left, right = (f @ g) @ h, f @ (g @ h)
+    assert np.allclose(left.A, right.A)
+    assert np.allclose(left.b, right.b)
+
+
+@given(seeds, sizes, sizes)
+def test_the_identity_changes_nothing_and_a_constant_forgets_its_input(seed: int, m: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    f, x = affine(rng, m, n), rng.normal(size=n)
+    assert np.allclose((fb.Affine.identity(m) @ f)(x), f(x))
+    assert np.allclose((f @ fb.Affine.identity(n))(x), f(x))
+    b = rng.normal(size=m)
+    assert np.array_equal(fb.Affine.constant(b, n)(x), b)
+    A = rng.normal(size=(m, n))
+    assert np.allclose(fb.Affine.linear(A)(x), A @ x)
+
+
+@given(seeds, sizes, sizes)
+def test_sums_and_multiples_of_maps_are_those_of_their_values(seed: int, m: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    f, g, x, c = affine(rng, m, n), affine(rng, m, n), rng.normal(size=n), rng.normal(size=m)
+    assert np.allclose((f + g)(x), f(x) + g(x))
+    assert np.allclose((f - g)(x), f(x) - g(x))
+    assert np.allclose((f + c)(x), f(x) + c)
+    assert np.allclose((f - c)(x), f(x) - c)
+    assert np.allclose((2.5 * f)(x), 2.5 * f(x))
+    assert np.allclose((-f)(x), -f(x))
+
+
+@pytest.mark.parametrize("scale", [3, 3.0, np.float64(3.0), np.float32(3.0), np.int64(3)])
+def test_any_real_number_scales_maps_and_costs(scale: float) -> None:
+    rng = np.random.default_rng(0)
+    f, cost, x = affine(rng, 2, 3), quadratic(rng, 3), rng.normal(size=3)
+    assert isinstance(scale * f, fb.Affine)
+    assert np.allclose((scale * f)(x), 3.0 * f(x))
+    assert isinstance(scale * cost, fb.Quadratic)
+    assert (scale * cost)(x) == pytest.approx(3.0 * cost(x))
+
+
+@given(seeds, sizes, sizes, sizes)
+def test_stacked_maps_keep_their_blocks_under_composition_and_sums(seed: int, a: int, b: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    f, g, inner = affine(rng, a, n), affine(rng, b, n), affine(rng, n, 2)
+    both, x, y = fb.Affine.stack(tau=f, forces=g), rng.normal(size=n), rng.normal(size=2)
+    assert np.allclose(both(x), np.concatenate([f(x), g(x)]))
+    assert np.array_equal(both["tau"](x), f(x))
+    assert np.array_equal(both["forces"](x), g(x))
+    assert np.allclose((both @ inner)["forces"](y), g(inner(y)))
+    assert np.allclose((2.0 * both + np.ones(a + b))["tau"](x), 2.0 * f(x) + 1.0)
+
+
+@given(seeds, sizes, sizes)
+def test_a_map_takes_many_points_side_by_side(seed: int, m: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    f, points = affine(rng, m, n), rng.normal(size=(n, 7))
+    assert np.allclose(f(points), np.column_stack([f(x) for x in points.T]))
+
+
+@given(seeds, sizes, sizes)
+def test_a_pullback_is_the_cost_of_the_mapped_point(seed: int, m: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    cost, f, x = quadratic(rng, m), affine(rng, m, n), rng.normal(size=n)
+    assert cost.pullback(f)(x) == pytest.approx(cost(f(x)), rel=1e-9, abs=1e-9)
+    assert np.allclose(cost.pullback(f).gradient(x), f.A.T @ cost.gradient(f(x)))
+
+
+@given(seeds, sizes, sizes, sizes)
+def test_the_pullback_of_a_pullback_is_the_pullback_through_the_composition(seed: int, a: int, b: int, c: int) -> None:
+    rng = np.random.default_rng(seed)
+    cost, f, g = quadratic(rng, a), affine(rng, a, b), affine(rng, b, c)
+    twice, once = cost.pullback(f).pullback(g), cost.pullback(f @ g)
+    assert np.allclose(twice.H, once.H)
+    assert np.allclose(twice.g, once.g)
+    assert twice.c == pytest.approx(once.c, rel=1e-9, abs=1e-9)
+
+
+@given(seeds, sizes, sizes)
+def test_the_cost_of_a_residual_is_half_its_weighted_square(seed: int, m: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    f, x, r = affine(rng, m, n), rng.normal(size=n), rng.normal(size=m)
+    wanted = 0.5 * 3.0 * np.sum(f(x) ** 2)
+    assert fb.Quadratic.of(f, 3.0)(x) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+    wanted = 0.5 * 2.0 * np.sum((f.A @ x - r) ** 2)
+    assert fb.Quadratic.from_residual(f.A, r, 2.0)(x) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+
+
+@given(seeds, sizes)
+def test_the_gradient_is_the_slope_of_the_cost(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    cost, x, step = quadratic(rng, n), rng.normal(size=n), 1e-5
+    slope = [(cost(x + step * e) - cost(x - step * e)) / (2 * step) for e in np.eye(n)]
+    assert np.allclose(cost.gradient(x), slope, atol=1e-6)
+
+
+@given(seeds, sizes)
+def test_no_point_costs_less_than_the_minimiser(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    cost = quadratic(rng, n)
+    best = cost.minimiser()
+    assert np.allclose(cost.gradient(best), 0.0, atol=1e-8)
+    assert all(cost(best + rng.normal(size=n)) > cost(best) for _ in range(10))
+
+
+@given(seeds, st.integers(1, 3), st.integers(4, 6))
+def test_among_many_minimisers_the_smallest_is_given(seed: int, m: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    A, r = rng.normal(size=(m, n)), rng.normal(size=m)
+    assert np.allclose(fb.Quadratic.from_residual(A, r).minimiser(), np.linalg.lstsq(A, r)[0], atol=1e-6)
+
+
+def test_a_cost_that_falls_for_ever_has_no_minimum() -> None:
+    flat = fb.Quadratic(np.diag([1.0, 0.0]), np.array([1.0, 0.5]))
+    with pytest.raises(InputError, match="no minimum: it falls for ever along a direction without curvature"):
+        flat.minimiser()
+    saddle = fb.Quadratic(np.diag([1.0, -1.0]), np.zeros(2))
+    with pytest.raises(InputError, match="no minimum: its smallest curvature is -1"):
+        saddle.minimiser()
+    assert np.array_equal(fb.Quadratic.zero(2).minimiser(), [0.0, 0.0])
+
+
+def test_the_matrix_of_a_cost_is_made_symmetric_without_changing_the_cost() -> None:
+    H = np.array([[1.0, 4.0], [0.0, 2.0]])
+    x = np.array([1.0, -2.0])
+    cost = fb.Quadratic(H, np.zeros(2))
+    assert np.array_equal(cost.H, cost.H.T)
+    assert cost(x) == pytest.approx(0.5 * x @ H @ x)
+
+
+def test_values_share_no_array_with_what_they_were_made_of_and_can_not_be_written_to() -> None:
+    A, b = np.eye(2), np.zeros(2)
+    f = fb.Affine(A, b)
+    A[0, 0] = b[0] = 9.0
+    assert np.array_equal(f([1.0, 1.0]), [1.0, 1.0])
+    with pytest.raises(ValueError, match="read-only"):
+        f.A[0, 0] = 2.0
+    with pytest.raises(AttributeError):
+        f.A = np.zeros((2, 2))
+    with pytest.raises(TypeError):
+        f.blocks["tau"] = slice(0, 1)
+    A, b = f
+    assert A is f.A
+    assert b is f.b
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: fb.Affine(np.eye(2), np.zeros(3)), r"b has shape \(3,\); it must have shape \(2,\)"),
+        (lambda: fb.Affine(np.zeros(2), np.zeros(2)), r"A has shape \(2,\); it must have shape \(any, any\)"),
+        (lambda: fb.Affine([[np.nan]], [0.0]), r"A holds nan at index \[0, 0\]; every entry must be a finite number"),
+        (lambda: fb.Affine("A", [0.0]), r"A must be numbers of shape \(any, any\), not 'A'"),
+        (lambda: fb.Affine.identity(2)([1.0]), r"x has shape \(1,\); this map takes shape \(2,\) or \(2, N\)"),
+        (lambda: fb.Affine.identity(2) @ fb.Affine.identity(3), "the inner map gives 3 numbers, the outer takes 2"),
+        (lambda: fb.Affine.identity(2) + fb.Affine.identity(3), r"cannot add maps of shapes \(2, 2\) and \(3, 3\)"),
+        (lambda: fb.Affine.identity(2) + [1.0], r"the constant has shape \(1,\); it must have shape \(2,\)"),
+        (lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)), r"same space; input sizes: .*'b': 3"),
+        (lambda: fb.Affine.stack(), "stack needs at least one map"),
+        (lambda: fb.Affine.stack(tau=fb.Affine.identity(1))["toe"], r"no block 'toe'; its blocks are \['tau'\]"),
+        (lambda: fb.Quadratic(np.eye(2), np.zeros(3)), r"H has shape \(2, 2\); it must have shape \(3, 3\)"),
+        (lambda: fb.Quadratic.zero(2) + fb.Quadratic.zero(3), "cannot add costs over 2 and 3 numbers"),
+        (lambda: fb.Quadratic.zero(2).pullback(fb.Affine.identity(3)), "the map gives 3 numbers, the cost takes 2"),
+        (lambda: fb.Quadratic.of(fb.Affine.identity(1), -1.0), "weight is -1; it must be ≥ 0"),
+    ],
+)
+def test_shapes_that_do_not_fit_are_named(make, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        make()
