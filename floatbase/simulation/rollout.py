@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
+import pinocchio as pin
 
 from floatbase._arrays import Array, positive, read_only
 from floatbase.dynamics.contacts import Contacts
@@ -25,12 +26,24 @@ class Controller(Protocol):
         """The command for configuration q and velocity v at time t, s."""
 
 
+class Actuators(Protocol):
+    """What stands between the torques a controller asks for and those the joints get, with a memory of its own."""
+
+    def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
+        """The torques of the next dt s, shape (d,), N·m.
+
+        q_joints, v_joints: (d,) rad and rad/s, positions and velocities of the joints now.
+        """
+
+
 @dataclass(frozen=True, eq=False)
 class Rollout:
     """What happened, one row for each control tick, taken before the tick's torques act.
 
-    time: (n,) s, the simulation's clock. q: (n, nq). v: (n, nv). tau: (n, d) N·m. planned: (n, k) N, world, the controller's contact forces (NaN where
-    it gave none). measured: (n, k) N, world, those of the physics during the tick. foot_positions: (n, k/3, 3) m, world.
+    time: (n,) s, the simulation's clock. q: (n, nq). v: (n, nv). tau: (n, d) N·m, the torques applied, their mean over
+    the tick. tau_desired: (n, d) N·m, what the controller asked for, the same without actuators. planned: (n, k) N,
+    world, the controller's contact forces (NaN where it gave none). measured: (n, k) N, world, those of the physics
+    during the tick. foot_positions: (n, k/3, 3) m, world.
     outcome: "completed", "fell", "diverged" or "controller failed" (then `error` holds its exception): the record ends there.
     """
 
@@ -40,6 +53,7 @@ class Rollout:
     q: Array
     v: Array
     tau: Array
+    tau_desired: Array
     planned: Array
     measured: Array
     foot_positions: Array
@@ -78,12 +92,17 @@ def rollout(
     duration: float,
     pushes: Sequence[Push] = (),
     control_period: float | None = None,
+    actuators: Actuators | None = None,
 ) -> Rollout:
     """Run a controller on the physics for `duration` s from the simulation's present state.
 
-    pushes: forces on the robot; their start is on the simulation's clock, which a reset sets to 0. control_period: s, a whole multiple of the
-    simulation's timestep, which it is by default. A fall, a divergence of the physics or a controller that finds no answer
-    ends the rollout; the record up to there is returned and says so.
+    pushes: forces on the robot; their start is on the simulation's clock, which a reset sets to 0. control_period: s,
+    a whole multiple of the simulation's timestep, which it is by default. actuators: what the commanded torques pass
+    through in every step of the physics, such as `HydraulicActuators`; none by default, then joints get what was asked
+    for. They keep their state from one rollout to the next: reset them yourself, `actuators.reset(…)`, with the
+    simulation.
+    A fall, a divergence of the physics or a controller that finds no answer ends the rollout; the record up to there is
+    returned and says so.
     Raises `InputError` for a period that does not divide, a push that is none, and a controller without `.tau`.
     """
     positive("duration", duration, "s")
@@ -96,7 +115,7 @@ def rollout(
     for push in pushes:
         if not isinstance(push, Push):
             raise InputError(f"pushes must hold fb.Push values; {push!r} is none.")
-    run = _Run(sim, controller, tuple(pushes))
+    run = _Run(sim, controller, tuple(pushes), actuators)
     outcome: Outcome = "completed"
     error: FloatbaseError | None = None
     for _ in range(max(1, round(duration / period))):
@@ -118,9 +137,10 @@ def rollout(
 class _Run:
     """The rows collected on the way."""
 
-    def __init__(self, sim: Simulation, controller: Controller, pushes: tuple[Push, ...]):
+    def __init__(self, sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None):
         self.sim = sim
         self.pushes = pushes
+        self.actuators = actuators
         contacts = getattr(controller, "contacts", None)
         self.contacts = contacts if isinstance(contacts, Contacts) else _all_feet(sim.robot)
         self._columns = _columns(self.contacts, sim.point_names)
@@ -132,24 +152,47 @@ class _Run:
             raise InputError(f"a controller must answer with .tau (N·m), as fb.Command does; got {command!r}.")
         sim = self.sim
         time, q, v, feet = sim.time, sim.q, sim.v, self._columns @ sim.contact_positions()
-        forces = np.zeros((len(sim.point_names), 3))
+        desired = np.array(command.tau, dtype=np.float64)
+        forces, applied = np.zeros((len(sim.point_names), 3)), np.zeros(sim.robot.d)
         for _ in range(substeps):
-            sim.step(command.tau, self.pushes)
+            tau = self._actuated(desired)
+            sim.step(tau, self.pushes)
             forces += sim.contact_forces() / substeps
+            applied += tau / substeps
         planned = getattr(command, "forces", None)
         planned = np.full(self.contacts.k, np.nan) if planned is None else np.asarray(planned, dtype=np.float64)
         count = np.maximum(self._columns.sum(axis=1, keepdims=True), 1.0)
-        self.rows.append((time, q, v, np.array(command.tau), planned, (self._columns @ forces).ravel(), feet / count))
+        applied = desired if self.actuators is None else applied
+        measured = (self._columns @ forces).ravel()
+        self.rows.append((time, q, v, applied, desired, planned, measured, feet / count))
+
+    def _actuated(self, desired: Array) -> Array:
+        """The torques the joints get in the next step when these are wanted, N·m."""
+        if self.actuators is None:
+            return desired
+        sim, robot = self.sim, self.sim.robot
+        # joints without limits are stored as (cos, sin); the way from the neutral configuration holds their angles
+        q_joints = pin.difference(robot.model, pin.neutral(robot.model), sim.q)[robot.nv - robot.d :]
+        return np.asarray(self.actuators.step(desired, q_joints, sim.v[robot.nv - robot.d :], sim.timestep))
 
     def record(self, outcome: Outcome, error: FloatbaseError | None) -> Rollout:
         """The finished value."""
         robot, k = self.sim.robot, self.contacts.k
-        shapes = ((), (robot.nq,), (robot.nv,), (robot.d,), (k,), (k,), (k // 3, 3))
-        columns = [
-            read_only(np.array([row[i] for row in self.rows], dtype=np.float64).reshape((len(self.rows), *shape)))
-            for i, shape in enumerate(shapes)
-        ]
-        return Rollout(robot, self.contacts, *columns, self.pushes, outcome, error)
+        shapes = {
+            "time": (),
+            "q": (robot.nq,),
+            "v": (robot.nv,),
+            "tau": (robot.d,),
+            "tau_desired": (robot.d,),
+            "planned": (k,),
+            "measured": (k,),
+            "foot_positions": (k // 3, 3),
+        }
+        columns: dict[str, Any] = {
+            name: read_only(np.array([row[i] for row in self.rows]).reshape((len(self.rows), *shape)))
+            for i, (name, shape) in enumerate(shapes.items())
+        }
+        return Rollout(robot, self.contacts, pushes=self.pushes, outcome=outcome, error=error, **columns)
 
 
 def _all_feet(robot: Robot) -> Contacts:
