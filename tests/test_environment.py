@@ -1,0 +1,81 @@
+"""The lock agrees with pyproject.toml, and importing the package stays light."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+LOCK = (ROOT / "environment.txt").read_text(encoding="utf-8")
+PINS = [Requirement(line) for line in LOCK.splitlines() if line and not line.startswith("#")]
+ASKED = [
+    Requirement(text)
+    for texts in (PROJECT["dependencies"], *PROJECT["optional-dependencies"].values())
+    for text in texts
+]
+HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib")
+IMPORT_LIMIT = 0.5  # s
+
+
+def test_every_package_is_pinned_once_to_one_version() -> None:
+    names = [canonicalize_name(pin.name) for pin in PINS]
+    assert len(names) == len(set(names))
+    for pin in PINS:
+        assert [spec.operator for spec in pin.specifier] == ["=="], f"{pin} is not exact"
+        assert pin.url is None, f"{pin} names a place instead of a version"
+
+
+@pytest.mark.parametrize("asked", ASKED, ids=str)
+def test_every_dependency_is_pinned_within_its_range(asked: Requirement) -> None:
+    pins = {canonicalize_name(pin.name): pin for pin in PINS}
+    pin = pins.get(canonicalize_name(asked.name))
+    assert pin is not None, f"{asked.name} is not in environment.txt: make lock"
+    version = next(iter(pin.specifier)).version
+    assert asked.specifier.contains(version, prereleases=True), f"{pin} is not within {asked}: make lock"
+    assert pin.marker is None, f"{pin} would not be installed everywhere"
+
+
+def test_markers_speak_of_platform_and_python_only() -> None:
+    known = {
+        "implementation_name", "os_name", "platform_machine", "platform_python_implementation", "platform_system",
+        "python_full_version", "python_version", "sys_platform",
+    }  # fmt: skip
+    for pin in PINS:
+        words = {word for word in str(pin.marker or "").replace("(", " ").split() if "_" in word and word[0].isalpha()}
+        assert words <= known, f"{pin} depends on {words - known}"
+
+
+def test_the_lock_names_no_place() -> None:
+    assert "make lock" in LOCK.splitlines()[1]
+    for word in ("://", "--index", "--extra-index", "--find-links", "/home/", "/root/", "@"):
+        assert word not in LOCK, f"environment.txt holds {word}"
+
+
+def test_versions_agree() -> None:
+    import floatbase
+
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert floatbase.__version__ == PROJECT["version"]
+    assert f"version: {PROJECT['version']}\n" in citation
+    assert f"## [{PROJECT['version']}]" in changelog
+
+
+def test_importing_floatbase_loads_no_physics_no_pictures_and_no_modelling() -> None:
+    code = f"import sys, floatbase; print(*[name for name in {HEAVY} if name in sys.modules])"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.split() == []
+
+
+def test_importing_floatbase_takes_under_half_a_second() -> None:
+    code = "import time; start = time.perf_counter(); import floatbase; print(time.perf_counter() - start)"
+    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(3)]
+    took = min(float(run.stdout) for run in runs)
+    assert took < IMPORT_LIMIT, f"{took:.2f} s"

@@ -1,0 +1,45 @@
+"""What the README shows works as printed, and what it links to is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+LINKS = sorted({link for link in re.findall(r"\]\(([^)#]+)\)", README) if "://" not in link})
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_the_twelve_lines_work_as_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    (code,) = blocks("python")
+    (printed,) = blocks("text")
+    assert len([line for line in code.splitlines() if line]) == 12
+    names: dict[str, Any] = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert capsys.readouterr().out == printed
+
+    run, state = names["run"], names["state"]
+    strayed = np.linalg.norm(run.com - state.com, axis=1)
+    assert strayed[-1] < 1e-3 < strayed.max()
+    assert run.slip().max() < 1e-3
+    weight = run.measured[-1].reshape(-1, 3)[:, 2].sum()
+    assert weight == pytest.approx(state.robot.weight, rel=0.01)
+
+
+def test_the_two_commands_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in set(re.findall(r"(?:`|    )make ([a-z]+)", README)):
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), f"the README names make {target}"
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_links_lead_somewhere(link: str) -> None:
+    assert (ROOT / link).exists(), f"the README links to {link}, which is not there"
