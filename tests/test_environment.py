@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -66,6 +67,17 @@ def test_versions_agree() -> None:
     assert floatbase.__version__ == PROJECT["version"]
     assert f"version: {PROJECT['version']}\n" in citation
     assert f"## [{PROJECT['version']}]" in changelog
+
+
+def test_the_wheel_brings_the_meshes_and_their_licences(tmp_path: Path) -> None:
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", str(tmp_path), str(ROOT)]
+    subprocess.run(pip, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("floatbase-*.whl")
+    packed = set(zipfile.ZipFile(wheel).namelist())
+    meshes = {f"floatbase/_assets/meshes/{path.name}" for path in (ROOT / "assets" / "meshes").glob("*.npz")}
+    assert meshes
+    assert meshes | {"floatbase/__init__.py", "floatbase/_assets/LICENSES.md"} <= packed
+    assert {name.split("/")[0] for name in packed} == {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
 
 
 def test_importing_floatbase_loads_no_physics_no_pictures_and_no_modelling() -> None:
