@@ -1,0 +1,188 @@
+"""h taken apart: gravity, centrifugal and Coriolis forces, and what a turning frame makes of straight paths (App. A)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array, checked, read_only
+from floatbase.errors import InputError
+from floatbase.robots.state import State
+
+Turning: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
+_LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up
+
+
+@dataclass(frozen=True, eq=False)
+class BiasForces:
+    """h = gravity + centrifugal + coriolis, each of shape (nv,), in the units of h: N and N·m.
+
+    gravity: g(q). centrifugal: the terms in v_i². coriolis: the terms in v_i v_j, i ≠ j. Which is which depends on the
+    coordinates: v holds the base's velocity in the base frame, so ω × v of the base counts as Coriolis.
+    Source: the document, Appendix A.
+    """
+
+    gravity: Array
+    centrifugal: Array
+    coriolis: Array
+
+    @property
+    def fictitious(self) -> Array:
+        """The part that comes from moving along curved coordinates, shape (nv,): C(q, v) v."""
+        return read_only(self.centrifugal + self.coriolis)
+
+    @property
+    def total(self) -> Array:
+        """h(q, v), shape (nv,)."""
+        return read_only(self.gravity + self.centrifugal + self.coriolis)
+
+
+def bias_forces(state: State) -> BiasForces:
+    """App. A: h(q, v) taken apart.
+
+    The velocity part is a quadratic form, Σ_ij Γ_ij v_i v_j. Moving one coordinate alone gives Γ_ii; what is left of h
+    when gravity and all Γ_ii v_i² are taken off are the products of two different velocities.
+    """
+    model = state.robot.model
+    data = model.createData()
+    g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
+    alone = [pin.nonLinearEffects(model, data, state.q, unit) - g for unit in np.eye(model.nv)]
+    centrifugal = np.column_stack(alone) @ state.v**2
+    return BiasForces(read_only(g), read_only(centrifugal), read_only(state.h - g - centrifugal))
+
+
+def coriolis_matrix(state: State) -> Array:
+    """App. A: C(q, v), shape (nv, nv), with C v = centrifugal + Coriolis forces and Ṁ - 2 C skew-symmetric.
+
+    Many matrices satisfy the first; this one, Pinocchio's, satisfies both.
+    """
+    model = state.robot.model
+    return read_only(pin.computeCoriolisMatrix(model, model.createData(), state.q, state.v))
+
+
+def inertia_rate(state: State) -> Array:
+    """App. A: Ṁ = C + Cᵀ, shape (nv, nv): how M(q) changes in time when the robot moves with v."""
+    C = coriolis_matrix(state)
+    return read_only(C + C.T)
+
+
+def power_identity(state: State) -> float:
+    """App. A: vᵀ (Ṁ - 2 C) v, W, which is zero: fictitious forces do no net work.
+
+    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f is left.
+    The matrix C is multiplied out here, so that rounding, and nothing else, keeps the answer from zero.
+    """
+    return float(state.v @ (inertia_rate(state) - 2.0 * coriolis_matrix(state)) @ state.v)
+
+
+def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
+    """App. A, the one-link robot: ω × (ω × r), shape (3,), m/s², of a point on a link that turns at constant rate.
+
+    omega: (3,) rad/s; r: (3,) m, from a point of the axis to the point of the link, both in one frame, which is the
+    answer's too. It points at the axis and has the size ω² times the distance from it; the particles around the point
+    must pull it inward by that much times its mass.
+    """
+    omega = checked("omega", omega, (3,), "rad/s")
+    return read_only(np.cross(omega, np.cross(omega, checked("r", r, (3,), "m"))))
+
+
+@dataclass(frozen=True, eq=False)
+class TurningView:
+    """A free particle as one who rides on a turning frame sees it; a row for each time.
+
+    time: (n,) s. rotation: (n, 3, 3) R_world_frame. All else is in the turning frame's coordinates, shape (n, 3):
+    position [m] and velocity [m/s] of the particle, and the accelerations [m/s²] that explain its curved path:
+    centrifugal -ω × (ω × p), coriolis -2 ω × ṗ and euler -ω̇ × p. Source: the document, Appendix A.
+    """
+
+    time: Array
+    rotation: Array
+    position: Array
+    velocity: Array
+    centrifugal: Array
+    coriolis: Array
+    euler: Array
+
+    @property
+    def acceleration(self) -> Array:
+        """The particle's acceleration as the frame sees it, shape (n, 3), m/s²: p̈ is all fictitious."""
+        return read_only(self.centrifugal + self.coriolis + self.euler)
+
+
+def seen_from_turning_frame(
+    time: npt.ArrayLike,
+    omega: Turning,
+    position: npt.ArrayLike,
+    velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+    omega_rate: Turning | None = None,
+) -> TurningView:
+    """App. A: a particle that no force acts on, moving straight in the world, seen from a frame that turns.
+
+    time: (n,) s, rising; the frame's axes are the world's at time[0], its origin stays at the world's.
+    omega: (3,) rad/s, world, angular velocity of the frame: a constant, or a function of the time in s.
+    omega_rate: (3,) rad/s², world, its derivative; zero for a constant ω, and needed for a function.
+    position [m], velocity [m/s]: (3,), world, of the particle at time[0].
+    Raises `InputError` for times that do not rise, wrong shapes and an ω(t) without its rate.
+    """
+    time = checked("time", time, (None,), "s")
+    if time.size < 1 or np.any(np.diff(time) <= 0.0):
+        raise InputError("time must hold at least one instant, and each must come after the one before.")
+    if callable(omega) and omega_rate is None:
+        raise InputError("omega is a function of time; give its derivative too, omega_rate=lambda t: …, rad/s².")
+    rate = _as_function("omega_rate", (0.0, 0.0, 0.0) if omega_rate is None else omega_rate)
+    turn = _as_function("omega", omega)
+    R = _rotations(time, turn)
+    start, v = checked("position", position, (3,), "m"), checked("velocity", velocity, (3,), "m/s")
+    # the same three vectors, read off in the frame's axes: Rᵀ x for each row
+    into = np.transpose(R, (0, 2, 1))
+    p = np.einsum("nij,nj->ni", into, start + np.outer(time - time[0], v))
+    w = np.einsum("nij,nj->ni", into, np.array([turn(t) for t in time]))
+    w_rate = np.einsum("nij,nj->ni", into, np.array([rate(t) for t in time]))
+    p_rate = into @ v - np.cross(w, p)
+    return TurningView(
+        time=time,
+        rotation=read_only(R),
+        position=read_only(p),
+        velocity=read_only(p_rate),
+        centrifugal=read_only(-np.cross(w, np.cross(w, p))),
+        coriolis=read_only(-2.0 * np.cross(w, p_rate)),
+        euler=read_only(-np.cross(w_rate, p)),
+    )
+
+
+def _as_function(name: str, value: Turning) -> Callable[[float], Array]:
+    """The value as a checked function of time."""
+    if callable(value):
+        return lambda t: checked(f"{name} at {t:g} s", value(t), (3,))
+    constant = checked(name, value, (3,))
+    return lambda t: constant
+
+
+def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
+    """R(t) with Ṙ = [ω] R and R = 1 at time[0], shape (n, 3, 3), in small turns of fourth order."""
+    R = np.empty((time.size, 3, 3))
+    R[0] = np.eye(3)
+    for i, (t, end) in enumerate(pairwise(time)):
+        fastest = max(float(np.linalg.norm(omega(t + part * (end - t)))) for part in (0.0, 0.5, 1.0))
+        steps = int(np.ceil(fastest * (end - t) / _LARGEST_TURN)) + 1
+        R[i + 1] = R[i]
+        for start in np.linspace(t, end, steps + 1)[:-1]:
+            R[i + 1] = _small_turn(omega, float(start), (end - t) / steps) @ R[i + 1]
+    return R
+
+
+def _small_turn(omega: Callable[[float], Array], t: float, step: float) -> Array:
+    """The rotation from t to t + step by ω at the two Gauss points (Magnus series).
+
+    Source: Iserles et al., Lie-group methods, Acta Numerica, 2000.
+    """
+    spread = np.sqrt(3.0) / 6.0 * step
+    first, second = omega(t + 0.5 * step - spread), omega(t + 0.5 * step + spread)
+    bend = np.sqrt(3.0) / 12.0 * step**2 * np.cross(second, first)
+    return np.asarray(pin.exp3(0.5 * step * (first + second) + bend))

@@ -1,0 +1,201 @@
+"""App. A: h taken apart, judged by MuJoCo without gravity, finite differences, energy; straight paths seen turning."""
+
+from __future__ import annotations
+
+import judges
+import mujoco
+import numpy as np
+import pytest
+import scipy.integrate
+
+import floatbase as fb
+from floatbase.dynamics.fictitious import (
+    bias_forces,
+    coriolis_matrix,
+    inertia_rate,
+    inward_acceleration,
+    power_identity,
+    seen_from_turning_frame,
+)
+
+N = 5
+
+
+@pytest.fixture(params=judges.ROBOTS)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+def test_the_parts_sum_to_h(name: str) -> None:
+    for state in judges.states(name, N, spread=1.0):
+        parts = bias_forces(state)
+        assert judges.relative(parts.total, state.h) < 1e-12
+        assert np.array_equal(parts.fictitious, parts.centrifugal + parts.coriolis)
+
+
+def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(name: str) -> None:
+    judge = judges.Mujoco(judges.load(name))
+    judge.model.opt.gravity[:] = 0.0
+    for state in judges.states(name, N, spread=1.0):
+        assert judges.relative(bias_forces(state).fictitious, judge.at(state).h) < 1e-8
+
+
+def test_gravity_is_the_slope_of_the_weights_potential_energy(name: str) -> None:
+    """Judged by MuJoCo's own potential energy."""
+    judge = judges.Mujoco(judges.load(name))
+    judge.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+
+    def potential(state: fb.State) -> np.ndarray:
+        mujoco.mj_energyPos(judge.model, judge.at(state).data)
+        return np.array([judge.data.energy[0]])
+
+    for state in judges.states(name, 2):
+        slope = judges.jacobian_of(potential, state)[0]
+        assert judges.relative(bias_forces(state).gravity, slope) < 1e-5
+
+
+def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grows_with_the_square(name: str) -> None:
+    state = judges.load(name).random_state(3, spread=1.0)
+    scale = np.max(np.abs(state.h))
+    for i, unit in enumerate(np.eye(state.robot.nv)):
+        slow, fast = bias_forces(state.at(v=unit)), bias_forces(state.at(v=-3.0 * unit))
+        assert np.max(np.abs(fast.coriolis)) < 1e-11 * scale, i
+        assert np.allclose(fast.centrifugal, 9.0 * slow.centrifugal, atol=1e-11 * scale)
+
+
+def test_coriolis_forces_are_the_products_of_two_different_velocities(name: str) -> None:
+    """Σ_{i<j} of what i and j feel together and not alone, by MuJoCo without gravity."""
+    state = judges.load(name).random_state(4, spread=1.0)
+    judge = judges.Mujoco(state.robot)
+    judge.model.opt.gravity[:] = 0.0
+
+    def felt(v: np.ndarray) -> np.ndarray:
+        return judge.at(state.at(v=v)).h
+
+    v, nv = state.v, state.robot.nv
+    alone = [felt(v[i] * np.eye(nv)[i]) for i in range(nv)]
+    pairs = sum(felt(v[i] * np.eye(nv)[i] + v[j] * np.eye(nv)[j]) - alone[i] - alone[j] for i in range(nv) for j in range(i))
+    assert judges.relative(bias_forces(state).coriolis, pairs) < 1e-8
+    assert judges.relative(bias_forces(state).centrifugal, sum(alone)) < 1e-8
+
+
+def test_the_coriolis_matrix_gives_the_velocity_forces(name: str) -> None:
+    for state in judges.states(name, N, spread=1.0):
+        assert judges.relative(coriolis_matrix(state) @ state.v, bias_forces(state).fictitious) < 1e-9
+
+
+def test_inertia_changes_as_finite_differences_along_v_say(name: str) -> None:
+    for state in judges.states(name, N, spread=1.0):
+        differences = judges.derivative(lambda s: s.M, state, state.v, 1e-5)
+        assert judges.relative(inertia_rate(state), differences) < 1e-6
+
+
+def test_fictitious_forces_do_no_net_work(name: str) -> None:
+    """vᵀ (Ṁ - 2 C) v = 0, with Ṁ from Pinocchio and with Ṁ from finite differences."""
+    for state in judges.states(name, N, spread=1.0):
+        C, v = coriolis_matrix(state), state.v
+        power = abs(v) @ np.abs(C) @ abs(v)
+        assert abs(power_identity(state)) < 1e-12 * power
+        M_rate = judges.derivative(lambda s: s.M, state, v, 1e-5)
+        assert abs(v @ (M_rate - 2.0 * C) @ v) < 1e-6 * power
+        assert abs(v @ M_rate @ v) > 1e-4 * power  # each of the two alone does work
+
+
+def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy() -> None:
+    """go2 whirls its legs for 0.2 s under fictitious forces alone: energy moves between joints and base, none is lost."""
+    state = judges.load("go2").random_state(5, spread=1.0)
+    state = state.at(v=8.0 * state.v)
+    start, dt, joints = 0.5 * state.v @ state.M @ state.v, 1e-4, []
+    for _ in range(2000):
+        # the midpoint rule in q and v
+        acceleration = -np.linalg.solve(state.M, bias_forces(state).fictitious)
+        middle = state.at(q=state.integrate(0.5 * dt * state.v), v=state.v + 0.5 * dt * acceleration)
+        acceleration = -np.linalg.solve(middle.M, bias_forces(middle).fictitious)
+        state = state.at(q=state.integrate(dt * middle.v), v=state.v + dt * acceleration)
+        joints.append(0.5 * state.v[6:] @ state.M[6:, 6:] @ state.v[6:])
+    assert abs(0.5 * state.v @ state.M @ state.v / start - 1.0) < 1e-7
+    assert np.ptp(joints) > 0.3 * joints[0]
+
+
+# a particle seen from a turning frame
+
+
+def wandering(t: float) -> np.ndarray:
+    """An angular velocity that changes in size and direction, rad/s."""
+    return np.array([np.sin(2.0 * t), 1.5 + 0.5 * t, np.cos(3.0 * t)])
+
+
+def wandering_rate(t: float) -> np.ndarray:
+    return np.array([2.0 * np.cos(2.0 * t), 0.5, -3.0 * np.sin(3.0 * t)])
+
+
+def test_the_three_terms_explain_the_curved_path_whatever_the_frame_does() -> None:
+    time = np.linspace(0.0, 2.0, 4001)
+    view = seen_from_turning_frame(time, wandering, (0.4, -0.2, 0.7), (0.3, 0.5, -0.1), wandering_rate)
+    dt = time[1] - time[0]
+    velocity = (view.position[2:] - view.position[:-2]) / (2.0 * dt)
+    acceleration = (view.position[2:] - 2.0 * view.position[1:-1] + view.position[:-2]) / dt**2
+    assert np.max(np.abs(view.velocity[1:-1] - velocity)) < 1e-5
+    assert np.max(np.abs(view.acceleration[1:-1] - acceleration)) < 2e-5
+    for term in (view.centrifugal, view.coriolis, view.euler):  # leaving one out would not explain it
+        assert np.max(np.abs(term)) > 0.5
+
+
+def test_the_frames_rotation_agrees_with_a_tight_integrator() -> None:
+    def derivative(t: float, R: np.ndarray) -> np.ndarray:
+        x, y, z = wandering(t)
+        return (np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ R.reshape(3, 3)).ravel()
+
+    time = np.linspace(0.0, 3.0, 7)
+    found = seen_from_turning_frame(time, wandering, (1.0, 0.0, 0.0), omega_rate=wandering_rate).rotation
+    exact = scipy.integrate.solve_ivp(derivative, (0.0, 3.0), np.eye(3).ravel(), t_eval=time, rtol=1e-12, atol=1e-13)
+    assert np.max(np.abs(found.reshape(7, 9) - exact.y.T)) < 1e-8
+    assert np.allclose(found @ found.transpose(0, 2, 1), np.eye(3), atol=1e-12)
+
+
+def test_a_particle_at_rest_in_the_world_circles_backwards_in_a_frame_that_turns_evenly() -> None:
+    """p' = (r cos ωt, -r sin ωt): Coriolis pulls inward twice as hard as centrifugal pushes outward."""
+    time = np.linspace(0.0, 5.0, 101)
+    r, w = 0.8, 1.3
+    view = seen_from_turning_frame(time, (0.0, 0.0, w), (r, 0.0, 0.2))
+    circle = np.column_stack([r * np.cos(w * time), -r * np.sin(w * time), np.full(time.size, 0.2)])
+    assert np.allclose(view.position, circle, atol=1e-12)
+    outward = circle * [1.0, 1.0, 0.0]
+    assert np.allclose(view.centrifugal, w**2 * outward, atol=1e-12)
+    assert np.allclose(view.coriolis, -2.0 * w**2 * outward, atol=1e-12)
+    assert np.array_equal(view.euler, np.zeros((101, 3)))
+
+
+def test_the_path_is_straight_again_in_the_world() -> None:
+    time = np.linspace(0.5, 2.5, 21)
+    view = seen_from_turning_frame(time, wandering, (0.1, 0.2, 0.3), (1.0, -1.0, 0.5), wandering_rate)
+    world = np.einsum("nij,nj->ni", view.rotation, view.position)
+    assert np.allclose(world, np.array([0.1, 0.2, 0.3]) + np.outer(time - 0.5, [1.0, -1.0, 0.5]), atol=1e-12)
+
+
+def test_a_link_that_turns_evenly_pulls_its_points_inward_by_omega_squared_times_distance() -> None:
+    """ur5's shoulder turns at 2 rad/s: the wrist's acceleration by the robot's own kinematics."""
+    robot = judges.load("ur5")
+    state = robot.standing().at(v=2.0 * np.eye(robot.nv)[0])
+    axis, place = state.frame_pose("shoulder_pan_joint").rotation[:, 2], state.point("shoulder_pan_joint")
+    r = state.point("wrist_3_link") - place
+    inward = inward_acceleration(2.0 * axis, r)
+    assert np.allclose(state.frame_drift("wrist_3_link")[:3], inward, atol=1e-10)
+    from_axis = r - (r @ axis) * axis
+    assert np.linalg.norm(from_axis) > 0.1
+    assert np.allclose(inward, -(2.0**2) * from_axis, atol=1e-12)
+
+
+def test_bad_input_is_told_what_would_be_right() -> None:
+    with pytest.raises(fb.FloatbaseError, match="give its derivative too, omega_rate="):
+        seen_from_turning_frame([0.0, 1.0], wandering, (1.0, 0.0, 0.0))
+    with pytest.raises(fb.FloatbaseError, match="each must come after the one before"):
+        seen_from_turning_frame([0.0, 0.0], (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    with pytest.raises(fb.FloatbaseError, match="at least one instant"):
+        seen_from_turning_frame([], (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    with pytest.raises(fb.FloatbaseError, match=r"position has shape \(2,\); it must have shape \(3,\) \(m\)"):
+        seen_from_turning_frame([0.0], (0.0, 0.0, 1.0), (1.0, 0.0))
+    with pytest.raises(fb.FloatbaseError, match=r"omega at 0\S* s has shape \(2,\)"):
+        seen_from_turning_frame([0.0, 1.0], lambda t: (1.0, t), (1.0, 0.0, 0.0), omega_rate=lambda t: (0.0, 1.0))
+    with pytest.raises(fb.FloatbaseError, match=r"r holds nan at index \[1\]"):
+        inward_acceleration((0.0, 0.0, 1.0), (1.0, np.nan, 0.0))
