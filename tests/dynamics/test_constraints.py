@@ -1,0 +1,485 @@
+"""Constraints beyond feet (5)(6), note 6: bolts, drives and rolling wheels, judged by closed forms and by integration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import judges
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+
+import floatbase as fb
+from floatbase.dynamics import subspace
+from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
+from floatbase.robots.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+M_DISC, R_DISC, G = 3.0, 0.25, 9.81
+I_ACROSS, I_AXLE = 0.25 * M_DISC * R_DISC**2, 0.5 * M_DISC * R_DISC**2
+Z = np.array([0.0, 0.0, 1.0])
+
+DISC = f"""<robot name="disc"><link name="disc"><inertial><origin xyz="0 0 0"/><mass value="{M_DISC}"/>
+<inertia ixx="{I_ACROSS}" ixy="0" ixz="0" iyy="{I_AXLE}" iyz="0" izz="{I_ACROSS}"/></inertial></link></robot>"""
+
+# a body with a steered wheel, every axis and offset askew, so that no term of the drift is zero by luck
+CART = """<robot name="cart">
+<link name="body"><inertial><origin xyz="0.02 -0.01 0.05"/><mass value="5"/>
+<inertia ixx="0.1" ixy="0.01" ixz="0" iyy="0.2" iyz="-0.01" izz="0.15"/></inertial></link>
+<link name="fork"><inertial><mass value="0.5"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+<link name="wheel"><inertial><origin xyz="0.01 0 0.02"/><mass value="1.5"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial></link>
+<joint name="steering" type="revolute"><parent link="body"/><child link="fork"/><origin xyz="0.3 0.05 -0.1" rpy="0.1 0.2 -0.1"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="10" velocity="10"/></joint>
+<joint name="axle" type="revolute"><parent link="fork"/><child link="wheel"/><origin xyz="0.05 0.02 -0.1" rpy="0.2 0 0.1"/>
+<axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="10" velocity="10"/></joint></robot>"""
+
+
+def read(text: str, path: Path, **more: object) -> Robot:
+    """A robot of our own, from URDF text."""
+    path.write_text(text)
+    model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+    d = model.nv - 6
+    return Robot(path.stem, model, path, (path.parent,), (), np.full(d, np.inf), pin.neutral(model), **more)
+
+
+@pytest.fixture
+def disc(tmp_path: Path) -> Robot:
+    return read(DISC, tmp_path / "disc.urdf")
+
+
+@pytest.fixture
+def cart(tmp_path: Path) -> Robot:
+    return read(CART, tmp_path / "cart.urdf")
+
+
+def pose(robot: Robot, R: Array, position: npt.ArrayLike, omega: npt.ArrayLike, velocity: npt.ArrayLike) -> fb.State:
+    """A floating body's state from world quantities."""
+    q = np.concatenate([np.asarray(position, float), pin.Quaternion(R).coeffs()])
+    return fb.State(robot, q, np.concatenate([R.T @ np.asarray(velocity, float), R.T @ np.asarray(omega, float)]))
+
+
+def rolling(robot: Robot, R: Array, omega: npt.ArrayLike, place: npt.ArrayLike = (0.0, 0.0)) -> fb.State:
+    """A disc on z = 0 with its axle along R's y axis that rolls with angular velocity ω: v_c = ω × (r u)."""
+    axle = R[:, 1]
+    u = Z - axle * axle[2]
+    u /= np.linalg.norm(u)
+    centre = np.array([*place, 0.0]) + R_DISC * u
+    return pose(robot, R, centre, omega, np.cross(omega, R_DISC * u))
+
+
+def wheel_of_the_disc(normal: npt.ArrayLike = Z) -> RollingWheel:
+    return RollingWheel("disc", [0.0, 1.0, 0.0], R_DISC, normal)
+
+
+def motion(state: fb.State, *contacts: object, t: float = 0.0) -> tuple[Array, Array]:
+    """q̈ and λ under no torque, from the whole system (7) by least squares: no ζ, no η."""
+    eom = fb.equations_of_motion(state, fb.Contacts(list(contacts)), t)
+    kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
+    x = np.linalg.lstsq(kkt, np.concatenate([-eom.h, eom.b]), rcond=1e-12)[0]
+    return x[: eom.nv], x[eom.nv :]
+
+
+def world_acceleration(state: fb.State, qdd: Array) -> tuple[Array, Array]:
+    """Linear acceleration of a floating body's origin and its angular acceleration, world: Newton's, not the base frame's."""
+    R = judges.quaternion_rotation(state.q[3:7])
+    return R @ (qdd[:3] + np.cross(state.v[3:6], state.v[:3])), R @ qdd[3:6]
+
+
+def integrate(state: fb.State, acceleration: Callable[[fb.State], Array], duration: float, steps: int) -> fb.State:
+    """Runge-Kutta of order four on (position, quaternion, joints, velocity) written out, without Pinocchio's integrate."""
+
+    def rate(x: Array) -> Array:
+        nq = state.robot.nq
+        q, v = x[:nq].copy(), x[nq:]
+        q[3:7] /= np.linalg.norm(q[3:7])
+        i, j, k, w = q[3:7]
+        a, b, c = 0.5 * v[3:6]
+        spin = [w * a + j * c - k * b, w * b + k * a - i * c, w * c + i * b - j * a, -i * a - j * b - k * c]
+        q_dot = np.concatenate([judges.quaternion_rotation(q[3:7]) @ v[:3], spin, v[6:]])
+        return np.concatenate([q_dot, acceleration(fb.State(state.robot, q, v))])
+
+    x, dt = np.concatenate([state.q, state.v]), duration / steps
+    for _ in range(steps):
+        k1 = rate(x)
+        k2 = rate(x + 0.5 * dt * k1)
+        k3 = rate(x + 0.5 * dt * k2)
+        k4 = rate(x + dt * k3)
+        x = x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        x[3:7] /= np.linalg.norm(x[3:7])
+    return fb.State(state.robot, x[: state.robot.nq], x[state.robot.nq :])
+
+
+def energy(state: fb.State) -> float:
+    """Kinetic and potential."""
+    return 0.5 * float(state.v @ state.M @ state.v) + state.robot.mass * G * float(state.com[2])
+
+
+# any A q̈ = b ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_linear_constraint_is_kept_by_the_motion_and_its_force_is_its_rows_times_its_multipliers() -> None:
+    rng = np.random.default_rng(0)
+    state = judges.load("go2").random_state(1)
+    A, b = rng.normal(size=(4, 18)), rng.normal(size=4)
+    constraint = LinearConstraint("any", 4, lambda s, t: (A, b))
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot, frames=["FL_foot"]) + fb.Contacts([constraint]))
+    tau = rng.normal(size=12)
+    qdd, forces = subspace.accelerations_from_torques(eom)(tau), subspace.forces_from_torques(eom)(tau)
+    assert np.allclose(A @ qdd, b, atol=1e-8)
+    J_foot = judges.mujoco_of("go2").at(state).jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
+    assert np.allclose(state.M @ qdd + state.h - eom.S @ tau, J_foot.T @ forces[:3] + A.T @ forces[3:], atol=1e-7)
+    assert eom.contacts.point_names == ("FL_foot",)
+
+
+def test_gauss_a_constraint_changes_the_free_acceleration_as_little_as_the_inertia_allows() -> None:
+    """Gauss' principle: among all q̈ with A q̈ = b the true one is nearest to the free one in the metric M."""
+    import cvxpy as cp
+
+    rng = np.random.default_rng(3)
+    state = judges.load("solo12").random_state(2)
+    A, b, tau = rng.normal(size=(5, 18)), rng.normal(size=5), rng.normal(size=12)
+    eom = fb.equations_of_motion(state, fb.Contacts([LinearConstraint("any", 5, lambda s, t: (A, b))]))
+    free = judges.aba(fb.equations_of_motion(state, fb.Contacts.none()), tau, np.zeros(0))
+    L = np.linalg.cholesky(state.M)
+    x = cp.Variable(18)
+    cp.Problem(cp.Minimize(cp.sum_squares(L.T @ (x - free))), [A @ x == b]).solve(
+        solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12
+    )
+    assert np.allclose(subspace.accelerations_from_torques(eom)(tau), x.value, rtol=1e-5, atol=1e-3)
+
+
+def test_rows_that_turn_with_time_push_along_where_they_point_now() -> None:
+    """Note 6: A(q, q̇, t) q̈ = b(q, q̇, t). The force of the constraint at t is A(t)ᵀ λ, not A(0)ᵀ λ."""
+    state = judges.load("go2").random_state(0)
+
+    def rows(s: fb.State, t: float) -> tuple[Array, Array]:
+        return (np.array([[np.cos(t), 0.0, np.sin(t)]]) @ s.frame_jacobian("base")[:3], np.array([t]))
+
+    eom = fb.equations_of_motion(state, fb.Contacts([LinearConstraint("rail", 1, rows)]), t=0.7)
+    wanted = rows(state, 0.7)[0]
+    assert np.allclose(eom.A, wanted)
+    assert np.allclose(eom.J, wanted), "J of (4) was taken at another time than A of (5)"
+
+
+def test_b_may_follow_the_time_and_the_motion_follows_b() -> None:
+    state = judges.load("go2").random_state(0)
+    constraint = LinearConstraint("drive", 1, lambda s, t: (np.eye(18)[:1], np.array([np.sin(t)])))
+    for t in (0.0, 0.4, 2.0):
+        qdd, _ = motion(state, constraint, t=t)
+        assert qdd[0] == pytest.approx(np.sin(t), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [
+        (lambda s, t: (np.eye(17)[:2], np.zeros(2)), r"A of bad has shape \(2, 17\); it must have shape \(2, 18\)"),
+        (lambda s, t: (np.eye(18)[:2], np.zeros(3)), r"b of bad has shape \(3,\); it must have shape \(2,\)"),
+        (lambda s, t: (np.eye(18)[:2], np.full(2, np.nan)), r"b of bad holds nan at index \[0\]"),
+    ],
+)
+def test_rows_that_do_not_fit_are_named(rows: Callable[..., tuple[Array, Array]], text: str) -> None:
+    contacts = fb.Contacts([LinearConstraint("bad", 2, rows)])
+    with pytest.raises(fb.FloatbaseError, match=text):
+        fb.equations_of_motion(judges.load("go2").standing(), contacts)
+
+
+def test_a_constraint_needs_a_row() -> None:
+    with pytest.raises(fb.FloatbaseError, match=r"'none' has m = 0 rows; it must have at least 1"):
+        LinearConstraint("none", 0, lambda s, t: (np.zeros((0, 18)), np.zeros(0)))
+
+
+# bolts: Figure 1, left --------------------------------------------------------------------------------------------------
+
+
+def test_bolts_of_a_robot_that_is_held_still_carry_its_weight_upwards_and_the_moment_of_its_centre_of_mass() -> None:
+    """λ is what the ground does to the robot: + m g along z, and r × (+ m g z) about the frame, r from the frame to the CoM."""
+    state = judges.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
+    zeta, eta = subspace.forces_from_torques(eom), subspace.accelerations_from_torques(eom)
+    tau = np.linalg.solve(eta.A[6:], -eta.b[6:])  # the torques that hold the legs
+    assert np.allclose(eta(tau), 0.0, atol=1e-9)
+    up = np.array([0.0, 0.0, state.robot.mass * G])
+    lever = state.com - state.frame_pose("base").translation
+    assert np.linalg.norm(np.cross(lever, up)) > 0.1
+    assert np.allclose(zeta(tau), np.concatenate([up, np.cross(lever, up)]), atol=1e-8)
+
+
+def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls() -> None:
+    """With no torque at all λ = m (a_com - g): less than the weight, as the legs fall."""
+    state = judges.load("go2").standing()
+    qdd, wrench = motion(state, fixed_frame("base"))
+    data = state.robot.model.createData()
+    rate = pin.computeCentroidalMomentumTimeVariation(state.robot.model, data, state.q, state.v, qdd)
+    up = np.array([0.0, 0.0, state.robot.mass * G])
+    assert np.allclose(wrench[:3], rate.linear + up, atol=1e-8)
+    lever = state.com - state.frame_pose("base").translation
+    assert np.allclose(wrench[3:] - np.cross(lever, wrench[:3]), rate.angular, atol=1e-8)
+    assert 0.5 * up[2] < wrench[2] < 0.99 * up[2]
+
+
+def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_bolts_carry_that_robots_base_wrench() -> None:
+    robot = judges.load("go2")
+    rng = np.random.default_rng(0)
+    model = pin.buildModelFromUrdf(str(robot.urdf))
+    model.armature = np.array(robot.model.armature)[6:]
+    for seed in range(3):
+        state = robot.random_state(seed)
+        R = judges.quaternion_rotation(state.q[3:7])
+        v = state.v.copy()
+        v[:6] = 0.0
+        state, tau = state.at(v=v), 5.0 * rng.normal(size=12)
+        eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
+        model.gravity.linear = R.T @ np.array([0.0, 0.0, -G])  # the bolted base leans
+        data = model.createData()
+        wanted = pin.aba(model, data, state.q[7:], state.v[6:], tau)
+        qdd = subspace.accelerations_from_torques(eom)(tau)
+        assert judges.relative(qdd[6:], wanted) < 1e-9
+        assert np.max(np.abs(qdd[:6])) < 1e-9
+        pin.rnea(model, data, state.q[7:], state.v[6:], wanted)
+        # what the base link passes on to its children, plus its own weight
+        origin = pin.Force.Zero()
+        for child in range(1, model.njoints):
+            if model.parents[child] == 0:
+                origin += data.liMi[child].act(data.f[child])
+        own = robot.model.inertias[1]
+        f_own = -own.mass * np.array(model.gravity.linear)
+        origin += pin.Force(f_own, np.cross(own.lever, f_own))
+        # the links that pin welds into the world keep their weight out of data.f; robot.inertias[1] holds them all
+        wrench = subspace.forces_from_torques(eom)(tau)
+        assert np.allclose(R.T @ wrench[:3], origin.linear, atol=1e-7)
+        assert np.allclose(R.T @ wrench[3:], origin.angular, atol=1e-7)
+
+
+def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1() -> None:
+    """§1: fixed bases are fully actuated. η of a bolted robot is onto the joints; of a standing one it is not."""
+    state = judges.load("go2").standing()
+    bolted = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
+    standing = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    assert np.linalg.matrix_rank(subspace.accelerations_from_torques(bolted).A[6:], tol=1e-6) == 12
+    assert np.linalg.matrix_rank(subspace.accelerations_from_torques(standing).A[6:], tol=1e-6) == 6
+
+
+def test_the_frame_of_the_bolts_does_not_accelerate_whatever_moves() -> None:
+    for seed, frame in enumerate(("base", "FL_foot", "RR_calf")):
+        state = judges.load("go2").random_state(seed, spread=0.6)
+        qdd, _ = motion(state, fixed_frame(frame))
+        moving = judges.acceleration_of(lambda s, f=frame: s.point(f), state, qdd)
+        turning = judges.turning_acceleration_of(lambda s, f=frame: s.frame_pose(f).rotation, state, qdd)
+        assert np.allclose(moving, 0.0, atol=1e-4)
+        assert np.allclose(turning, 0.0, atol=1e-4)
+
+
+def test_a_driven_frame_has_the_acceleration_asked_for_at_that_time() -> None:
+    def wanted(t: float) -> Array:
+        return np.array([np.sin(t), 2.0 * np.cos(3.0 * t), -t])
+
+    for seed, (t, frame) in enumerate(((0.0, "base"), (0.8, "FL_foot"), (1.9, "RR_calf"))):
+        state = judges.load("go2").random_state(seed, spread=0.6)
+        qdd, force = motion(state, moving_frame(frame, wanted), t=t)
+        found = judges.acceleration_of(lambda s, f=frame: s.point(f), state, qdd)
+        assert np.allclose(found, wanted(t), atol=1e-4)
+        data = state.robot.model.createData()
+        rate = pin.computeCentroidalMomentumTimeVariation(state.robot.model, data, state.q, state.v, qdd)
+        assert np.allclose(force, rate.linear + np.array([0.0, 0.0, state.robot.mass * G]), atol=1e-7)
+
+
+def test_a_drive_of_the_wrong_size_is_named() -> None:
+    contacts = fb.Contacts([moving_frame("base", lambda t: np.zeros(2))])
+    with pytest.raises(fb.FloatbaseError, match=r"acceleration has shape \(2,\); it must have shape \(3,\)"):
+        fb.equations_of_motion(judges.load("go2").standing(), contacts)
+
+
+# the wheel --------------------------------------------------------------------------------------------------------------
+
+
+def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart: Robot) -> None:
+    """(6) by central differences of J(q) v with v fixed, on states that neither roll nor stand, on leaning grounds."""
+    rng = np.random.default_rng(0)
+    for seed in range(20):
+        q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
+        state = fb.State(cart, q, rng.normal(size=cart.nv))
+        normal = judges.random_normals(1, seed)[0]
+        wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, normal)
+        A, b = wheel.constraint(state)
+        wanted = -judges.derivative(lambda s, w=wheel: w.jacobian(s) @ s.v, state, state.v)
+        assert np.linalg.norm(wanted) > 1e-2
+        assert np.allclose(b, wanted, atol=1e-7)
+        assert np.array_equal(A, wheel.jacobian(state))
+
+
+def test_the_slip_is_the_velocity_of_the_wheels_material_point_at_the_contact(cart: Robot) -> None:
+    rng = np.random.default_rng(1)
+    for seed in range(10):
+        q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
+        state = fb.State(cart, q, rng.normal(size=cart.nv))
+        wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, judges.random_normals(1, seed)[0])
+        touching = wheel.positions(state)[0]
+        in_wheel = state.frame_pose("wheel").actInv(touching)
+        velocity = judges.derivative(lambda s, p=in_wheel: s.point("wheel", p), state, state.v)
+        assert np.allclose(wheel.slip(state), velocity, atol=1e-8)
+
+
+def test_the_contact_is_the_lowest_point_of_the_rim(cart: Robot) -> None:
+    rng = np.random.default_rng(2)
+    angles = np.linspace(0.0, 2.0 * np.pi, 20001)
+    for seed in range(5):
+        q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
+        state, n = fb.State(cart, q), judges.random_normals(1, seed)[0]
+        wheel = RollingWheel("wheel", [0.0, 1.0, 0.0], 0.17, n)
+        rim = np.stack([0.17 * np.cos(angles), 0.0 * angles, 0.17 * np.sin(angles)])
+        R, centre = state.frame_pose("wheel").rotation, state.point("wheel")
+        heights = n @ (R @ rim + centre[:, None])
+        touching = wheel.positions(state)[0]
+        assert n @ touching == pytest.approx(heights.min(), abs=1e-8)
+        assert np.linalg.norm(touching - (R @ rim + centre[:, None])[:, heights.argmin()]) < 1e-4
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.4, 0.9])
+def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(disc: Robot, slope: float) -> None:
+    normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
+    down = np.array([np.cos(slope), 0.0, -np.sin(slope)])
+    state = pose(disc, np.eye(3), R_DISC * normal, np.zeros(3), np.zeros(3))
+    qdd, force = motion(state, wheel_of_the_disc(normal))
+    linear, angular = world_acceleration(state, qdd)
+    assert np.allclose(linear, 2.0 / 3.0 * G * np.sin(slope) * down, atol=1e-10)
+    assert np.allclose(angular, [0.0, 2.0 / 3.0 * G * np.sin(slope) / R_DISC, 0.0], atol=1e-9)
+    # friction takes the third that gravity does not give, up the slope
+    assert np.allclose(force, M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down), atol=1e-9)
+
+
+@pytest.mark.parametrize(("lean", "radius"), [(1.2, 0.6), (0.8, 1.0), (0.5, 0.3)])
+def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(disc: Robot, lean: float, radius: float) -> None:
+    """Steady motion with angle α between disc and ground, centre on a circle of radius b: Ω² = 4 g cot α / (6 b + r cos α)."""
+    rate = np.sqrt(4.0 * G / np.tan(lean) / (6.0 * radius + R_DISC * np.cos(lean)))
+    out, along = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    u = -np.cos(lean) * out + np.sin(lean) * Z  # leans towards the circle's centre
+    axle = np.sin(lean) * out + np.cos(lean) * Z
+    omega = -rate * radius / R_DISC * axle + rate * np.sin(lean) * u
+    R = np.column_stack([np.cross(axle, u), axle, u])
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    state = pose(disc, R, radius * out + R_DISC * np.sin(lean) * Z, omega, rate * radius * along)
+    wheel = wheel_of_the_disc()
+    assert np.allclose(wheel.slip(state), 0.0, atol=1e-12)
+    qdd, force = motion(state, wheel)
+    linear, angular = world_acceleration(state, qdd)
+    assert np.allclose(linear, -(rate**2) * radius * out, atol=1e-9)
+    assert np.allclose(angular, rate * np.cross(Z, omega), atol=1e-9)
+    assert np.allclose(force, M_DISC * (G * Z - rate**2 * radius * out), atol=1e-9)
+    faster = state.at(v=1.2 * state.v)  # at another rate the circle is not kept: the lean changes
+    assert np.linalg.norm(world_acceleration(faster, motion(faster, wheel)[0])[1] - 1.44 * angular) > 1.0
+
+
+def test_a_wobbling_disc_that_rolls_goes_on_rolling_at_constant_energy_and_on_the_ground(disc: Robot) -> None:
+    wheel = wheel_of_the_disc()
+    start = rolling(disc, judges.rotation([0.3, 0.0, 0.0]) @ judges.rotation([0.0, 0.5, 0.0]), [0.4, 5.0, 1.0])
+    assert np.linalg.norm(wheel.slip(start)) < 1e-12
+    errors = []
+    for steps in (150, 300):
+        end = integrate(start, lambda s: motion(s, wheel)[0], 0.6, steps)
+        axle = end.frame_pose("disc").rotation[:, 1]
+        off = float(end.q[2]) - R_DISC * float(np.sqrt(1.0 - axle[2] ** 2))
+        errors.append(max(float(np.linalg.norm(wheel.slip(end))), abs(off), abs(energy(end) - energy(start))))
+        assert abs(axle[2] - start.frame_pose("disc").rotation[2, 1]) > 0.02  # it does wobble
+    assert errors[1] < 1e-7
+    assert errors[1] < errors[0] / 8.0 or errors[1] < 1e-11  # what is left is the integrator's, of order four
+
+
+def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) -> None:
+    """Roll, turn, roll back, turn back: never a slip, and in the end the disc stands beside where it was, nothing else changed.
+
+    Straight there it may not go. So the same place is reached or refused by the way, which no φ(q) = 0 can tell apart.
+    """
+    wheel, turn, way = wheel_of_the_disc(), 0.7, 0.5
+
+    def drive(state: fb.State, spin: Callable[[Array], Array], steps: int = 50) -> fb.State:
+        for _ in range(steps):
+            R = judges.quaternion_rotation(state.q[3:7])
+            omega = spin(R[:, 1])
+            velocity = np.cross(omega, R_DISC * Z)
+            assert np.max(np.abs(wheel.slip(pose(disc, R, state.q[:3], omega, velocity)))) < 1e-9
+            state = pose(disc, judges.rotation(omega / steps) @ R, state.q[:3] + velocity / steps, omega, velocity)
+        return state
+
+    start = rolling(disc, np.eye(3), np.zeros(3))
+    ahead = drive(start, lambda axle: way / R_DISC * axle)
+    turned = drive(ahead, lambda axle: turn * Z)
+    back = drive(turned, lambda axle: -way / R_DISC * axle)
+    end = drive(back, lambda axle: -turn * Z)
+    assert np.allclose(ahead.q[:3] - start.q[:3], [way, 0.0, 0.0], atol=1e-9)
+    assert np.allclose(end.frame_pose("disc").rotation, np.eye(3), atol=1e-9)
+    assert np.allclose(end.q[:3] - start.q[:3], way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0]), atol=1e-9)
+    sideways = start.at(v=[0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    assert np.linalg.norm(wheel.slip(sideways)) > 0.9
+
+
+def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_ground_cannot(cart: Robot) -> None:
+    """The height of the centre, r √(1 - (n·a)²), is a position constraint; its derivative is the normal row. The curl of the
+    tangential rows is not zero on the motions they allow (Frobenius), so no position constraint stands behind them."""
+    rng = np.random.default_rng(4)
+    q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.4, 0.4, cart.nv))
+    state, n = fb.State(cart, q), judges.random_normals(1, 1)[0]
+    wheel = RollingWheel("wheel", [0.0, 1.0, 0.0], 0.17, n)
+
+    def height(s: fb.State) -> Array:
+        axle = s.frame_pose("wheel").rotation[:, 1]
+        return np.array([n @ s.point("wheel") - 0.17 * np.sqrt(1.0 - (n @ axle) ** 2)])
+
+    assert np.allclose(judges.jacobian_of(height, state)[0], n @ wheel.jacobian(state), atol=1e-8)
+
+    def bracket(contact: object) -> float:
+        """Largest A [X, Y] over pairs of constant allowed directions: what a small parallel-parking loop gains, per area."""
+        N = subspace.null_space(contact.constraint(state)[0])
+        gains = []
+        for x in N.T:
+            for y in N.T:
+                dy = judges.derivative(lambda s, w=y: contact.constraint(s)[0] @ w, state, x)
+                dx = judges.derivative(lambda s, w=x: contact.constraint(s)[0] @ w, state, y)
+                free = contact.constraint(state)[0] @ lie(x, y)
+                gains.append(np.max(np.abs(dy - dx - free)))
+        return max(gains)
+
+    def lie(x: Array, y: Array) -> Array:
+        """The bracket of two body-fixed directions: the free flyer's own, se(3); zero for joints."""
+        out = np.zeros(cart.nv)
+        out[:6] = (pin.Motion(x[:3], x[3:6]) ^ pin.Motion(y[:3], y[3:6])).vector
+        return out
+
+    from floatbase.dynamics import PointContact
+
+    assert bracket(PointContact("wheel")) < 1e-6
+    assert bracket(wheel) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"axis": [0, 0, 0]}, "axis of disc is the zero vector"),
+        ({"radius": 0.0}, "radius of disc is 0; it must be > 0 m"),
+        ({"radius": -1.0}, "radius of disc is -1; it must be > 0 m"),
+        ({"mu": 0.0}, "friction coefficient mu of disc is 0; it must be > 0"),
+        ({"normal": [0, np.nan, 0]}, "normal of disc holds nan"),
+    ],
+)
+def test_a_wheel_that_cannot_be_is_refused(arguments: dict[str, object], text: str) -> None:
+    with pytest.raises(fb.FloatbaseError, match=text):
+        RollingWheel(**{"frame": "disc", "axis": [0.0, 1.0, 0.0], "radius": 0.2, **arguments})
+
+
+def test_a_wheel_that_lies_flat_has_no_lowest_point(disc: Robot) -> None:
+    state = pose(disc, judges.rotation([np.pi / 2, 0.0, 0.0]), np.zeros(3), np.zeros(3), np.zeros(3))
+    with pytest.raises(fb.FloatbaseError, match="wheel disc lies flat on its side"):
+        wheel_of_the_disc().constraint(state)
+
+
+def test_a_wheel_and_feet_and_bolts_stand_in_one_list_under_their_names(cart: Robot) -> None:
+    contacts = fb.Contacts([RollingWheel("wheel", [0, 1, 0], 0.17), fixed_frame("body")])
+    assert contacts.names == ("wheel", "bolts of body")
+    assert contacts.force_slice("bolts of body") == slice(3, 9)
+    assert contacts.point_names == ("wheel",)
+    eom = fb.equations_of_motion(fb.State(cart, pin.neutral(cart.model)), contacts)
+    assert eom.J.shape == (9, cart.nv)
