@@ -182,7 +182,7 @@ def test_values_share_no_array_with_what_they_were_made_of_and_can_not_be_writte
         (lambda: fb.Affine.identity(2)([1.0]), r"x has shape \(1,\); this map takes shape \(2,\) or \(2, N\)"),
         (lambda: fb.Affine.identity(2) @ fb.Affine.identity(3), "the inner map gives 3 numbers, the outer takes 2"),
         (lambda: fb.Affine.identity(2) + fb.Affine.identity(3), r"cannot add maps of shapes \(2, 2\) and \(3, 3\)"),
-        (lambda: fb.Affine.identity(2) + [1.0], r"the constant has shape \(1,\); it must have shape \(2,\)"),
+        (lambda: fb.Affine.identity(2) + np.ones(1), r"the constant has shape \(1,\); it must have shape \(2,\)"),
         (lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)), r"same space; input sizes: .*'b': 3"),
         (lambda: fb.Affine.stack(), "stack needs at least one map"),
         (lambda: fb.Affine.stack(tau=fb.Affine.identity(1))["toe"], r"no block 'toe'; its blocks are \['tau'\]"),

@@ -1,0 +1,354 @@
+"""The whole-body controller (26)(27): judged by cvxpy, by the articulated-body algorithm and by closed forms."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import ClassVar
+
+import judges
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import floatbase as fb
+from floatbase.control.qp import QP, Solution, solve
+from floatbase.errors import InfeasibleError
+from floatbase.robots.state import State
+
+
+def controller_of(name: str, **options: object) -> fb.WholeBodyController:
+    """Keep the robot standing on all its feet."""
+    robot = judges.load(name)
+    return fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), **options)
+
+
+def cases(name: str, n: int) -> list[State]:
+    """Half the states near standing, half far away, where many rows push."""
+    return judges.states(name, n - n // 2, 0.08) + judges.states(name, n // 2, 0.3)
+
+
+@pytest.mark.parametrize(("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS])
+def test_daqp_gives_the_torques_that_cvxpy_gives(name: str, n: int) -> None:
+    controller, pushed = controller_of(name), 0
+    for state in cases(name, n):
+        qp = controller.qp(state)
+        found, judge = solve(qp), solve(qp, "cvxpy")
+        assert np.max(np.abs(found["tau"] - judge["tau"])) < 1e-4
+        pushed += bool(found.active)
+        for solution in (found, judge):
+            r = solution.residuals
+            assert r.equality < 1e-9
+            assert r.inequality < 1e-6
+            assert r.stationarity < 1e-6
+            assert r.complementarity < 1e-6
+            assert r.dual == 0.0
+    assert pushed > n / 4 or not judges.load(name).is_floating, "no row pushed: these states try nothing"
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_the_planned_acceleration_is_what_torques_and_forces_bring_about(name: str) -> None:
+    controller = controller_of(name)
+    for state in cases(name, 10):
+        command = controller(state.q, state.v)
+        eom = fb.equations_of_motion(state, controller.contacts)
+        assert judges.relative(command.qdd, judges.aba(eom, command.tau, command.forces)) < 1e-6
+
+
+@pytest.mark.parametrize("name", judges.BALLS)
+def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name: str) -> None:
+    """By differences of the rolling feet's centres, whose velocity ω × r n a rolling ball has."""
+    controller = controller_of(name)
+    for state in judges.states(name, 3, 0.2) if name != "solo8" else []:
+        command = controller(state.q, state.v)
+        step = 1e-5
+        ahead, behind = (judges.moved(state, command.qdd, t).at(v=state.v + t * command.qdd) for t in (step, -step))
+        rates = [controller.contacts.jacobian(s) @ s.v for s in (ahead, behind)]
+        assert np.allclose((rates[0] - rates[1]) / (2 * step), 0.0, atol=1e-5 * (1.0 + np.max(np.abs(command.qdd))))
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_forces_stay_in_the_exact_cone_and_torques_within_their_limits(name: str) -> None:
+    controller, robot = controller_of(name), judges.load(name)
+    for state in cases(name, 20):
+        command = controller(state.q, state.v)
+        forces, normals = command.forces.reshape(-1, 3), controller.contacts.normals
+        pressing = np.sum(forces * normals, axis=1)
+        sliding = np.linalg.norm(forces - pressing[:, None] * normals, axis=1)
+        assert np.all(sliding <= controller.contacts.mus * pressing + 1e-6)
+        assert np.all(pressing >= -1e-6)
+        assert np.all(np.abs(command.tau) <= robot.torque_limits + 1e-6)
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_a_row_that_pushes_is_met_exactly_and_named_for_what_it_limits(name: str) -> None:
+    controller, robot = controller_of(name, min_normal_force=1.0), judges.load(name)
+    seen = set()
+    for state in cases(name, 20):
+        command = controller(state.q, state.v)
+        assert tuple(command.multipliers) == command.active
+        points = controller.contacts.point_names
+        forces = dict(zip(points, command.forces.reshape(-1, 3), strict=True))
+        torques = dict(zip(robot.joint_names, command.tau, strict=True))
+        limits = dict(zip(robot.joint_names, robot.torque_limits, strict=True))
+        for row in command.active:
+            assert command.multipliers[row] > 0
+            if row.startswith("torque limit "):
+                joint, side = row.removeprefix("torque limit ").split()
+                assert torques[joint] == pytest.approx(limits[joint] * {"upper": 1, "lower": -1}[side], abs=1e-6)
+                seen.add("torque")
+            elif row.endswith(" normal force"):
+                assert forces[row.removesuffix(" normal force")][2] == pytest.approx(1.0, abs=1e-6)
+                seen.add("normal")
+            else:
+                point, facet = row.split(" facet ")
+                angle = 2 * np.pi * int(facet) / 4
+                along = forces[point] @ [np.cos(angle), np.sin(angle), 0.0]
+                assert along == pytest.approx(0.7 * np.cos(np.pi / 4) * forces[point][2], abs=1e-6)
+                seen.add("facet")
+    assert {"normal", "facet"} <= seen
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) -> None:
+    state = judges.load(name).standing()
+    command = controller_of(name)(state.q, state.v)
+    forces = command.forces.reshape(-1, 3)
+    assert np.allclose(forces.sum(axis=0), [0.0, 0.0, state.robot.weight], rtol=1e-3, atol=1e-3 * state.robot.weight)
+    moment = np.cross(judges.stance(state.robot).positions(state) - state.com, forces).sum(axis=0)
+    assert np.allclose(moment, 0.0, atol=1e-3 * state.robot.weight)
+    assert np.allclose(command.qdd, 0.0, atol=0.05)
+    assert command.active == ()
+
+
+def test_an_arm_bolted_to_the_ground_gets_computed_torque() -> None:
+    """(1) τ = M (-kp e - kd ė) + h, the closed form, when nothing limits it."""
+    robot = judges.load("ur5")
+    goal = robot.standing().q
+    task = fb.PostureTask(goal, kp=30.0, kd=4.0, weight=1e6)
+    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [task], torque_limits=np.inf)
+    for state in judges.states("ur5", 5):
+        judge = judges.mujoco_of("ur5").at(state)
+        wanted = judge.M @ (-30.0 * (state.q - goal) - 4.0 * state.v) + judge.h
+        assert np.allclose(controller(state.q, state.v).tau, wanted, atol=1e-5)
+
+
+def test_nothing_can_hold_a_robot_that_touches_nothing() -> None:
+    robot = judges.load("go2")
+    state = robot.standing()
+    controller = fb.WholeBodyController(robot, fb.Contacts.none(), fb.standing_tasks(state))
+    command = controller(state.q, state.v)
+    assert command.forces.shape == (0,)
+    fall = judges.acceleration_of(lambda s: s.com, state, command.qdd)
+    assert np.allclose(fall, [0.0, 0.0, -9.81], atol=1e-5)
+
+
+def test_tasks_are_met_when_nothing_limits_them() -> None:
+    robot = judges.load("go2")
+    for state in judges.states("go2", 5, 0.02):
+        feed = np.array([0.3, -0.2, 0.5])
+        tasks = [fb.CoMTask(state.com, state.com_velocity, feed, weight=1e3), fb.OrientationTask(weight=1e3)]
+        command = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)(state.q, state.v)
+        assert np.allclose(judges.acceleration_of(lambda s: s.com, state, command.qdd), feed, atol=1e-3)
+
+
+def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
+    """Newton: the body cannot be accelerated sideways by more than μ g while the feet carry its weight."""
+    robot = judges.load("go2")
+    state = robot.standing()
+    tasks = [
+        fb.CoMTask(state.com, acceleration=[0.0, 20.0, 0.0], weight=1e3),
+        fb.OrientationTask(weight=1e-3),
+        fb.PostureTask(state.q, weight=1e-4),
+    ]
+    for inside, reach in ((True, 0.5 * np.cos(np.pi / 4)), (False, 0.5)):
+        contacts = fb.Contacts.points(robot, mu=0.5)
+        command = fb.WholeBodyController(robot, contacts, tasks, inside=inside, torque_limits=np.inf)(state.q, state.v)
+        total = command.forces.reshape(-1, 3).sum(axis=0)
+        assert total[1] / total[2] == pytest.approx(reach, rel=1e-4)
+        for point in contacts.point_names:
+            assert f"{point} facet 1" in command.active or f"{point} normal force" in command.active
+
+
+def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> None:
+    """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges and neither holds the other."""
+    for state in judges.states("go2", 5, 0.3):
+        outside = [solve(controller_of("go2", facets=n, inside=False).qp(state)).objective for n in (4, 8, 16, 32)]
+        slack = 1e-9 * abs(outside[0])
+        assert all(coarse <= fine + slack for coarse, fine in pairwise(outside))
+        inside = [solve(controller_of("go2", facets=n).qp(state)).objective for n in (4, 8, 16, 32)]
+        assert max(outside) <= min(inside) + slack
+        assert inside[-1] - outside[-1] < 0.1 * (inside[0] - outside[0])
+
+
+def test_the_smallest_normal_force_is_kept_on_every_point() -> None:
+    controller = controller_of("go2", min_normal_force=7.0)
+    lowest = [controller(s.q, s.v).forces.reshape(-1, 3)[:, 2].min() for s in judges.states("go2", 10, 0.2)]
+    assert min(lowest) == pytest.approx(7.0, abs=1e-6)
+
+
+def test_normal_forces_are_along_the_normals_of_tilted_ground() -> None:
+    robot = judges.load("go2")
+    normals = judges.random_normals(4, 1)
+    contacts = fb.Contacts.points(robot, mu=0.4, normals=normals)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=2.0)
+    for state in judges.states("go2", 5, 0.2):
+        forces = controller(state.q, state.v).forces.reshape(4, 3)
+        pressing = np.sum(forces * normals, axis=1)
+        assert np.all(pressing >= 2.0 - 1e-6)
+        assert np.all(np.linalg.norm(forces - pressing[:, None] * normals, axis=1) <= 0.4 * pressing + 1e-6)
+
+
+def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
+    state = judges.states("go2", 1, 0.3)[0]
+    robot = state.robot
+    assert np.array_equal(controller_of("go2").limits.torque_limits, robot.torque_limits)
+    assert np.max(np.abs(controller_of("go2", torque_limits=12.0)(state.q, state.v).tau)) <= 12.0 + 1e-6
+    free = controller_of("go2", torque_limits=np.inf)
+    assert not any(name.startswith("torque") for name in free.qp(state).inequality_names)
+    assert np.max(np.abs(free(state.q, state.v).tau)) > 12.0
+    some = np.full(12, np.inf)
+    some[3] = 1.0
+    one = controller_of("go2", torque_limits=some)
+    assert [n for n in one.qp(state).inequality_names if n.startswith("torque")] == [
+        f"torque limit {robot.joint_names[3]} upper",
+        f"torque limit {robot.joint_names[3]} lower",
+    ]
+
+
+def test_every_row_of_the_problem_has_a_name_of_its_own() -> None:
+    for name in judges.ROBOTS:
+        qp = controller_of(name).qp(judges.load(name).standing())
+        assert len(set(qp.equality_names)) == len(qp.equality_names) == len(qp.A)
+        assert len(set(qp.inequality_names)) == len(qp.inequality_names) == len(qp.G)
+
+
+def test_the_order_of_tasks_does_not_matter() -> None:
+    robot = judges.load("go2")
+    state = robot.random_state(3)
+    tasks = fb.standing_tasks(robot.standing())
+    one, other = (fb.WholeBodyController(robot, fb.Contacts.points(robot), t) for t in (tasks, tasks[::-1]))
+    assert np.allclose(one(state.q, state.v).tau, other(state.q, state.v).tau, atol=1e-8)
+
+
+def test_the_order_of_contacts_does_not_matter() -> None:
+    robot = judges.load("go2")
+    state = robot.random_state(3)
+    tasks, contacts = fb.standing_tasks(robot.standing()), fb.Contacts.points(robot)
+    turned = fb.Contacts.points(robot, frames=contacts.names[::-1])
+    one, other = (fb.WholeBodyController(robot, c, tasks)(state.q, state.v) for c in (contacts, turned))
+    assert np.allclose(one.tau, other.tau, atol=1e-7)
+    assert np.allclose(one.forces.reshape(4, 3), other.forces.reshape(4, 3)[::-1], atol=1e-6)
+
+
+def test_the_same_state_gets_the_same_answer_whatever_came_before() -> None:
+    controller = controller_of("go2")
+    state, other = judges.states("go2", 2)
+    first = controller(state.q, state.v)
+    controller(other.q, other.v)
+    again = controller(state.q, state.v)
+    assert np.array_equal(first.tau, again.tau)
+    assert first.active == again.active
+
+
+def test_regularisation_is_added_where_it_is_missing_and_shown() -> None:
+    robot = judges.load("go2")
+    contacts, tasks = fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
+    added = fb.WholeBodyController(robot, contacts, tasks).tasks[len(tasks) :]
+    assert {type(task) for task in added} == {fb.ForceTask, fb.TorqueTask}
+    own = [*tasks, fb.ForceTask(weight=1e-3), fb.TorqueTask(weight=1e-3)]
+    assert fb.WholeBodyController(robot, contacts, own).tasks == tuple(own)
+
+
+def test_a_controller_is_replaced_rather_than_changed() -> None:
+    robot = judges.load("go2")
+    controller = controller_of("go2", facets=8, inside=False, min_normal_force=3.0, torque_limits=20.0, solver="cvxpy")
+    three = controller.replace(contacts=controller.contacts.without("FL_foot"))
+    assert three.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
+    assert controller.contacts.names == tuple(foot.frame for foot in robot.feet)
+    assert three.tasks == controller.tasks
+    for field in ("facets", "inside", "min_normal_force"):
+        assert getattr(three.limits, field) == getattr(controller.limits, field)
+    assert np.array_equal(three.limits.torque_limits, controller.limits.torque_limits)
+    assert three.solver == "cvxpy"
+    other = controller.replace(tasks=[fb.PostureTask(robot.standing().q)])
+    assert [type(task) for task in other.tasks] == [fb.PostureTask, fb.ForceTask, fb.TorqueTask]
+
+
+def test_anything_of_the_form_of_a_task_is_a_task() -> None:
+    class KeepStill:
+        """A residual of one's own: no joint accelerates."""
+
+        block: ClassVar[str] = "qdd"
+        name, weight = "keep still", 5.0
+
+        def residual(self, eom: object, t: float = 0.0) -> fb.Affine:
+            return fb.Affine.linear(eom.S.T)
+
+    robot = judges.load("go2")
+    command = fb.WholeBodyController(robot, fb.Contacts.points(robot), [KeepStill()])(robot.standing().q, np.zeros(18))
+    assert np.allclose(command.qdd[6:], 0.0, atol=0.05)
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_feet_whose_rows_contradict_a_measured_velocity_are_kept_as_nearly_as_possible(name: str) -> None:
+    """J loses rank on solo8: then A q̈ = b is met in the least-squares sense, and exactly wherever that is possible."""
+    controller = controller_of(name)
+    for state in judges.states(name, 5, 0.3):
+        eom = fb.equations_of_motion(state, controller.contacts)
+        qdd = controller(state.q, state.v).qdd
+        nearest = eom.A @ np.linalg.pinv(eom.A, rcond=1e-10) @ eom.b
+        assert np.allclose(eom.A @ qdd, nearest, atol=1e-7)
+        if np.linalg.matrix_rank(eom.A, tol=1e-9) == len(eom.A):
+            assert np.allclose(eom.A @ qdd, eom.b, atol=1e-7)
+
+
+# infeasible --------------------------------------------------------------------------------------------------------------
+
+
+def feasible(qp: QP, rows: list[int]) -> bool:
+    """By a linear program on the whole problem: the equalities, and these rows alone."""
+    found = linprog(np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, bounds=(None, None), method="highs")
+    return bool(found.status == 0)
+
+
+@pytest.mark.parametrize("name", ["solo12", "go2"])
+def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict(name: str) -> None:
+    controller = controller_of(name, min_normal_force=500.0)
+    state = judges.load(name).standing()
+    with pytest.raises(InfeasibleError, match=r"these contradict each other: .* Loosen or drop any one of them") as caught:
+        controller(state.q, state.v)
+    qp = controller.qp(state)
+    rows = [qp.inequality_names.index(row) for row in caught.value.rows]
+    assert any(row.endswith("normal force") for row in caught.value.rows)
+    assert any(row.startswith("torque limit") for row in caught.value.rows)
+    assert all(row in str(caught.value) for row in caught.value.rows)
+    assert not feasible(qp, rows)
+    for row in rows:
+        assert feasible(qp, [i for i in rows if i != row])
+
+
+def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
+    state = judges.load("go2").random_state(0)
+    found = solve(controller_of("go2").qp(state))
+    wrong = Solution(found.qp, found.x + 0.01, found.equality_multipliers, found.inequality_multipliers + 0.1, "wrong")
+    r = wrong.residuals
+    assert min(r.stationarity, r.equality, r.inequality, r.complementarity) > 1e-4
+
+
+# arguments ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", ["daqp", "cvxpy"])
+def test_either_solver_can_drive_a_controller(solver: str) -> None:
+    state = judges.load("go2").random_state(1)
+    command = controller_of("go2", solver=solver)(state.q, state.v)
+    assert command.solution.solver == solver
+    assert np.allclose(command.tau, controller_of("go2")(state.q, state.v).tau, atol=1e-4)
+
+
+def test_commands_can_not_be_written_to() -> None:
+    state = judges.load("go2").standing()
+    command = controller_of("go2")(state.q, state.v)
+    for array in (command.tau, command.qdd, command.forces, command.solution.x):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0

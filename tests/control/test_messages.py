@@ -1,0 +1,113 @@
+"""What tasks, friction and controllers answer to what they cannot use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.control.friction import FrictionPolyhedron
+from floatbase.errors import FloatbaseError, InputError, UnknownNameError
+
+GO2 = judges.load("go2")
+CONTACTS = fb.Contacts.points(GO2)
+STATE = GO2.standing()
+UP = [0.0, 0.0, 1.0]
+
+
+def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
+    return fb.WholeBodyController(GO2, CONTACTS, tasks, **options)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "text"),
+    [
+        (lambda: FrictionPolyhedron(UP, 0.7, 2), InputError, "facets is 2; .* needs a whole number ≥ 3"),
+        (lambda: FrictionPolyhedron(UP, 0.7, 4.5), InputError, "facets is 4.5; .* needs a whole number ≥ 3"),
+        (lambda: FrictionPolyhedron(UP, 0.0), InputError, "friction coefficient mu is 0; it must be > 0"),
+        (lambda: FrictionPolyhedron([0.0, 0.0, 0.0], 0.7), InputError, "normal is the zero vector; it must have a direction"),
+        (lambda: FrictionPolyhedron(UP, 0.7).margin([1.0]), InputError, r"force has shape \(1,\); .*\(3,\) \(N\)"),
+        (lambda: controller(facets=2), InputError, "facets is 2"),
+        (lambda: controller(min_normal_force=-1.0), InputError, "min_normal_force is -1; it must be ≥ 0 N"),
+        (lambda: controller(torque_limits=[1.0, 2.0]), InputError, r"torque_limits must be one number > 0 or 12 of them"),
+        (lambda: controller(torque_limits=0.0), InputError, r"torque_limits must be one number > 0 or 12 of them \(N·m\)"),
+        (lambda: controller(torque_limits=np.nan), InputError, "torque_limits must be one number > 0"),
+        (lambda: controller(solver="dapq"), UnknownNameError, "unknown solver 'dapq'; .*daqp"),
+        (lambda: controller("stand"), InputError, r"tasks must hold tasks, such as fb\.CoMTask\(state\.com\); 'stand' is none"),
+        (
+            lambda: controller(fb.FrameTask("FL_fot", UP)),
+            UnknownNameError,
+            "frame of go2 'FL_fot'; near names: FL_foot",
+        ),
+        (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "unknown frame of go2 'torso'"),
+        (lambda: controller(fb.PostureTask(np.zeros(5))), InputError, r"q of posture has shape \(5,\); .*\(19,\)"),
+        (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, r"target forces has shape \(3,\); .*\(12,\)"),
+        (lambda: controller(fb.TorqueTask(np.zeros(3))), InputError, r"target torques has shape \(3,\); .*\(12,\)"),
+        (lambda: controller(fb.CoMTask(lambda t: [0.0])), InputError, r"position has shape \(1,\); it must have shape \(3,\)"),
+        (lambda: fb.CoMTask([0.0, 0.0]), InputError, r"position of centre of mass has shape \(2,\); .*\(3,\)"),
+        (lambda: fb.CoMTask([0.0, 0.0, np.nan]), InputError, r"position of centre of mass holds nan at index \[2\]"),
+        (lambda: fb.CoMTask(UP, velocity=[1.0]), InputError, r"velocity of centre of mass has shape \(1,\)"),
+        (lambda: fb.CoMTask(UP, kp=-1.0), InputError, "kp of centre of mass is -1; it must be ≥ 0 1/s²"),
+        (lambda: fb.FrameTask("base", UP, kd=-1.0), InputError, "kd of position of base is -1; it must be ≥ 0 1/s"),
+        (lambda: fb.PostureTask(STATE.q, weight=-1.0), InputError, "weight of posture is -1; it must be ≥ 0"),
+        (lambda: fb.ForceTask(weight=-1.0), InputError, "weight of force regularisation is -1"),
+        (lambda: fb.OrientationTask("base", np.eye(2)), InputError, r"rotation of .*base has shape \(2, 2\); .*\(3, 3\)"),
+        (
+            lambda: fb.OrientationTask("base", 2 * np.eye(3)),
+            InputError,
+            "a rotation matrix: its columns must be orthonormal",
+        ),
+        (lambda: fb.OrientationTask("base", np.diag([1, 1, -1])), InputError, r"orthonormal, determinant \+1"),
+        (lambda: controller(fb.OrientationTask("base", lambda t: np.zeros((3, 3)))), InputError, "not a rotation matrix"),
+        (
+            lambda: fb.WholeBodyController(GO2, [1], []),
+            InputError,
+            r"Contacts, as fb\.Contacts\.points\(robot\), not list",
+        ),
+        (
+            lambda: fb.WholeBodyController(judges.load("solo12"), CONTACTS, []),
+            UnknownNameError,
+            "unknown frame of solo12 'FL_foot'; near names: FL_FOOT",
+        ),
+        (lambda: controller()(np.zeros(3), STATE.v), InputError, r"q has shape \(3,\); it must have shape \(19,\)"),
+        (lambda: controller()(STATE.q, np.full(18, np.nan)), InputError, r"v holds nan at index \[0\]"),
+        (lambda: controller()(1.1 * STATE.q, STATE.v), InputError, r"has length 1.1; it must be 1\. Divide it by its length"),
+    ],
+)
+def test_bad_input_is_answered_with_what_is_wrong_and_what_would_be_right(
+    make: Callable[[], object], kind: type[FloatbaseError], text: str
+) -> None:
+    with pytest.raises(kind, match=text):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), "tasks"),
+        (lambda: fb.WholeBodyController(GO2, CONTACTS, None), "tasks"),
+        (lambda: controller().replace(tasks=3), "tasks"),
+        (lambda: fb.WholeBodyController("go2", CONTACTS, []), "Robot"),
+        (lambda: controller(torque_limits="strong"), "torque_limits"),
+        (lambda: controller(torque_limits=["strong"] * 12), "torque_limits"),
+        (lambda: fb.standing_tasks(GO2), "State"),
+    ],
+)
+def test_values_of_another_kind_are_refused_by_an_error_of_the_package(make: Callable[[], object], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        make()
+
+
+@pytest.mark.parametrize("number", ["10", np.array(10.0), np.float32(10.0), 10])
+def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> None:
+    """Gains and weights that pass their check can be computed with."""
+    try:
+        task = fb.CoMTask(UP, kp=number, kd=number, weight=number)
+    except InputError:
+        return
+    command = controller(task)(STATE.q, STATE.v)
+    wanted = controller(fb.CoMTask(UP, kp=10.0, kd=10.0, weight=10.0))(STATE.q, STATE.v)
+    assert np.allclose(command.tau, wanted.tau)

@@ -1,0 +1,90 @@
+"""What the physics and the loop answer to what they cannot use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.errors import FloatbaseError, InputError, SimulationError, UnknownNameError
+from floatbase.simulation.physics import Ground
+
+GO2 = judges.load("go2")
+SIM = fb.Simulation(GO2)
+UP = [0.0, 0.0, 1.0]
+
+
+@dataclass
+class Torques:
+    """The simplest command."""
+
+    tau: np.ndarray
+
+
+def limp(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
+    return Torques(np.zeros(12))
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "text"),
+    [
+        (
+            lambda: fb.Simulation(fb.load("go2", feet=["FL_foot_joint"])),
+            SimulationError,
+            "the foot FL_foot_joint is no link of the URDF; give feet by the names of their links",
+        ),
+        (lambda: fb.Simulation(GO2, ground=0.0), InputError, "friction coefficient mu of the ground is 0; it must be > 0"),
+        (lambda: fb.Simulation(GO2, ground="ice"), InputError, "mu of the ground must be a number, not 'ice'"),
+        (lambda: fb.Simulation(GO2, timestep=0.0), InputError, "timestep is 0; it must be > 0 s"),
+        (lambda: Ground(normal=[0.0, 0.0, 0.0]), InputError, "normal of the ground is the zero vector"),
+        (lambda: SIM.reset(judges.load("solo12").standing()), InputError, "holds go2; the state belongs to another robot"),
+        (lambda: SIM.step(np.zeros(3)), InputError, r"torques must be 12 finite numbers \(N·m\); got array"),
+        (lambda: SIM.step(np.full(12, np.nan)), InputError, "torques must be 12 finite numbers"),
+        (lambda: SIM.step(np.zeros(12), (fb.Push(UP, frame="bse"),)), UnknownNameError, "'bse'; near names: base"),
+        (lambda: fb.Push([1.0, 0.0]), InputError, r"force of the push has shape \(2,\); .*\(3,\) \(N\)"),
+        (lambda: fb.Push(UP, start=-1.0), InputError, "start of the push is -1; it must be ≥ 0 s"),
+        (lambda: fb.Push(UP, duration=0.0), InputError, "duration of the push is 0; it must be > 0 s"),
+        (lambda: fb.rollout(SIM, limp, -1.0), InputError, "duration is -1; it must be > 0 s"),
+        (
+            lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0015),
+            InputError,
+            r"control_period 0.0015 s is not a whole multiple of the simulation's timestep 0.001 s",
+        ),
+        (lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0001), InputError, "is not a whole multiple"),
+        (lambda: fb.rollout(SIM, limp, 1.0, [3]), InputError, r"pushes must hold fb\.Push values; 3 is none"),
+        (lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0), InputError, r"must answer with \.tau .* got None"),
+        (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), UnknownNameError, "'bse'; near names: base"),
+    ],
+)
+def test_bad_input_is_answered_with_what_is_wrong_and_what_would_be_right(
+    make: Callable[[], object], kind: type[FloatbaseError], text: str
+) -> None:
+    with pytest.raises(kind, match=text):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: fb.Simulation("go2"), "Robot"),
+        (lambda: SIM.reset(3), "State"),
+        (lambda: SIM.step("full"), "torques"),
+        (lambda: fb.rollout(3, limp, 1.0), "Simulation"),
+        (lambda: fb.rollout(SIM, limp, 1.0, fb.Push(UP)), "pushes"),
+        (lambda: fb.rollout(SIM, 3, 1.0), "controller"),
+    ],
+)
+def test_values_of_another_kind_are_refused_by_an_error_of_the_package(make: Callable[[], object], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        make()
+
+
+def test_a_controller_of_one_robot_is_not_run_on_another() -> None:
+    """go2 and solo12 have equally many joints: nothing but the robot itself tells them apart."""
+    controller = fb.WholeBodyController(GO2, fb.Contacts.points(GO2), fb.standing_tasks(GO2.standing()))
+    with pytest.raises(InputError, match="solo12"):
+        fb.rollout(fb.Simulation(judges.load("solo12")), controller, 0.01)

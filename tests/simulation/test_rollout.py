@@ -1,0 +1,246 @@
+"""The one loop: its clock, its record, and how it says that something went wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.errors import InfeasibleError
+from floatbase.robots.state import State
+
+
+@dataclass
+class Torques:
+    """The simplest command: torques alone."""
+
+    tau: np.ndarray
+
+
+def limp(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
+    """No torques at all."""
+    return Torques(np.zeros(12))
+
+
+def standing(name: str = "go2") -> fb.WholeBodyController:
+    robot = judges.load(name)
+    return fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+
+
+@pytest.fixture
+def sim() -> fb.Simulation:
+    return fb.Simulation(judges.load("go2"))
+
+
+def test_a_limp_robot_falls_and_the_record_says_so(sim: fb.Simulation) -> None:
+    record = fb.rollout(sim, limp, 3.0)
+    assert record.outcome == "fell"
+    assert record.time[-1] < 2.0
+    assert record.final.q[2] < 0.2
+    assert record.error is None
+
+
+def test_forces_that_a_controller_does_not_give_are_not_numbers_but_are_measured_all_the_same(sim: fb.Simulation) -> None:
+    record = fb.rollout(sim, limp, 0.05)
+    assert np.all(np.isnan(record.planned))
+    assert record.contacts.point_names == sim.point_names
+    assert record.measured[:5].reshape(5, 4, 3)[:, :, 2].sum() > 0
+
+
+def test_a_robot_that_stands_on_its_back_has_fallen(sim: fb.Simulation) -> None:
+    q = sim.q
+    q[2] = 1.0
+    sim.reset(State(sim.robot, q))
+    assert not sim.fallen
+    v = np.zeros(18)
+    v[3] = 20.0
+    sim.reset(State(sim.robot, q, v))
+    for _ in range(60):  # 1.2 rad
+        sim.step(np.zeros(12))
+    assert sim.fallen
+
+
+def test_a_physics_that_explodes_has_diverged(sim: fb.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it stands
+    sim.reset(sim.robot.standing().at(v=np.full(18, 1e7)))
+    record = fb.rollout(sim, limp, 1.0)
+    assert record.outcome == "diverged"
+    assert len(record) < 10
+    assert np.all(np.isfinite(record.q))
+    sim.reset()
+    assert not sim.diverged
+    assert fb.rollout(sim, standing(), 0.05).outcome == "completed"
+
+
+def test_a_controller_without_an_answer_ends_the_record_and_its_error_is_kept(sim: fb.Simulation) -> None:
+    inner = standing()
+
+    def gives_up(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
+        if t > 0.0095:
+            raise InfeasibleError("no point satisfies all rows", ["FL_foot normal force"])
+        return inner(q, v, t)
+
+    record = fb.rollout(sim, gives_up, 1.0)
+    assert record.outcome == "controller failed"
+    assert isinstance(record.error, InfeasibleError)
+    assert record.error.rows == ("FL_foot normal force",)
+    assert len(record) == 10
+
+
+def test_a_controller_that_fails_at_once_leaves_an_empty_record(sim: fb.Simulation) -> None:
+    robot = sim.robot
+    contacts = fb.Contacts.points(robot)
+    greedy = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=5000.0)
+    record = fb.rollout(sim, greedy, 0.1)
+    assert record.outcome == "controller failed"
+    assert len(record) == 0
+    assert record.q.shape == (0, robot.nq)
+    assert record.measured.shape == (0, 12)
+    assert "controller failed" in repr(record)
+
+
+def test_mistakes_in_a_controller_are_not_swallowed(sim: fb.Simulation) -> None:
+    def broken(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fb.rollout(sim, broken, 0.1)
+
+
+def test_the_record_holds_a_row_for_each_tick_taken_before_its_torques_act(sim: fb.Simulation) -> None:
+    start, seen = sim.robot.standing(), []
+    inner = standing()
+
+    def watched(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
+        seen.append((q.copy(), v.copy(), t))
+        return inner(q, v, t)
+
+    record = fb.rollout(sim, watched, 0.02)
+    assert len(record) == len(seen) == 20
+    assert np.allclose(record.time, 1e-3 * np.arange(20))
+    assert np.allclose(record.q[0], start.q)
+    for i, (q, v, t) in enumerate(seen):
+        assert np.array_equal(record.q[i], q)
+        assert np.array_equal(record.v[i], v)
+        assert record.time[i] == pytest.approx(t)
+    assert np.array_equal(record.state(3).q, record.q[3])
+    assert np.array_equal(record.final.q, record.q[-1])
+    assert np.allclose(record.com[-1], record.final.com)
+
+
+def test_torques_are_held_for_the_whole_control_period(sim: fb.Simulation) -> None:
+    asked = []
+
+    def counting(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
+        asked.append(t)
+        return Torques(np.full(12, float(len(asked))))
+
+    record = fb.rollout(sim, counting, 0.02, control_period=0.005)
+    assert np.allclose(asked, [0.0, 0.005, 0.01, 0.015])
+    assert np.allclose(record.time, asked)
+    assert sim.time == pytest.approx(0.02)
+    assert np.array_equal(record.tau[:, 0], [1.0, 2.0, 3.0, 4.0])
+    again = fb.Simulation(sim.robot)
+    for step in range(20):
+        again.step(np.full(12, 1.0 + step // 5))
+    assert np.array_equal(again.q, sim.q)
+
+
+def test_measured_forces_are_the_mean_over_the_control_period() -> None:
+    robot = judges.load("go2")
+    slow, fast = fb.Simulation(robot), fb.Simulation(robot)
+    coarse = fb.rollout(slow, limp, 0.02, control_period=0.005)
+    fine = fb.rollout(fast, limp, 0.02)
+    assert np.allclose(coarse.measured, fine.measured.reshape(4, 5, 12).mean(axis=1), atol=1e-9)
+
+
+def test_a_rollout_goes_on_from_where_the_last_one_ended(sim: fb.Simulation) -> None:
+    controller = standing()
+    push = fb.Push([30.0, 0.0, 0.0], start=0.015, duration=0.01)
+    first, second = (fb.rollout(sim, controller, 0.02, [push]) for _ in range(2))
+    assert second.time[0] == pytest.approx(first.time[-1] + 1e-3)
+    whole = fb.rollout(fb.Simulation(sim.robot), controller, 0.04, [push])
+    assert np.allclose(np.vstack([first.q, second.q]), whole.q, atol=1e-12)
+    assert second.pushes == (push,)
+
+
+def test_moving_targets_see_the_simulations_clock(sim: fb.Simulation) -> None:
+    seen = []
+    goal = sim.robot.standing().com
+
+    def path(t: float) -> np.ndarray:
+        seen.append(t)
+        return goal + np.array([0.0, 0.05 * t, 0.0])
+
+    robot = sim.robot
+    tasks = [fb.CoMTask(path), fb.OrientationTask(), fb.PostureTask(robot.standing().q)]
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
+    seen.clear()
+    fb.rollout(sim, controller, 0.005)
+    assert np.allclose(seen, [0.0, 0.001, 0.002, 0.003, 0.004])
+
+
+def test_slip_is_how_far_a_foot_strays_and_not_how_far_it_ends() -> None:
+    robot = judges.load("go2")
+    sim = fb.Simulation(robot)
+    record = fb.rollout(sim, limp, 0.4)
+    strayed = np.linalg.norm(record.foot_positions - record.foot_positions[0], axis=2)
+    assert record.slip() == pytest.approx(strayed.max(axis=0))
+    assert record.slip().shape == (4,)
+
+
+def test_forces_of_feet_that_the_controller_does_not_use_are_left_out() -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.points(robot).without("FL_foot")
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
+    record = fb.rollout(fb.Simulation(robot), controller, 0.02)
+    assert record.measured.shape == (20, 9)
+    assert record.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
+
+
+def test_a_flat_foot_taken_as_a_point_is_measured_by_all_its_corners() -> None:
+    robot = judges.load("talos")
+    start = robot.standing()
+    flat = fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot), fb.standing_tasks(start))
+
+    class Points:
+        """The flat-footed controller, seen as one that speaks of two points."""
+
+        contacts = fb.Contacts.points(robot)
+
+        def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> Torques:
+            return Torques(flat(q, v, t).tau)
+
+    corners = fb.rollout(fb.Simulation(robot), flat, 0.03)
+    points = fb.rollout(fb.Simulation(robot), Points(), 0.03)
+    assert np.allclose(points.measured.reshape(30, 2, 3), corners.measured.reshape(30, 2, 4, 3).sum(axis=2), atol=1e-6)
+    assert np.allclose(points.foot_positions, corners.foot_positions.reshape(30, 2, 4, 3).mean(axis=2), atol=1e-9)
+
+
+def test_an_arm_bolted_to_the_ground_never_falls() -> None:
+    robot = judges.load("ur5")
+    sim = fb.Simulation(robot)
+    record = fb.rollout(sim, lambda q, v, t: Torques(np.zeros(6)), 0.3)
+    assert record.outcome == "completed"
+    assert record.planned.shape == (300, 0)
+    assert record.measured.shape == (300, 0)
+
+
+def test_an_arm_under_the_controller_reaches_its_posture() -> None:
+    robot = judges.load("ur5")
+    sim = fb.Simulation(robot)
+    goal = robot.standing().q + 0.2
+    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [fb.PostureTask(goal, weight=1e3)])
+    record = fb.rollout(sim, controller, 1.0)
+    assert np.allclose(record.final.q, goal, atol=5e-3)
+
+
+def test_records_can_not_be_written_to(sim: fb.Simulation) -> None:
+    record = fb.rollout(sim, limp, 0.01)
+    for array in (record.time, record.q, record.v, record.tau, record.planned, record.measured, record.foot_positions):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0

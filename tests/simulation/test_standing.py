@@ -1,0 +1,77 @@
+"""The loop closed: robots stand on MuJoCo's floor under our controller, and come back after a push."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+
+
+@cache
+def stood(name: str, duration: float, push: bool = False) -> fb.Rollout:
+    """A robot that stands, at 1 kHz; with a push of 30 N for 0.1 s after 0.5 s where that is asked for."""
+    robot = judges.load(name)
+    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+    pushes = [fb.Push([15.0, 26.0, 0.0], start=0.5, duration=0.1)] if push else []
+    return fb.rollout(fb.Simulation(robot), controller, duration, pushes)
+
+
+LONG = [("go2", 10.0), ("solo12", 10.0)]
+SHORT = [(name, 1.5) for name in judges.FLOATING if name not in dict(LONG)]
+
+
+@pytest.fixture(params=[*LONG, *SHORT], ids=lambda p: f"{p[0]} {p[1]:g} s")
+def record(request: pytest.FixtureRequest) -> fb.Rollout:
+    return stood(*request.param)
+
+
+def test_it_stands_to_the_end_with_its_centre_of_mass_where_it_was(record: fb.Rollout) -> None:
+    assert record.outcome == "completed"
+    assert record.error is None
+    assert np.linalg.norm(record.final.com - record.robot.standing().com) < 5e-3
+    assert np.linalg.norm(record.final.v) < 1e-2
+
+
+def test_no_foot_slips_more_than_a_millimetre(record: fb.Rollout) -> None:
+    assert record.slip().shape == (record.contacts.n_points,)
+    assert record.slip().max() < 1e-3
+
+
+def test_planned_and_measured_vertical_forces_agree_at_rest(record: fb.Rollout) -> None:
+    planned, measured = (rows[-1].reshape(-1, 3)[:, 2] for rows in (record.planned, record.measured))
+    assert np.all(planned > 0)
+    assert np.allclose(measured, planned, rtol=0.05)
+
+
+def test_both_forces_sum_to_the_weight(record: fb.Rollout) -> None:
+    for rows in (record.planned, record.measured):
+        total = rows[-1].reshape(-1, 3).sum(axis=0)
+        assert np.allclose(total, [0.0, 0.0, record.robot.weight], atol=0.01 * record.robot.weight)
+
+
+def test_torques_and_forces_settle(record: fb.Rollout) -> None:
+    late = slice(-200, None)
+    assert np.ptp(record.tau[late], axis=0).max() < 0.01 * np.abs(record.tau[late]).max()
+    assert np.ptp(record.measured[late], axis=0).max() < 0.02 * record.robot.weight
+
+
+def test_after_a_push_of_30_newtons_go2_comes_back() -> None:
+    record, start = stood("go2", 3.0, push=True), judges.load("go2").standing()
+    strayed = np.linalg.norm(record.com - start.com, axis=1)
+    assert record.outcome == "completed"
+    assert strayed.max() > 3e-3, "the push moved nothing"
+    assert strayed[-1] < 1e-3
+    assert record.slip().max() < 1e-3
+    assert np.linalg.norm(record.final.v) < 1e-2
+
+
+def test_under_the_push_the_ground_pushes_back() -> None:
+    record = stood("go2", 3.0, push=True)
+    sideways = record.measured.reshape(len(record), 4, 3).sum(axis=1)[:, :2]
+    before, during = (record.time > 0.2) & (record.time < 0.49), (record.time > 0.53) & (record.time < 0.59)
+    assert np.abs(sideways[before]).max() < 1.0
+    assert np.all(sideways[during] @ [0.5, 0.87] < -5.0)
