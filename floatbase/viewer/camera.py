@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+
+from floatbase._arrays import Array
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,7 @@ PRESETS = {
 }
 
 
-def eye_and_target(
-    view: View, low: npt.NDArray[np.float64], high: npt.NDArray[np.float64]
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def eye_and_target(view: View, low: Array, high: Array) -> tuple[Array, Array]:
     """The point looked at and the point looked from, m, world, so that the box from `low` to `high` fills the picture."""
     target = 0.5 * (low + high)
     radius = 0.5 * float(np.linalg.norm(high - low))

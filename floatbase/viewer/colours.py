@@ -31,6 +31,19 @@ X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")
 Z_AXIS = _rgb("#0072B2")
 
+# part of a picture, its colour, and what it is: the legend, in this order
+LEGEND: tuple[tuple[str, RGB, str], ...] = (
+    ("measured", MEASURED, "measured force"),
+    ("planned", PLANNED, "planned force"),
+    ("wrench", COM, "wrench at the centre of mass"),
+    ("com", COM, "centre of mass"),
+    ("push", PUSH, "push"),
+    ("cone", CALM, "friction cone: force inside"),
+    ("cone", WARNING, "friction cone: surface reached"),
+    ("cone", ALARM, "friction cone: force outside"),
+    ("ghost", GHOST, "wanted posture"),
+)
+
 # cone status -> colour, in the order of growing worry
 CONE = {"inside": CALM, "active": WARNING, "outside": ALARM}
 
@@ -40,6 +53,11 @@ BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
     "light": (_rgb("#FBFCFE"), _rgb("#DFE5EC"), _rgb("#BCC5CF"), _rgb("#222222")),
     "dark": (_rgb("#1E2227"), _rgb("#33393F"), _rgb("#59616A"), _rgb("#F2F2F2")),
 }
+
+
+def hexadecimal(colour: RGB) -> str:
+    """The colour as "#rrggbb"."""
+    return "#" + "".join(f"{round(255 * part):02X}" for part in colour)
 
 
 def with_alpha(colour: RGB, alpha: float) -> RGBA:

@@ -1,57 +1,54 @@
-"""`Viewer(robot)`: the picture of a state, its contacts, forces and friction cones, in the page."""
+"""`Viewer(robot)`: the picture of a state, its contacts, forces and friction cones, in the page; still or moving."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+import html
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive
+from floatbase._arrays import positive, unit_vector
 from floatbase.control.friction import FrictionPolyhedron
 from floatbase.dynamics.contacts import Contacts
-from floatbase.errors import InputError
+from floatbase.errors import InputError, ViewerError
 from floatbase.robots.robot import Robot
 from floatbase.robots.state import State
-from floatbase.viewer import shapes, three, wire
+from floatbase.viewer import page, recording, wire
 from floatbase.viewer.camera import PRESETS, View, eye_and_target
-from floatbase.viewer.canvas import Canvas
-from floatbase.viewer.colours import BACKGROUNDS, MEASURED, PLANNED, RGB
-from floatbase.viewer.cones import cone_status, polyhedron_status
-from floatbase.viewer.meshes import robot_meshes
+from floatbase.viewer.canvas import ROOT, Canvas
+from floatbase.viewer.colours import BACKGROUNDS, LEGEND, hexadecimal
+from floatbase.viewer.painter import Painter
+from floatbase.viewer.place import kernel_is_remote
 from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.window import Window
 
+if TYPE_CHECKING:
+    from floatbase.simulation.rollout import Rollout
 
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Forces at the points of contacts: shape (n, 3) each, N, world, what the ground does to the robot."""
-
-    measured: Array | None
-    planned: Array | None
-
-    @property
-    def kinds(self) -> list[tuple[str, Array | None, RGB]]:
-        """Name, forces and colour of each kind."""
-        return [("measured", self.measured, MEASURED), ("planned", self.planned, PLANNED)]
-
-    @property
-    def judged(self) -> Array | None:
-        """Those that colour the cones: the measured ones where there are any."""
-        return self.planned if self.measured is None else self.measured
+UP = (0.0, 0.0, 1.0)
+# the browser finds out whether it reaches the live page; the signs in the kernel's environment may have missed something
+_PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
+  const frame = document.querySelector('iframe[src="URL"]');
+  if (frame) frame.srcdoc = "<p style='font-family: sans-serif'>This browser does not reach the viewer of the kernel. " +
+    "If the kernel runs on another machine, show a still picture: import os; os.environ['FLOATBASE_VIEWER'] = 'static', " +
+    "and run this cell again. If it was restarted, run the notebook again.</p>";
+});</script>"""
 
 
 class Viewer:
     """A robot in a meshcat window of this process.
 
     height: of the picture in a notebook, pixels. background: "white", "light" or "dark". scale: metres drawn for a newton,
-    shared by forces and cones; by default such that the robot's weight is twice as long as its centre of mass is high.
+    shared by forces and cones; by default such that the robot's weight is about twice as long as its centre of mass is high.
     facets: draw friction cones as polyhedra with so many facets; None for round cones. inside: see `FrictionPolyhedron`.
-    port: of the window; a free one by default. Raises `ViewerError` when the port is taken.
+    ground: (3,), world, normal of the ground, a plane through the origin. port: of the window; a free one by default.
+    Raises `InputError` for arguments that cannot be, and `ViewerError` when the port is taken.
 
-    In a notebook a viewer as the last line of a cell shows itself; elsewhere open `viewer.url` in a browser.
+    In a notebook a viewer as the last line of a cell shows itself: the live page, or, where the kernel is on another machine
+    and its page cannot be reached, the scene as it is now. Elsewhere open `viewer.url` in a browser.
     """
 
     def __init__(
@@ -63,42 +60,36 @@ class Viewer:
         scale: float | None = None,
         facets: int | None = None,
         inside: bool = True,
+        ground: npt.ArrayLike = UP,
         port: int = 0,
     ):
         if not isinstance(robot, Robot):
             raise InputError(f"Viewer needs a Robot, as in fb.Viewer(fb.load('go2')), not {type(robot).__name__}.")
         if background not in BACKGROUNDS:
             raise InputError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}.")
+        if facets is not None:
+            FrictionPolyhedron(np.array(UP), 1.0, facets)  # says what is wrong with the number
         self.robot = robot
         self.height = int(positive("height", height, "pixels"))
-        self.facets, self.inside = facets, inside
-        if facets is not None:
-            FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets)  # says what is wrong with the number
-        self._scale = None if scale is None else positive("scale", scale, "m/N")
+        asked = None if scale is None else positive("scale", scale, "m/N")
+        lines, text = BACKGROUNDS[background][2:]
+        self.painter = Painter(robot, asked, facets, inside, unit_vector("ground", ground), lines, text)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
-        self._placed = False
+        self._moving = False
+        self._last: State | None = None
+        self._controls: dict[str, Callable[[Any], None]] = {}
         self._set_stage(background)
 
     @property
     def url(self) -> str:
-        """Address of the live page, on this machine."""
+        """Address of the live page, on the kernel's machine."""
         return self.window.web_url
 
-    @cached_property
-    def size(self) -> float:
-        """How large the robot is when it stands, m: the diagonal of the box around its joints, half of it."""
-        low, high = self._box
-        return 0.5 * float(np.linalg.norm(high - low))
-
-    @cached_property
+    @property
     def scale(self) -> float:
-        """Metres drawn for a newton, for forces and cones alike: 1, 2 or 5 times a power of ten."""
-        if self._scale is not None:
-            return self._scale
-        low, high = self._box
-        reach = 2.0 * max(float(self._home.com[2] - low[2]), 0.3 * float(np.linalg.norm(high - low)))
-        return nice(reach / self.robot.weight)
+        """Metres drawn for a newton, for forces and cones alike."""
+        return self.painter.scale
 
     def show(
         self,
@@ -109,192 +100,180 @@ class Viewer:
         *,
         com: bool = True,
         cones: bool = True,
+        support: bool = False,
+        wrench: npt.ArrayLike | None = None,
+        push: tuple[str, npt.ArrayLike] | None = None,
+        ghost: State | None = None,
+        frames: Sequence[str] = (),
+        labels: bool = False,
+        extra: Mapping[str, Item] | None = None,
         title: str | None = None,
     ) -> Viewer:
         """Draw this and nothing else; drawing the same again sends nothing.
 
         forces, planned: shape (3 n,) or (n, 3) for the n points of `contacts`, N, world-aligned, what the ground does to the
         robot: measured, and as a controller plans them. Cones are judged by `forces`, else by `planned`.
-        com: draw the centre of mass and its projection on the ground. title: a line of text in the corner.
+        com: the centre of mass and its projection on the ground. support: the region that the contact points span.
+        wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world; the moment's ring has the radius that the
+        force would have which makes it at a lever as long as the robot's half diagonal. push: frame and force, (3,), N, world.
+        ghost: another state of the robot, drawn as a veil. frames: names of frames to draw. labels: names of the contacts.
+        extra: more items by path, from `floatbase.viewer.shapes`, `marks` or `props`. title: a line in the corner.
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
         `ViewerError` when the window is closed.
         """
-        self.canvas.draw(self.picture(state, contacts, forces, planned, com=com, cones=cones))
-        self.canvas.set(wire.set_title(title or ""))
-        if not self._placed:
+        picture = self.painter.picture(
+            state, contacts, forces, planned, com=com, cones=cones, support=support, wrench=wrench, push=push,
+            ghost=ghost, frames=frames, labels=labels, extra=extra,
+        )  # fmt: skip
+        self.draw(picture, title)
+        if self._last is None:
+            self._last = state
             self.camera()
+        self._last = state
         return self
 
-    def picture(
+    def draw(self, picture: Picture, title: str | None = None) -> None:
+        """Draw a picture, from `painter.picture` or your own items, and nothing else."""
+        if self._moving:
+            self.window.put([recording.no_animation()])
+            self._moving = False
+        self.canvas.draw(picture)
+        self._caption(picture, title)
+
+    def play(
         self,
-        state: State,
-        contacts: Contacts | None = None,
-        forces: npt.ArrayLike | None = None,
-        planned: npt.ArrayLike | None = None,
+        rollout: Rollout,
         *,
+        speed: float = 1.0,
+        rate: float = 30.0,
+        planned: bool = True,
         com: bool = True,
         cones: bool = True,
-    ) -> Picture:
-        """What `show` draws, as a value: path -> item."""
-        self._check_state(state)
-        both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
-        picture = self._stage | self._robot(state)
-        if contacts is not None and contacts.n_points:
-            picture |= self._contacts(state, contacts, both, cones)
-            picture |= self._scale_bar
-        if com:
-            picture |= _below("com", shapes.centre_of_mass(state.com, 0.0, self.size))
-        return picture
+        support: bool = False,
+        ghost: State | None = None,
+        follow: bool = True,
+        paused: bool = False,
+        title: str | None = None,
+    ) -> Viewer:
+        """Play a record in the page, over and over, with a slider to seek and a choice of speeds; this call returns at once.
 
-    def camera(self, view: str | View = "default") -> Viewer:
-        """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`."""
+        speed: 1 for real time, 0.25 for slow motion. rate: pictures a second of the record. planned: the planned forces
+        too. com, cones, support, ghost: as for `show`. follow: the camera goes with the robot. paused: wait for the reader
+        to press play. Raises `InputError` for a record of another robot or without rows.
+        """
+        if rollout.robot.name != self.robot.name:
+            raise InputError(f"this viewer shows {self.robot.name}, but the record is one of {rollout.robot.name}.")
+        if not len(rollout.time):
+            raise InputError("the record has no rows, so there is nothing to play.")
+        rows = recording.thinned(rollout.time, positive("rate", rate, "1/s"))
+        pictures = [
+            self.painter.picture(
+                State(self.robot, rollout.q[i], rollout.v[i]),
+                rollout.contacts,
+                rollout.measured[i],
+                rollout.planned[i] if planned and np.isfinite(rollout.planned[i]).all() else None,
+                com=com, cones=cones, support=support, ghost=ghost, push=_push_at(rollout, i),
+            )
+            for i in rows
+        ]  # fmt: skip
+        self.play_pictures(rollout.time[rows], pictures, speed=speed, paused=paused, title=title)
+        self._last = State(self.robot, rollout.q[rows[0]], rollout.v[rows[0]])
+        return self.camera(follow=follow)
+
+    def play_pictures(
+        self, times: npt.ArrayLike, pictures: Sequence[Picture], *, speed: float = 1.0, paused: bool = False,
+        title: str | None = None,
+    ) -> Viewer:  # fmt: skip
+        """Play pictures, from `painter.picture` or your own items, picture i from times[i], s, on."""
+        moving = recording.animate(times, pictures, ROOT, positive("speed", speed), paused)
+        self.draw(moving.first, title)
+        self.window.put([moving.command])
+        self._moving = True
+        return self
+
+    def camera(self, view: str | View = "default", follow: bool = False) -> Viewer:
+        """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`.
+
+        follow: go with the robot when it walks away.
+        """
         if isinstance(view, str):
             if view not in PRESETS:
                 raise InputError(f"camera view is {view!r}; it must be one of {', '.join(PRESETS)}, or a View.")
             view = PRESETS[view]
-        low, high = self._box
-        self._placed = True
-        target, eye = eye_and_target(view, low, high)
-        self.canvas.set(wire.set_camera(eye, target, view.angle))
+        low, high = self.painter.box
+        moved = np.zeros(3)
+        if self._last is not None:
+            moved[:2] = self._last.com[:2] - self.painter.home.com[:2]
+        target, eye = eye_and_target(view, low + moved, high + moved)
+        base = f"{ROOT}robot/{self.robot.model.names[1]}" if follow and self.robot.is_floating else ""
+        self.canvas.set(wire.set_camera(eye, target, view.angle), wire.page_command("set_follow", node=base))
         return self
+
+    def save(self, path: str | Path, title: str | None = None) -> Path:
+        """Write the scene, still or moving, as one HTML file that needs neither server nor network; return its path."""
+        target = Path(path)
+        if target.suffix.lower() not in (".html", ".htm"):
+            raise ViewerError(f"cannot save {target.name!r}: the scene is saved as a web page; end the name in .html.")
+        try:
+            target.write_text(self.static_html(title), encoding="utf-8")
+        except OSError as error:
+            raise ViewerError(f"cannot write {target} ({error.strerror}); choose a folder that exists.") from None
+        return target
+
+    def static_html(self, title: str | None = None) -> str:
+        """The scene as it is now, as a page that needs neither server nor network."""
+        return page.file_page(self.window.scene.lasting(), title or self.robot.name)
+
+    def slider(
+        self, name: str, changed: Callable[[float], None], value: float, low: float, high: float, step: float = 0.01
+    ) -> None:
+        """A slider in the page's own panel; `changed(value)` is called, in the window's thread, when it is moved."""
+        self._control(name, changed, value=float(value), min=float(low), max=float(high), step=float(step))
+
+    def button(self, name: str, pressed: Callable[[], None]) -> None:
+        """A button in the page's own panel; `pressed()` is called, in the window's thread."""
+        self._control(name, lambda _: pressed())
 
     def close(self) -> None:
         """Close the window: its thread ends and its port is free."""
         self.window.close()
 
     def _repr_html_(self) -> str:
-        if not self.window.is_open:
-            return "<p>This viewer is closed; make a new one to see the robot.</p>"
-        return (
-            f'<iframe src="{self.url}" title="{self.robot.name}" '
-            f'style="width: 100%; height: {self.height}px; border: 0; border-radius: 6px"></iframe>'
-        )
+        frame = f'title="{self.robot.name}" style="width: 100%; height: {self.height}px; border: 0; border-radius: 6px"'
+        if kernel_is_remote() or not self.window.is_open:
+            return f'<iframe srcdoc="{html.escape(self.static_html())}" {frame}></iframe>'
+        return f'<iframe src="{self.url}" {frame}></iframe>' + _PROBE.replace("URL", self.url)
 
     def __repr__(self) -> str:
         return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"
 
-    # the pieces of a picture
-
-    @cached_property
-    def _meshes(self) -> list[tuple[int, str, three.Shape]]:
-        """Joint, path and shape of every mesh of the robot."""
-        return [
-            (
-                mesh.joint,
-                f"robot/{_plain(self.robot.model.names[mesh.joint])}",
-                three.mesh(mesh.vertices, mesh.faces, colours=mesh.colours),
-            )
-            for mesh in robot_meshes(self.robot)
-        ]
-
-    def _robot(self, state: State) -> Picture:
-        poses = state.joint_transforms
-        return {path: Item(shape, poses[joint]) for joint, path, shape in self._meshes}
-
-    def _contacts(self, state: State, contacts: Contacts, forces: Forces, cones: bool) -> Picture:
-        picture: Picture = {}
-        rows = zip(contacts.point_names, contacts.positions(state), contacts.normals, contacts.mus, strict=True)
-        for i, (name, position, normal, mu) in enumerate(rows):
-            at = _plain(name)
-            picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
-            if cones:
-                force = None if forces.judged is None else forces.judged[i]
-                picture |= _below(f"cone/{at}", self._cone(position, normal, float(mu), force))
-            for kind, vectors, colour in forces.kinds:
-                if vectors is not None and np.linalg.norm(vectors[i]) > 1e-3 * self.robot.weight:
-                    picture[f"{kind}/{at}"] = shapes.arrow(
-                        position, self.scale * vectors[i], colour, self.size, halo=kind == "planned"
-                    )
-        return picture
-
-    def _cone(self, position: Array, normal: Array, mu: float, force: Array | None) -> Picture:
-        """A cone or polyhedron in the colour that the force gives it."""
-        quiet = force is None or np.linalg.norm(force) < 1e-3 * self.robot.weight
-        height = self._cone_height
-        if self.facets is None:
-            status = "inside" if quiet or force is None else cone_status(force, normal, mu)
-            return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
-        polyhedron = FrictionPolyhedron(normal, mu, self.facets, self.inside)
-        status, active = ("inside", []) if quiet or force is None else polyhedron_status(force, polyhedron)
-        return shapes.friction_polyhedron(position, polyhedron, height, status, active)
-
-    @cached_property
-    def _cone_height(self) -> float:
-        """m: for half as much again as a foot carries at rest, but not so high as to hide the robot."""
-        return min(self.scale * 1.5 * self.robot.weight / max(len(self.robot.feet), 2), 0.55 * self.size)
-
-    @cached_property
-    def _patch_radius(self) -> float:
-        return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
-
-    @cached_property
-    def _scale_bar(self) -> Picture:
-        """A bar for a round force of about a quarter of the weight, on the ground in front of the robot."""
-        force = nice(self.robot.weight / 4)
-        low, high = self._box
-        length = self.scale * force
-        at = [high[0] + 0.25 * self.size, 0.5 * (low[1] + high[1]) - length / 2, 0.01 * self.size]
-        return _below("scale", shapes.scale_bar(at, force, length, self.size, self._text))
+    def _control(self, name: str, used: Callable[[Any], None], **range_of_values: float) -> None:
+        self._controls[name] = used
+        controls = self._controls  # not self: the window must not keep its viewer alive
+        self.window.on_control(lambda which, value: controls[which](value) if which in controls else None)
+        self.window.put([wire.set_control(name, **range_of_values)])
 
     def _set_stage(self, background: str) -> None:
-        """Background and ground; the page's own grid and axes go."""
-        top, bottom, grid, self._text = BACKGROUNDS[background]
+        """Background; the page's own grid and axes go."""
+        top, bottom = BACKGROUNDS[background][:2]
         self.canvas.set(
             wire.set_property("/Background", "top_color", list(top)),
             wire.set_property("/Background", "bottom_color", list(bottom)),
             wire.set_property("/Grid", "visible", False),
             wire.set_property("/Axes", "visible", False),
+            wire.page_command("set_theme", name=background),
         )
-        self._stage: Picture = {"ground": shapes.ground(grid)}
 
-    @cached_property
-    def _home(self) -> State:
-        return self.robot.standing()
-
-    @cached_property
-    def _box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of the robot where it stands, m, world."""
-        poses = self._home.joint_transforms
-        points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in robot_meshes(self.robot)]
-        together = np.vstack(points)
-        return np.min(together, axis=0), np.max(together, axis=0)
-
-    def _check_state(self, state: Any) -> None:
-        if not isinstance(state, State):
-            raise InputError(f"show needs a State, as in robot.standing(), not {type(state).__name__}.")
-        if state.robot is not self.robot and state.robot.name != self.robot.name:
-            raise InputError(
-                f"this viewer shows {self.robot.name}, but the state is one of {state.robot.name}; "
-                "make a Viewer for that robot."
-            )
+    def _caption(self, picture: Picture, title: str | None) -> None:
+        """Title, and what the colours in the picture mean."""
+        kinds = {path.split("/")[0] for path in picture}
+        items = [[hexadecimal(colour), text] for kind, colour, text in LEGEND if kind in kinds]
+        self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
 
 
-def nice(value: float) -> float:
-    """The number of 1, 2, 5 times a power of ten that is nearest to `value` by ratio."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)
-
-
-def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -> Array | None:
-    """Forces as (n, 3), checked against the contacts."""
-    if value is None:
-        return None
-    if contacts is None:
-        raise InputError(f"{name} were given without contacts, so it is not known where they act; pass contacts=… too.")
-    array = np.asarray(value, dtype=np.float64)
-    n = contacts.n_points
-    if array.shape not in ((3 * n,), (n, 3)):
-        raise InputError(
-            f"{name} has shape {array.shape}; {n} contact points ({', '.join(contacts.point_names)}) need shape "
-            f"({3 * n},) or ({n}, 3)."
-        )
-    return checked(name, array.reshape(n, 3), (n, 3), "N")
-
-
-def _below(path: str, items: Picture) -> Picture:
-    return {path + name: item for name, item in items.items()}
-
-
-def _plain(name: str) -> str:
-    """A name as one part of a path."""
-    return name.replace("/", "_")
+def _push_at(rollout: Rollout, row: int) -> tuple[str, npt.ArrayLike] | None:
+    """Frame and force of the push that acts at a row of a record."""
+    for push in rollout.pushes:
+        if push.acts_at(float(rollout.time[row])):
+            return push.frame, push.force
+    return None

@@ -108,14 +108,14 @@ def label(position: npt.ArrayLike, text: str, height: float, colour: RGB = (0.13
 
 
 def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB) -> Picture:
-    """A bar on the ground as long as a force of `force` N is drawn, and what it stands for."""
+    """A bar along x on the ground, as long as a force of `force` N is drawn, and what it stands for."""
     start = np.asarray(position, dtype=np.float64)
-    along = geometry.frame_along([0.0, 1.0, 0.0])
+    along = geometry.frame_along([1.0, 0.0, 0.0])
     thick = 0.012 * size
-    text_at = start + np.array([0.0, length / 2, 2.2 * thick + 0.07 * size])
+    text_at = start + np.array([length / 2, 0.0, 2.2 * thick + 0.07 * size])
     picture = {"/bar": Item(_unit_rod(colour), placed(start, along, (thick / 2, thick / 2, length)))}
-    for end, y in (("/start", 0.0), ("/end", length)):
-        where = start + np.array([0.0, y, 0.0])
+    for end, x in (("/start", 0.0), ("/end", length)):
+        where = start + np.array([x, 0.0, 0.0])
         picture[end] = Item(_unit_rod(colour), placed(where, along, (2.2 * thick, 2.2 * thick, thick / 2)))
     return picture | {"/label": label(text_at, f"{force:g} N", 0.055 * size, colour)}
 

@@ -58,12 +58,14 @@ def mesh(
     flat: bool = False,
     lit: bool = True,
     through: bool = False,
+    veil: bool = False,
     name: str = "",
 ) -> Shape:
     """Triangles of one colour, or with `colours`, shape (n, 3), 0-255, for each vertex.
 
     Vertices travel as 16-bit numbers, 1/32767 of the largest: half the bytes, and finer than the eye. flat: each triangle
-    is shaded for itself. lit: shaded at all. through: seen through what is in front of it.
+    is shaded for itself.
+    lit: shaded at all. through: seen through what is in front of it. veil: translucent, but hides its own far side.
     """
     points = np.asarray(vertices, dtype=np.float64)
     step = max(float(np.abs(points).max(initial=0.0)), 1e-9) / 32767
@@ -78,7 +80,7 @@ def mesh(
         "side": 2,
         "transparent": opacity < 1.0,
         "opacity": opacity,
-        "depthWrite": opacity == 1.0,
+        "depthWrite": opacity == 1.0 or veil,
         "depthTest": not through,
     }
     if lit:
@@ -118,7 +120,7 @@ def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.1
     return Shape(lowered, text)
 
 
-_LETTER = 40  # pixels
+_LETTER = 28  # pixels
 
 
 def _text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
@@ -126,7 +128,7 @@ def _text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
     font = ImageFont.load_default(_LETTER)
     probe = ImageDraw.Draw(Image.new("L", (1, 1)))
     left, top, right, bottom = (int(x) for x in probe.multiline_textbbox((0, 0), text, font=font))
-    margin = 14
+    margin = 10
     picture = Image.new("LA", (right - left + 2 * margin, bottom - top + 2 * margin), (255, 0))
     draw = ImageDraw.Draw(picture)
     grey = round(255 * sum(colour) / 3)

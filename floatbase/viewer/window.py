@@ -108,7 +108,7 @@ class Window:
 
     def get_scene(self) -> str:
         """The scene as one HTML page that needs no server."""
-        return page.file_page(self.scene.since(0)[1])
+        return page.file_page(self.scene.lasting())
 
     def get_image(self, timeout: float = 10.0) -> Image:
         """A picture of the page that connected last, as a PIL image.

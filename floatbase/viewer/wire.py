@@ -6,6 +6,7 @@ is a dict from key to the newest command, and never grows by being drawn again.
 
 from __future__ import annotations
 
+import json
 import struct
 import threading
 from collections.abc import Iterable, Mapping
@@ -15,14 +16,16 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
+from floatbase._arrays import Array
 from floatbase.errors import ViewerError
 
 Key = tuple[str, str, str]
 Update = tuple[Key, bytes]
 
+# meshcat's commands, and those that our page adds
 STORED = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "set_control", "delete_control",
-    "set_camera", "set_title",
+    "set_camera", "set_follow", "set_title", "set_legend", "set_theme",
 )  # fmt: skip
 
 _FLOAT32 = np.dtype([("code", "u1"), ("value", ">f4")])  # MessagePack: the byte 0xca, then a big-endian float
@@ -37,7 +40,7 @@ def encode(command: Mapping[str, Any]) -> Update:
     return (path, kind, str(command.get("property", command.get("name", "")))), umsgpack.packb(dict(command))
 
 
-def set_transform(path: str, matrix: npt.NDArray[np.float64]) -> Update:
+def set_transform(path: str, matrix: Array) -> Update:
     """Place `path` by a homogeneous matrix, shape (4, 4), relative to its parent; the hot path, 3 µs."""
     numbers = np.empty(16, _FLOAT32)
     numbers["code"] = 0xCA
@@ -71,9 +74,16 @@ def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> 
     return encode({"type": "set_camera", "position": eye, "target": at, "fov": angle})
 
 
-def set_title(text: str) -> Update:
-    """A line of text in the corner of the page; our own command."""
-    return encode({"type": "set_title", "text": text})
+def page_command(kind: str, **values: Any) -> Update:
+    """One of our page's own commands that belong to no object: set_title, set_legend, set_follow, set_theme."""
+    return encode({"type": kind, "path": "", **values})
+
+
+def set_control(name: str, **range_of_values: float) -> Update:
+    """A slider with value, min, max and step, or a button without them, in the page's panel; it reports to the window."""
+    told = json.dumps(name)
+    report = f"(value) => viewer.connection.send(JSON.stringify({{type: 'control', name: {told}, value: value ?? null}}))"
+    return encode({"type": "set_control", "name": name, "callback": report, **range_of_values})
 
 
 def _upright(point: npt.ArrayLike) -> list[float]:
@@ -128,6 +138,12 @@ class Scene:
         with self._lock:
             entries = sorted((number, key, command) for key, (number, command) in self._entries.items())
         return {key: umsgpack.unpackb(command) for _, key, command in entries if not _is_gone(key)}
+
+    def lasting(self) -> list[bytes]:
+        """The commands that a file can hold: without what is gone, and without controls, which need someone to answer."""
+        with self._lock:
+            entries = sorted((number, key, command) for key, (number, command) in self._entries.items())
+        return [command for _, key, command in entries if not _is_gone(key) and not key[1].endswith("_control")]
 
     def __len__(self) -> int:
         return len(self._entries)

@@ -129,7 +129,7 @@ def test_polyhedra_light_the_facets_that_are_reached(go2: Robot, standing: State
         "/meshcat/cone/FR_foot/facet 2",
         "/meshcat/cone/FR_foot/facet 3",
     }
-    assert colours(viewer, "/meshcat/cone/")["FL_foot"] == WARNING
+    assert colours(viewer, "/meshcat/cone/")["FL_foot"] == CALM
     viewer.show(standing, contacts, forces=0.5 * force + [0, 0, 20.0])
     assert not {path for path in paths(viewer) if "facet" in path}
     viewer.close()
@@ -183,7 +183,7 @@ def test_an_interrupted_picture_is_drawn_afresh(viewer: Viewer, standing: State,
 
 def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer: Viewer, standing: State, contacts: Contacts) -> None:
     viewer.show(standing, contacts)
-    label = viewer.picture(standing, contacts)["scale/label"].shape.name
+    label = viewer.painter.picture(standing, contacts)["scale/label"].shape.name
     force = float(re.fullmatch(r"([\d.]+) N", label)[1])  # type: ignore[index]
     assert np.linalg.norm(matrices(viewer, "/meshcat/scale/bar")[""][:3, 2]) == pytest.approx(viewer.scale * force, rel=1e-5)
 

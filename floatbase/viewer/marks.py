@@ -1,0 +1,95 @@
+"""Marks in the picture: wrenches, pushes, the support region, frames."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import ConvexHull, QhullError
+
+from floatbase.viewer import geometry, three
+from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
+from floatbase.viewer.shapes import Item, Picture, arrow, label, placed
+from floatbase.viewer.three import Shape
+
+
+def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike, size: float, colour: RGB = COM) -> Picture:
+    """A force, shape (3,), as a straight arrow from `position`, and a moment, shape (3,), as a curled arrow around its axis.
+
+    Both are lengths, m, world: the force times the picture's scale, and the moment times the scale over `size`. So the
+    curled arrow's radius is the force that makes the moment at a lever of `size` m.
+    """
+    picture: Picture = {}
+    if np.linalg.norm(force) > 1e-6:
+        picture["/force"] = arrow(position, force, colour, size)
+    if np.linalg.norm(moment) > 1e-6:
+        picture["/moment"] = curled_arrow(position, moment, colour)
+    return picture
+
+
+def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM) -> Item:
+    """An arrow that turns around `moment`'s direction by the right-hand rule, its radius as long as `moment`, m."""
+    moment = np.asarray(moment, dtype=np.float64)
+    radius = float(np.linalg.norm(moment))
+    return Item(_unit_curl(colour), placed(position, geometry.frame_along(moment / radius), radius))
+
+
+def push(position: npt.ArrayLike, vector: npt.ArrayLike, size: float) -> Item:
+    """A push: an arrow that ends at `position`, where it acts, as long as `vector`, m, world."""
+    return arrow(np.asarray(position) - np.asarray(vector), vector, PUSH, size)
+
+
+def support_region(positions: npt.ArrayLike, height: float) -> Picture:
+    """The convex hull of contact points, shape (n, 3), seen from above, laid on the ground at `height` m.
+
+    Fewer than three points, or points on a line, have no region: nothing is drawn.
+    """
+    points = np.asarray(positions, dtype=np.float64)[:, :2]
+    try:
+        corners = points[ConvexHull(points).vertices] if len(points) >= 3 else points[:0]
+    except QhullError:
+        corners = points[:0]
+    if not len(corners):
+        return {}
+    key = tuple((round(float(x), 3), round(float(y), 3)) for x, y in corners)
+    return {"": Item(_region(key), placed([0.0, 0.0, height]))}
+
+
+def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
+    """A frame, shape (4, 4), as three rods: x vermilion, y green, z blue; with its name when given."""
+    matrix = np.array(pose, dtype=np.float64)
+    matrix[:3, :3] *= length
+    picture = {"/axes": Item(_axes(), matrix)}
+    if name:
+        picture["/name"] = label(matrix[:3, 3] + [0.0, 0.0, 0.35 * length], name, 0.3 * length)
+    return picture
+
+
+@lru_cache(maxsize=64)
+def _unit_curl(colour: RGB) -> Shape:
+    """Three quarters of a ring of radius 1 around z, with a head at its end."""
+    end = 1.5 * np.pi
+    ring = geometry.torus_arc(1.0, 0.055, 0.0, end - 0.3)
+    head, faces = geometry.revolved([(0.0, 0.0), (0.17, 0.0), (0.0, 0.42)])
+    at = np.array([np.cos(end - 0.3), np.sin(end - 0.3), 0.0])
+    along = np.array([-at[1], at[0], 0.0])
+    turned = head @ geometry.frame_along(along).T + at
+    return three.mesh(*geometry.merged([ring, (turned, faces)]), colour)
+
+
+@lru_cache(maxsize=256)
+def _region(corners: tuple[tuple[float, float], ...]) -> Shape:
+    flat = np.array([(x, y, 0.0) for x, y in corners])
+    return three.mesh(*geometry.fan(flat), CALM, opacity=0.22, lit=False)
+
+
+@lru_cache(maxsize=1)
+def _axes() -> Shape:
+    """Three rods of length 1."""
+    rods = [geometry.rod(np.zeros(3), axis, 0.035) for axis in np.eye(3)]
+    colours = [
+        np.tile(np.round(255 * np.array(colour)), (len(vertices), 1))
+        for colour, (vertices, _) in zip((X_AXIS, Y_AXIS, Z_AXIS), rods, strict=True)
+    ]
+    return three.mesh(*geometry.merged(rods), colours=np.vstack(colours))

@@ -1,0 +1,152 @@
+"use strict";
+// floatbase's page around meshcat's viewer: our own commands, the player, and frames of commands.
+
+const part = (id) => document.getElementById(id);
+
+function startViewer() {
+  const viewer = new MeshCat.Viewer(part("meshcat-pane"));
+  viewer.gui.__folders.Scene.close();
+  const player = startPlayer(viewer);
+  const camera = startCamera(viewer);
+  const own = {
+    set_camera: camera.look,
+    set_follow: camera.follow,
+    set_title: (command) => { part("title").textContent = command.text; },
+    set_legend: (command) => { part("legend").replaceChildren(...command.items.map(legendLine)); },
+    set_theme: (command) => { document.body.className = command.name; },
+    set_animation: (command) => { meshcat(command); player.load(command); },
+    set_control: (command) => { meshcat(command); viewer.gui.open(); },
+  };
+  const meshcat = viewer.handle_command.bind(viewer);
+  viewer.handle_command = (command) => {
+    (own[command.type] || meshcat)(command);
+    viewer.set_dirty();
+  };
+  return viewer;
+}
+
+function legendLine([colour, text]) {
+  const line = document.createElement("div"), spot = document.createElement("i");
+  spot.style.background = colour;
+  line.append(spot, text);
+  return line;
+}
+
+// Where the page looks from. meshcat's camera node cannot move the point that the mouse turns around.
+function startCamera(viewer) {
+  let followed = null, last = null;
+  const where = () => followed.getWorldPosition(new MeshCat.THREE.Vector3());
+  const render = viewer.render.bind(viewer);
+  viewer.render = () => {
+    if (followed !== null) {
+      const now = where(), step = now.clone().sub(last).setY(0);
+      viewer.camera.position.add(step);
+      viewer.controls.target.add(step);
+      last = now;
+    }
+    render();
+  };
+  return {
+    look(command) {
+      viewer.camera.fov = command.fov;
+      viewer.camera.position.fromArray(command.position);
+      viewer.controls.target.fromArray(command.target);
+    },
+    follow(command) {
+      const parts = command.node.split("/").filter((name) => name);
+      followed = parts.length ? viewer.scene_tree.find(parts).object : null;
+      last = followed && where();
+    },
+  };
+}
+
+// Play, pause, seek and slow motion for an animation.
+function startPlayer(viewer) {
+  const bar = part("player"), button = bar.querySelector("button"), slider = bar.querySelector("input");
+  const clock = bar.querySelector("output"), speed = bar.querySelector("select");
+  const animator = () => viewer.animator;
+  function tick() {
+    if (bar.style.display == "none") return;
+    slider.value = animator().time;
+    clock.textContent = `${animator().time.toFixed(2)} s`;
+    button.textContent = animator().playing ? "❚❚" : "▶";
+    requestAnimationFrame(tick);
+  }
+  button.onclick = () => animator().playing ? animator().pause() : animator().play();
+  slider.oninput = () => {
+    animator().pause();
+    animator().seek(Number(slider.value));
+    animator().display_progress(Number(slider.value));
+  };
+  speed.onchange = () => { animator().mixer.timeScale = Number(speed.value); };
+  return {
+    load(command) {
+      bar.style.display = command.animations.length ? "flex" : "none";
+      if (!command.animations.length) return;
+      slider.max = animator().duration;
+      speed.value = String(command.options.speed);
+      animator().mixer.timeScale = command.options.speed;
+      if (command.options.paused) animator().pause();
+      tick();
+    },
+  };
+}
+
+// A frame is commands drawn together, each after its length; one that fails is reported and does not stop the others.
+function apply(frame) {
+  const view = new DataView(frame);
+  for (let at = 0; at < frame.byteLength;) {
+    const length = view.getUint32(at, true);
+    try {
+      viewer.handle_command_bytearray(new Uint8Array(frame, at + 4, length));
+    } catch (error) {
+      console.error("floatbase: a drawing command failed", error);
+    }
+    at += 4 + length;
+  }
+}
+
+// The live page: follow a window, and come back by itself when the window does.
+function follow() {
+  const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket`);
+  socket.binaryType = "arraybuffer";
+  viewer.connection = socket;
+  socket.onmessage = (message) => {
+    if (typeof message.data == "string") {
+      const asked = JSON.parse(message.data);
+      viewer.set_3d_pane_size();
+      socket.send(JSON.stringify({type: "image", id: asked.id, data: viewer.capture_image()}));
+    } else {
+      apply(message.data);
+      viewer.num_messages_received++;
+      socket.send('{"type": "done"}');
+    }
+  };
+  socket.onclose = () => {
+    part("notice").style.display = "block";
+    comeBack();
+  };
+}
+
+async function comeBack() {
+  try {
+    if ((await fetch("/", {cache: "no-store"})).ok) return location.reload();
+  } catch (error) { /* still closed */ }
+  setTimeout(comeBack, 500);
+}
+
+// The file: unpack meshcat's viewer and the scene that lie in the page.
+async function unpack(id) {
+  const packed = Uint8Array.from(atob(part(id).textContent), (letter) => letter.charCodeAt(0));
+  return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+}
+
+async function open() {
+  const script = document.createElement("script");
+  script.textContent = new TextDecoder().decode(await unpack("viewer-code"));
+  document.body.appendChild(script);
+  window.viewer = startViewer();
+  apply(await unpack("scene"));
+  viewer.num_messages_received++;
+  viewer.set_3d_pane_size();
+}

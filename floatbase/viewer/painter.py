@@ -1,0 +1,269 @@
+"""What is drawn for a state: a pure function from robot, state, contacts and forces to a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, checked
+from floatbase.control.friction import FrictionPolyhedron, tangents
+from floatbase.dynamics.contacts import Contacts
+from floatbase.errors import InputError
+from floatbase.robots.robot import Robot
+from floatbase.robots.state import State
+from floatbase.viewer import marks, shapes, three
+from floatbase.viewer.colours import GHOST, MEASURED, PLANNED, RGB
+from floatbase.viewer.cones import cone_status, polyhedron_status
+from floatbase.viewer.meshes import JointMesh, robot_meshes
+from floatbase.viewer.shapes import Item, Picture
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces at the points of contacts: shape (n, 3) each, N, world, what the ground does to the robot."""
+
+    measured: Array | None
+    planned: Array | None
+
+    @property
+    def kinds(self) -> list[tuple[str, Array | None, RGB]]:
+        """Name, forces and colour of each kind."""
+        return [("measured", self.measured, MEASURED), ("planned", self.planned, PLANNED)]
+
+    @property
+    def judged(self) -> Array | None:
+        """Those that colour the cones: the measured ones where there are any."""
+        return self.planned if self.measured is None else self.measured
+
+
+@dataclass(frozen=True, eq=False)
+class Painter:
+    """Draws a robot.
+
+    scale: m drawn for a newton; None for one that fits the robot. facets, inside: of the friction polyhedra; None for round
+    cones. ground: (3,), unit normal of the ground through the origin. lines, text: colours of the ground's lines and of text.
+    """
+
+    robot: Robot
+    asked_scale: float | None
+    facets: int | None
+    inside: bool
+    ground: Array
+    lines: RGB
+    text: RGB
+
+    def picture(
+        self,
+        state: State,
+        contacts: Contacts | None = None,
+        forces: npt.ArrayLike | None = None,
+        planned: npt.ArrayLike | None = None,
+        *,
+        com: bool = True,
+        cones: bool = True,
+        support: bool = False,
+        wrench: npt.ArrayLike | None = None,
+        push: tuple[str, npt.ArrayLike] | None = None,
+        ghost: State | None = None,
+        frames: Sequence[str] = (),
+        labels: bool = False,
+        extra: Mapping[str, Item] | None = None,
+    ) -> Picture:
+        """Everything that was asked for, as path -> item; the arguments are those of `Viewer.show`."""
+        self._check_state(state)
+        both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
+        picture = {"ground": self._ground} | self._robot(state, "robot", self._shapes)
+        if contacts is not None and contacts.n_points:
+            picture |= self._contacts(state, contacts, both, cones)
+            if support:
+                picture |= below("support", marks.support_region(contacts.positions(state), 0.004 * self.size))
+            if labels:
+                picture |= self._labels(state, contacts)
+        if com:
+            picture |= below("com", shapes.centre_of_mass(state.com, self._ground_below(state.com), self.size))
+        if wrench is not None:
+            picture |= self._wrench(state, wrench)
+        if push is not None:
+            picture |= self._push(state, *push)
+        if ghost is not None:
+            self._check_state(ghost)
+            picture |= self._robot(ghost, "ghost", self._ghosts)
+        for frame in frames:
+            pose = state.frame_pose(frame).homogeneous
+            picture |= below(f"frame/{plain(frame)}", marks.frame_axes(pose, 0.25 * self.size, frame))
+        if any(path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench") for path in picture):
+            picture |= self._scale_bar
+        return picture | dict(extra or {})
+
+    @cached_property
+    def home(self) -> State:
+        """The robot as it stands."""
+        return self.robot.standing()
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of the robot where it stands, m, world."""
+        poses = self.home.joint_transforms
+        points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in self._meshes]
+        together = np.vstack(points)
+        return np.min(together, axis=0), np.max(together, axis=0)
+
+    @cached_property
+    def size(self) -> float:
+        """How large the robot is when it stands, m: half the diagonal of its box."""
+        low, high = self.box
+        return 0.5 * float(np.linalg.norm(high - low))
+
+    @cached_property
+    def scale(self) -> float:
+        """Metres drawn for a newton: 1, 2 or 5 times a power of ten, so that the weight is about twice as long as the
+        centre of mass is high."""
+        if self.asked_scale is not None:
+            return self.asked_scale
+        return nice(2.0 * max(float(self.home.com[2] - self.box[0][2]), 0.6 * self.size) / self.robot.weight)
+
+    @cached_property
+    def cone_height(self) -> float:
+        """m: for half as much again as a foot carries at rest, but not so high as to hide the robot."""
+        return min(self.scale * 1.5 * self.robot.weight / max(len(self.robot.feet), 2), 0.55 * self.size)
+
+    @cached_property
+    def _meshes(self) -> list[JointMesh]:
+        return robot_meshes(self.robot)
+
+    @cached_property
+    def _shapes(self) -> list[three.Shape]:
+        return [three.mesh(mesh.vertices, mesh.faces, colours=mesh.colours) for mesh in self._meshes]
+
+    @cached_property
+    def _ghosts(self) -> list[three.Shape]:
+        return [three.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, veil=True) for mesh in self._meshes]
+
+    @cached_property
+    def _paths(self) -> list[tuple[int, str]]:
+        """Joint of every mesh, and its name as a part of a path."""
+        return [(mesh.joint, plain(self.robot.model.names[mesh.joint])) for mesh in self._meshes]
+
+    def _robot(self, state: State, root: str, looks: list[three.Shape]) -> Picture:
+        poses = state.joint_transforms
+        return {f"{root}/{name}": Item(look, poses[joint]) for (joint, name), look in zip(self._paths, looks, strict=True)}
+
+    def _contacts(self, state: State, contacts: Contacts, forces: Forces, cones: bool) -> Picture:
+        """Patches, cones and forces at every point."""
+        picture: Picture = {}
+        rows = zip(contacts.point_names, contacts.positions(state), contacts.normals, contacts.mus, strict=True)
+        for i, (name, position, normal, mu) in enumerate(rows):
+            at = plain(name)
+            picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
+            if cones:
+                force = None if forces.judged is None else forces.judged[i]
+                picture |= below(f"cone/{at}", self._cone(position, normal, float(mu), force))
+            for kind, vectors, colour in forces.kinds:
+                if vectors is not None and not self._is_quiet(vectors[i]):
+                    vector = self.scale * vectors[i]
+                    picture[f"{kind}/{at}"] = shapes.arrow(position, vector, colour, self.size, halo=kind == "planned")
+        return picture
+
+    def _cone(self, position: Array, normal: Array, mu: float, force: Array | None) -> Picture:
+        """A cone or polyhedron in the colour that the force gives it."""
+        judged = None if force is None or self._is_quiet(force) else force
+        if self.facets is None:
+            status = "inside" if judged is None else cone_status(judged, normal, mu)
+            return {"/surface": shapes.friction_cone(position, normal, mu, self.cone_height, status)}
+        polyhedron = FrictionPolyhedron(normal, mu, self.facets, self.inside)
+        status, active = ("inside", []) if judged is None else polyhedron_status(judged, polyhedron)
+        status = "inside" if status == "active" else status  # the facets that are reached light up instead
+        return shapes.friction_polyhedron(position, polyhedron, self.cone_height, status, active)
+
+    def _is_quiet(self, force: Array) -> bool:
+        """Whether a force is too small to be seen or judged: below a thousandth of the weight."""
+        return float(force @ force) < (1e-3 * self.robot.weight) ** 2
+
+    def _labels(self, state: State, contacts: Contacts) -> Picture:
+        """The name of every point, below and outside of it."""
+        picture: Picture = {}
+        for name, position in zip(contacts.point_names, contacts.positions(state), strict=True):
+            away = (position - state.com) * [1.0, 1.0, 0.0]
+            at = position + 0.12 * self.size * away / max(float(np.linalg.norm(away)), 1e-6)
+            picture[f"label/{plain(name)}"] = shapes.label(at, name, 0.06 * self.size)
+        return picture
+
+    def _wrench(self, state: State, value: npt.ArrayLike) -> Picture:
+        six = checked("wrench", value, (6,), "N and N·m")
+        drawn = marks.wrench(state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size)
+        return below("wrench", drawn)
+
+    def _push(self, state: State, frame: str, value: npt.ArrayLike) -> Picture:
+        force = checked("force of the push", value, (3,), "N")
+        if self._is_quiet(force):
+            return {}
+        at = state.frame_pose(frame).translation
+        return {"push": marks.push(at, self.scale * force, self.size)}
+
+    @cached_property
+    def _patch_radius(self) -> float:
+        return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
+
+    @cached_property
+    def _scale_bar(self) -> Picture:
+        """A bar for a round force of about a quarter of the weight, on the ground to the left of the robot."""
+        force = nice(self.robot.weight / 4)
+        low, high = self.box
+        length = self.scale * force
+        at = [0.5 * (low[0] + high[0]) - length / 2, high[1] + 0.5 * self.size, 0.01 * self.size]
+        return below("scale", shapes.scale_bar(at, force, length, self.size, self.text))
+
+    @cached_property
+    def _ground(self) -> Item:
+        t1, t2 = tangents(self.ground)
+        return Item(shapes.ground(self.lines).shape, shapes.placed(np.zeros(3), np.stack([t1, t2, self.ground], axis=1)))
+
+    def _ground_below(self, point: Array) -> float:
+        """Height of the ground below a point, m."""
+        return -float(self.ground[:2] @ point[:2] / self.ground[2])
+
+    def _check_state(self, state: Any) -> None:
+        if not isinstance(state, State):
+            raise InputError(f"show needs a State, as in robot.standing(), not {type(state).__name__}.")
+        if state.robot is not self.robot and state.robot.name != self.robot.name:
+            raise InputError(
+                f"this viewer shows {self.robot.name}, but the state is one of {state.robot.name}; "
+                "make a Viewer for that robot."
+            )
+
+
+def nice(value: float) -> float:
+    """The number of 1, 2, 5 times a power of ten that is nearest to `value` by ratio."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)
+
+
+def below(path: str, items: Mapping[str, Item]) -> Picture:
+    """Items under a common path."""
+    return {path + name: item for name, item in items.items()}
+
+
+def plain(name: str) -> str:
+    """A name as one part of a path."""
+    return name.replace("/", "_")
+
+
+def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -> Array | None:
+    """Forces as (n, 3), checked against the contacts."""
+    if value is None:
+        return None
+    if contacts is None:
+        raise InputError(f"{name} were given without contacts, so it is not known where they act; pass contacts=… too.")
+    array = np.asarray(value, dtype=np.float64)
+    n = contacts.n_points
+    if array.shape not in ((3 * n,), (n, 3)):
+        raise InputError(
+            f"{name} has shape {array.shape}; {n} contact points ({', '.join(contacts.point_names)}) need shape "
+            f"({3 * n},) or ({n}, 3)."
+        )
+    return checked(name, array.reshape(n, 3), (n, 3), "N")

@@ -1,0 +1,124 @@
+"""Things beside the robot: a rolling wheel, a hydraulic cylinder, a wall, a slab that the robot is bolted to."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase.viewer import geometry, three
+from floatbase.viewer.colours import MEASURED, PLANNED, RGB, WARNING
+from floatbase.viewer.shapes import Item, Picture, placed
+from floatbase.viewer.three import Shape
+
+STEEL: RGB = (0.55, 0.58, 0.62)
+RUBBER: RGB = (0.16, 0.17, 0.18)
+WALL: RGB = (0.78, 0.76, 0.72)
+
+
+def wheel(centre: npt.ArrayLike, axis: npt.ArrayLike, radius: float, angle: float, width: float | None = None) -> Item:
+    """A wheel with spokes.
+
+    centre: (3,), m, world. axis: (3,), world, its axle. radius, width: m. angle: rad, how far it has turned about the axle, by
+    the right-hand rule, from where its marked spoke points as far up as it can.
+    """
+    axle = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    up = np.array([0.0, 0.0, 1.0]) if abs(axle[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
+    x = up - axle * (axle @ up)
+    x /= np.linalg.norm(x)
+    c, s = np.cos(angle), np.sin(angle)
+    rest = np.stack([x, np.cross(axle, x), axle], axis=1)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    thick = 0.35 * radius if width is None else width
+    return Item(_unit_wheel(), placed(centre, rest @ turn, (radius, radius, thick)))
+
+
+def hydraulic_cylinder(
+    base: npt.ArrayLike, end: npt.ArrayLike, stroke: tuple[float, float], pressures: tuple[float, float] = (0.5, 0.5)
+) -> Picture:
+    """A double-acting cylinder between two points, shape (3,), m, world: barrel, rod, piston and its two chambers.
+
+    stroke: the shortest and the longest distance between the points, m. pressures: of the chamber at the base and of the one
+    around the rod, from 0 (drawn pale) to 1 (drawn in full colour).
+    """
+    start, tip = np.asarray(base, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    length = float(np.linalg.norm(tip - start))
+    turned = geometry.frame_along((tip - start) / length)
+    barrel = 0.92 * stroke[0]
+    piston = min(max(length - 0.95 * stroke[0], 0.06 * barrel), 0.94 * barrel)
+    radius = 0.10 * stroke[0]
+
+    def between(low: float, high: float, width: float) -> np.ndarray:
+        return placed(start + turned[:, 2] * low, turned, (width, width, max(high - low, 1e-4)))
+
+    return {
+        "/barrel": Item(_tube(), between(0.0, barrel, radius)),
+        "/rod": Item(_rod(STEEL), between(piston, length, 0.38 * radius)),
+        "/piston": Item(_rod(RUBBER), between(piston - 0.03 * barrel, piston + 0.03 * barrel, 0.93 * radius)),
+        "/base chamber": Item(_fluid(), between(0.0, piston, 0.9 * radius), (*MEASURED, 0.15 + 0.7 * pressures[0])),
+        "/rod chamber": Item(_fluid(), between(piston, barrel, 0.9 * radius), (*PLANNED, 0.15 + 0.7 * pressures[1])),
+    }
+
+
+def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: float) -> Item:
+    """A wall: a slab whose face through `position` looks along `normal`, both (3,), world, m."""
+    n = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
+    side = np.cross([0.0, 0.0, 1.0], n)
+    side /= np.linalg.norm(side)
+    turned = np.stack([n, side, np.cross(n, side)], axis=1)
+    thick = 0.05 * height
+    return Item(_unit_box(WALL), placed(np.asarray(position) - n * thick / 2, turned, (thick, width, height)))
+
+
+def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
+    """Bolts on a circle around a base on the ground, radius in m."""
+    picture: Picture = {}
+    for i in range(count):
+        angle = 2.0 * np.pi * (i + 0.5) / count
+        at = np.asarray(position) + radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+        picture[f"/bolt {i}"] = Item(_bolt(), placed(at, scale=0.14 * radius))
+    return picture
+
+
+@lru_cache(maxsize=1)
+def _unit_wheel() -> Shape:
+    """Around z, of radius 1 and width 1, one of its spokes marked."""
+    tyre = geometry.revolved([(0.8, -0.5), (1.0, -0.5), (1.0, 0.5), (0.8, 0.5), (0.8, -0.5)], 48)
+    hub = geometry.revolved([(0.0, -0.5), (0.16, -0.5), (0.16, 0.5), (0.0, 0.5)])
+    angles = 2.0 * np.pi * np.arange(6) / 6
+    spokes = [geometry.rod(np.zeros(3), [0.85 * np.cos(a), 0.85 * np.sin(a), 0.0], 0.06) for a in angles]
+    parts = [(tyre, RUBBER), (hub, STEEL), (spokes[0], WARNING), *((spoke, STEEL) for spoke in spokes[1:])]
+    colours = [np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts]
+    return three.mesh(*geometry.merged([mesh for mesh, _ in parts]), colours=np.vstack(colours))
+
+
+@lru_cache(maxsize=1)
+def _tube() -> Shape:
+    """Along z, 1 long, of radius 1, seen through."""
+    return three.mesh(*geometry.revolved([(1.0, 0.0), (1.0, 1.0)], 32), STEEL, opacity=0.35)
+
+
+@lru_cache(maxsize=1)
+def _fluid() -> Shape:
+    profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    return three.mesh(*geometry.revolved(profile, 24), (1.0, 1.0, 1.0), opacity=0.5)
+
+
+@lru_cache(maxsize=8)
+def _rod(colour: RGB) -> Shape:
+    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 24), colour)
+
+
+@lru_cache(maxsize=8)
+def _unit_box(colour: RGB) -> Shape:
+    """A cube of side 1 around the origin."""
+    corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return three.mesh(*geometry.merged([geometry.fan(corners[list(side)]) for side in sides]), colour, flat=True)
+
+
+@lru_cache(maxsize=1)
+def _bolt() -> Shape:
+    head = geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 0.9), (0.0, 0.9)], 6)
+    return three.mesh(*head, (0.25, 0.26, 0.28), flat=True)

@@ -1,0 +1,135 @@
+"""Moving pictures: a rollout, or any list of pictures, as one animation that the page plays, seeks and slows down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import umsgpack
+
+from floatbase._arrays import Array
+from floatbase.viewer import wire
+from floatbase.viewer.shapes import Item, Picture
+
+REPETITIONS = 10_000  # meshcat's default is 1, after which a picture falls back to its start
+_SMOOTH, _STEP = 2301, 2300  # three.js: linear and discrete interpolation
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """Pictures in time.
+
+    first: every item that ever appears, as it is at its first appearance. command: what makes them move.
+    """
+
+    first: Picture
+    command: wire.Update
+    duration: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """One item through time: present (n,), matrices (n, 4, 4), colours (n, 4) or None. Where absent, as last or first seen."""
+
+    item: Item
+    present: npt.NDArray[np.bool_]
+    matrices: Array
+    colours: Array | None
+
+
+def animate(
+    times: npt.ArrayLike, pictures: Iterable[Picture], root: str, speed: float = 1.0, paused: bool = False
+) -> Animation:
+    """The animation that shows picture i from times[i], s, on.
+
+    root: path that the items lie below. speed: 1 for real time. paused: wait for the reader to press play.
+    """
+    t = np.asarray(times, dtype=np.float64) - np.asarray(times, dtype=np.float64)[0]
+    courses = _courses(list(pictures))
+    clips = []
+    for path, course in courses.items():
+        tracks = list(_tracks(course, t))
+        if tracks:
+            clips.append({"path": root + path, "clip": {"fps": 1, "name": "default", "tracks": tracks}})
+    options = {"play": True, "repetitions": REPETITIONS, "speed": speed, "paused": paused}
+    command = wire.encode({"type": "set_animation", "path": "", "animations": clips, "options": options})
+    return Animation({path: course.item for path, course in courses.items()}, command, float(t[-1]))
+
+
+def no_animation() -> wire.Update:
+    """The command that ends an animation and puts everything back where it was before."""
+    return wire.encode({"type": "set_animation", "path": "", "animations": [], "options": {"play": False}})
+
+
+def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
+    """Rows of a record to draw, `rate` a second: the first, the last, and those nearest to the ticks between."""
+    t = np.asarray(times, dtype=np.float64)
+    ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
+    return np.unique(np.clip(np.searchsorted(t, ticks - 1e-9), 0, len(t) - 1))
+
+
+def _courses(pictures: list[Picture]) -> dict[str, _Course]:
+    """Every item's course; a path that shows several shapes in turn becomes several items."""
+    seen: dict[str, dict[int, Item]] = {}
+    for i, picture in enumerate(pictures):
+        for path, item in picture.items():
+            seen.setdefault(path, {})[i] = item
+    courses = {}
+    for path, items in seen.items():
+        shapes = list(dict.fromkeys(item.shape for item in items.values()))
+        for k, shape in enumerate(shapes):
+            own = {i: item for i, item in items.items() if item.shape is shape}
+            courses[f"{path}~{k}" if k else path] = _course(own, len(pictures))
+    return courses
+
+
+def _course(items: dict[int, Item], n: int) -> _Course:
+    rows = np.array(sorted(items))
+    held = rows[np.clip(np.searchsorted(rows, np.arange(n), side="right") - 1, 0, None)]
+    matrices = np.array([items[i].matrix for i in rows])[np.searchsorted(rows, held)]
+    first = items[rows[0]]
+    colours = None if first.colour is None else np.array([items[i].colour for i in held])
+    return _Course(first, np.isin(np.arange(n), rows), matrices, colours)
+
+
+def _tracks(course: _Course, t: Array) -> Iterator[dict[str, Any]]:
+    """Tracks of what changes; what stays as it is has none."""
+    # scale is a track of its own: a scaled matrix has no quaternion
+    scales = np.linalg.norm(course.matrices[:, :3, :3], axis=1)
+    quaternions = _quaternions(course.matrices[:, :3, :3] / scales[:, None, :])
+    yield from _track("position", "vector3", t, course.matrices[:, :3, 3])
+    yield from _track("quaternion", "quaternion", t, quaternions)
+    yield from _track("scale", "vector3", t, scales)
+    if not course.present.all():
+        yield {"name": ".visible", "type": "bool", "times": t.tolist(), "values": course.present.tolist()}
+    if course.colours is not None:
+        yield from _track("shape.material.color", "color", t, course.colours[:, :3], _STEP)
+
+
+def _track(name: str, kind: str, t: Array, values: Array, interpolation: int = _SMOOTH) -> Iterator[dict[str, Any]]:
+    if np.ptp(values, axis=0).max() < 1e-7:
+        return
+    yield {
+        "name": name if "." in name else f".{name}",
+        "type": kind,
+        "times": _floats(t),
+        "values": _floats(values),
+        "interpolation": interpolation,
+    }
+
+
+def _floats(values: Array) -> umsgpack.Ext:
+    return umsgpack.Ext(0x17, np.ascontiguousarray(values, dtype="<f4").tobytes())
+
+
+def _quaternions(rotations: Array) -> Array:
+    """Rotations (n, 3, 3) as quaternions x y z w, shape (n, 4), each on the side of the one before."""
+    from scipy.spatial.transform import Rotation
+
+    quaternions = Rotation.from_matrix(rotations).as_quat()
+    flips = np.sign(np.sum(quaternions[1:] * quaternions[:-1], axis=1))
+    quaternions[1:] *= np.cumprod(np.where(flips < 0, -1.0, 1.0))[:, None]
+    return np.asarray(quaternions)
