@@ -1,0 +1,515 @@
+"""ζ, η, C, B and their spaces (8)-(14)(16)(17): counted, solved and measured by others.
+
+Counts come from MuJoCo's matrices and elimination with complete pivoting, forces from Pinocchio's constrained dynamics and
+from MuJoCo's contacts.
+"""
+
+from __future__ import annotations
+
+import itertools
+from functools import cache
+
+import judges
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+
+import floatbase as fb
+from floatbase.dynamics import EquationsOfMotion, subspace
+from floatbase.dynamics.constraints import fixed_frame
+
+Array = npt.NDArray[np.float64]
+
+
+def stances(name: str) -> list[fb.Contacts]:
+    """Every subset of a robot's feet as points, and as flat feet where they are; no contacts for a robot without feet."""
+    robot = judges.load(name)
+    frames = [foot.frame for foot in robot.feet]
+    some = [list(c) for n in range(1, len(frames) + 1) for c in itertools.combinations(frames, n)]
+    kinds = [fb.Contacts.points] + ([fb.Contacts.flat_feet] if name in judges.FLAT else [])
+    return [kind(robot, frames=frames) for kind in kinds for frames in some] or [fb.Contacts.none()]
+
+
+def straight(name: str) -> fb.State:
+    """Standing posture with every knee straight."""
+    robot = judges.load(name)
+    q = np.array(robot.posture)
+    for joint in robot.joint_names:
+        if any(word in joint for word in ("calf", "KFE", "leg_left_4", "leg_right_4")):
+            q[robot.model.idx_qs[robot.model.getJointId(joint)]] = 0.0
+    return fb.State(robot, q)
+
+
+def configurations(name: str) -> dict[str, fb.State]:
+    """Standing, straight knees, all joints at zero, and two random ones."""
+    robot = judges.load(name)
+    random = {f"random {seed}": robot.random_state(seed) for seed in range(2)}
+    return {"standing": robot.standing(), "straight": straight(name), "neutral": robot.neutral(), **random}
+
+
+@cache
+def cases(name: str) -> list[tuple[str, EquationsOfMotion]]:
+    """Every configuration × every stance of a robot."""
+    return [
+        (f"{name} {where} on {contacts.names}", fb.equations_of_motion(state, contacts))
+        for where, state in configurations(name).items()
+        for contacts in stances(name)
+    ]
+
+
+def eliminated(A: npt.ArrayLike, tolerance: float = 1e-8) -> int:
+    """Rank by Gaussian elimination with complete pivoting, rows scaled to unit length: no singular values."""
+    A = np.array(A, dtype=np.float64)
+    lengths = np.linalg.norm(A, axis=1, keepdims=True)
+    A = A / np.where(lengths > 1e-12, lengths, 1.0)
+    count = 0
+    while A.size and count < min(A.shape):
+        rest = np.abs(A[count:, count:])
+        i, j = np.unravel_index(rest.argmax(), rest.shape)
+        if rest[i, j] < tolerance:
+            break
+        A[[count, count + i]] = A[[count + i, count]]
+        A[:, [count, count + j]] = A[:, [count + j, count]]
+        A[count + 1 :] -= np.outer(A[count + 1 :, count] / A[count, count], A[count])
+        count += 1
+    return count
+
+
+def judged(eom: EquationsOfMotion) -> tuple[Array, Array]:
+    """M and J from MuJoCo."""
+    judge = judges.mujoco_of(eom.robot.name).at(eom.state)
+    owners = [contact.name for contact in eom.contacts for _ in contact.point_names]
+    points = zip(owners, eom.contacts.positions(eom.state), strict=True)
+    J = [judge.jacobian(frame, point)[0] for frame, point in points]
+    return judge.M, np.vstack([np.zeros((0, eom.nv)), *J])
+
+
+def constrained(eom: EquationsOfMotion, tau: Array) -> tuple[Array, Array]:
+    """q̈ and the smallest λ of (7) for given τ from one least-squares solve of the whole system."""
+    kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
+    x = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b]), rcond=1e-11)[0]
+    return x[: eom.nv], x[eom.nv :]
+
+
+def kept(state: fb.State, contacts: fb.Contacts) -> fb.State:
+    """The state with the velocity nearest to its own that the contacts allow: A v = 0."""
+    A = contacts.constraint(state)[0]
+    return state.at(v=state.v - np.linalg.pinv(A, rcond=1e-9) @ (A @ state.v))
+
+
+# counting -----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_ranks_of_the_contact_jacobian_are_those_of_mujocos_by_elimination(name: str) -> None:
+    for case, eom in cases(name):
+        found = subspace.dimensions(eom)
+        _, J = judged(eom)
+        assert found.rank_J == eliminated(J), case
+        assert found.rank_J_base == eliminated(J[:, : eom.nv - eom.d]), case
+        assert (found.nv, found.d, found.k) == (eom.robot.nv, eom.robot.d, eom.contacts.k)
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name: str) -> None:
+    for case, eom in cases(name):
+        found, (_, J) = subspace.dimensions(eom), judged(eom)
+        wanted = eom.d + eom.k - eliminated(J)
+        assert (found.null_B, found.null_C) == (wanted, wanted), case
+        assert subspace.feasible_space(eom).dimension == wanted, case
+        assert subspace.torque_force_space(eom).n_in == wanted, case
+        B, C = subspace.motion_matrix(eom)[0], subspace.torque_force_matrix(eom)[0]
+        assert B.shape[1] - eliminated(B) == wanted, case
+        assert C.shape[1] - eliminated(C) == wanted, case
+        if found.rank_J == eom.k:
+            assert wanted == eom.d, case
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(name: str) -> None:
+    """rank V_q̈ = d - rank J + rank J_b, and it is the number of accelerations that torques reach with the contacts held."""
+    for case, eom in cases(name):
+        M, J = judged(eom)
+        found = subspace.dimensions(eom)
+        assert found.rank_V_qdd == eom.d - eliminated(J) + eliminated(J[:, : eom.nv - eom.d]), case
+        N = np.linalg.svd(J)[2][eliminated(J) :].T if len(J) else np.eye(eom.nv)
+        reached = N @ np.linalg.solve(N.T @ M @ N, N.T @ eom.S)
+        assert found.rank_V_qdd == eliminated(reached, 1e-7), case
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_geometry_says(name: str) -> None:
+    """k - rank J_b from geometry alone: points that are one, on a line, or not leave 3, 5 or 6 ways to push a rigid body."""
+    for case, eom in cases(name):
+        points = eom.contacts.positions(eom.state)
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        spanned = int(np.sum(spread > 1e-9))
+        wanted = eom.k - {0: 3, 1: 5}.get(spanned, 6)
+        F = subspace.internal_forces(eom)
+        assert F.shape == (eom.k, wanted), case
+        assert subspace.dimensions(eom).internal == wanted, case
+        for f in F.T:
+            each = f.reshape(-1, 3)
+            assert np.allclose(each.sum(axis=0), 0.0, atol=1e-9), case
+            assert np.allclose(np.cross(points, each).sum(axis=0), 0.0, atol=1e-9), case
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -> None:
+    """τ changes by -J_jᵀ λ for an internal λ: the acceleration by Pinocchio's recursion stays what it was."""
+    rng = np.random.default_rng(0)
+    for case, eom in cases(name)[:: 3 if name != "talos" else 1]:
+        F = subspace.internal_forces(eom)
+        if F.shape[1] == 0:
+            continue
+        tau, forces = rng.normal(size=eom.d), rng.normal(size=eom.k)
+        squeeze = 20.0 * F @ rng.normal(size=F.shape[1])
+        before = judges.aba(eom, tau, forces)
+        after = judges.aba(eom, tau - eom.J[:, 6:].T @ squeeze, forces + squeeze)
+        assert np.allclose(before, after, atol=1e-7 * max(1.0, np.abs(before).max())), case
+        if np.linalg.norm(eom.J.T @ squeeze) > 1.0:  # one that is not in null(Jᵀ) needs those torques
+            assert np.linalg.norm(judges.aba(eom, tau, forces + squeeze) - before) > 1e-2, case
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name: str) -> None:
+    for case, eom in cases(name):
+        _, J = judged(eom)
+        N = subspace.undetermined_forces(eom)
+        assert N.shape[1] == eom.k - eliminated(J), case
+        assert subspace.forces_are_unique(eom) == (eliminated(J) == eom.k), case
+        if eom.k:
+            assert np.max(np.abs(J.T @ N), initial=0.0) < 1e-8, case
+
+
+def test_solo8_on_four_feet_has_rank_10_where_it_stands_symmetrically_and_11_elsewhere() -> None:
+    robot = judges.load("solo8")
+    contacts = fb.Contacts.points(robot)
+    standing = subspace.dimensions(fb.equations_of_motion(robot.standing(), contacts))
+    assert (standing.rank_J, standing.null_B, standing.rank_V_qdd, standing.undetermined) == (10, 10, 4, 2)
+    for seed in range(10):
+        generic = subspace.dimensions(fb.equations_of_motion(robot.random_state(seed), contacts))
+        assert (generic.rank_J, generic.null_B, generic.rank_V_qdd, generic.undetermined) == (11, 9, 3, 1)
+
+
+def test_solo8_loses_one_rank_more_with_all_legs_straight_down() -> None:
+    robot = judges.load("solo8")
+    assert subspace.dimensions(fb.equations_of_motion(robot.neutral(), fb.Contacts.points(robot))).rank_J == 9
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12"])
+def test_straight_knees_alone_do_not_cost_a_robot_with_three_joints_a_leg_its_rank(name: str) -> None:
+    """The base still moves: 12 contact rows stay independent although each leg's own 3 × 3 Jacobian is singular."""
+    state = judges.load(name).neutral()  # legs straight down
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    _, J = judged(eom)
+    leg = [i for i in range(6, eom.nv) if np.any(np.abs(J[:3, i]) > 1e-9)]
+    assert len(leg) == 3
+    assert eliminated(J[:3][:, leg]) == 2
+    assert subspace.rank(eom.J) == eliminated(J) == 12
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12"])
+def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_there_too(name: str) -> None:
+    robot = judges.load(name)
+    contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
+    for state, lost in ((robot.standing(), 0), (robot.neutral(), 4)):
+        found = subspace.dimensions(fb.equations_of_motion(state, contacts))
+        assert found.rank_J == 18 - lost
+        assert found.null_B == found.null_C == 12 + 18 - found.rank_J
+        assert found.rank_V_qdd == 12 - found.rank_J + 6 == lost  # how many ways the legs can still move: bent, none
+
+
+@pytest.mark.parametrize("exponent", range(1, 13))
+def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_rank(exponent: int) -> None:
+    """A simulated solo8 is never quite symmetric: whatever rank J is said to have, all other numbers must follow from it."""
+    standing = judges.load("solo8").standing()
+    away = np.random.default_rng(0).normal(size=standing.robot.nv)
+    state = judges.along(standing, away, 10.0**-exponent)
+    found = subspace.dimensions(fb.equations_of_motion(state, fb.Contacts.points(state.robot)))
+    wanted = found.d + found.k - found.rank_J
+    assert (found.null_B, found.null_C) == (wanted, wanted)
+    assert found.rank_V_qdd == found.d - found.rank_J + found.rank_J_base
+
+
+@pytest.mark.parametrize("exponent", range(1, 13))
+def test_contacts_hold_under_eta_however_near_the_robot_is_to_losing_rank(exponent: int) -> None:
+    """A q̈ = b to 1e-6 m/s² also where J M⁻¹ Jᵀ is nearly singular: its condition is the square of that of J."""
+    standing = judges.load("solo8").standing()
+    away = np.random.default_rng(0).normal(size=standing.robot.nv)
+    eom = fb.equations_of_motion(judges.along(standing, away, 10.0**-exponent), fb.Contacts.points(standing.robot))
+    tau = np.random.default_rng(1).normal(size=8)
+    assert np.max(np.abs(eom.A @ subspace.accelerations_from_torques(eom)(tau) - eom.b)) < 1e-6
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_in_free_flight_all_torques_are_free_and_no_force_is_left(name: str) -> None:
+    state = judges.load(name).random_state(0)
+    eom = fb.equations_of_motion(state, fb.Contacts.none())
+    found = subspace.dimensions(eom)
+    assert found.null_B == found.null_C == found.rank_V_qdd == eom.d
+    assert found.internal == found.undetermined == 0
+    tau = np.random.default_rng(0).normal(size=eom.d)
+    assert judges.relative(subspace.accelerations_from_torques(eom)(tau), judges.aba(eom, tau, np.zeros(0))) < 1e-9
+    assert subspace.forces_from_torques(eom)(tau).shape == (0,)
+
+
+# ζ and η -----------------------------------------------------------------------------------------------------------------
+
+
+def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tuple[Array, Array]:
+    """q̈ and the contact forces [wrenches] of Pinocchio's constrained forward dynamics, world-aligned, no Baumgarte terms."""
+    robot, models = eom.robot, pin.StdVec_RigidConstraintModel()
+    for contact in eom.contacts:
+        frame = robot.model.frames[robot.frame_id(contact.name)]
+        placement = frame.placement
+        if kind == pin.ContactType.CONTACT_3D:
+            local = eom.state.frame_pose(contact.name).actInv(np.array(contact.positions(eom.state)[0]))
+            placement = placement * pin.SE3(np.eye(3), local)
+        model = pin.RigidConstraintModel(kind, robot.model, frame.parentJoint, placement, pin.LOCAL_WORLD_ALIGNED)
+        assert model.m_baumgarte_parameters.Kp == model.m_baumgarte_parameters.Kd == 0.0
+        models.append(model)
+    datas, data = pin.StdVec_RigidConstraintData([m.createData() for m in models]), robot.model.createData()
+    pin.initConstraintDynamics(robot.model, data, models, datas)
+    settings = pin.ProximalSettings(1e-14, 1e-12, 200)
+    qdd = pin.constraintDynamics(robot.model, data, eom.state.q, eom.state.v, eom.S @ tau, models, datas, settings)
+    part = "linear" if kind == pin.ContactType.CONTACT_3D else "vector"
+    return np.array(qdd), np.concatenate([getattr(d.contact_force, part) for d in datas])
+
+
+def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_aligned() -> None:
+    """The judge's own convention, checked first: its forces, put on the links as external ones, give its accelerations."""
+    state = judges.load("go2").random_state(0).at(v=np.zeros(18))
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    tau = np.random.default_rng(0).normal(size=12)
+    qdd, forces = pinocchios(eom, tau, pin.ContactType.CONTACT_3D)
+    assert judges.relative(judges.aba(eom, tau, forces), qdd) < 1e-9
+    assert judges.relative(judges.aba(eom, tau, -forces), qdd) > 0.1
+
+
+@pytest.mark.parametrize("name", judges.BALLS)
+def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(name: str) -> None:
+    """Feet of radius 0 where the balls' centres are, random states and torques, every stance with J of full rank."""
+    robot = fb.load(name, feet=[fb.Foot(foot.frame, 0.0, foot.centre) for foot in judges.load(name).feet])
+    rng, compared = np.random.default_rng(0), 0
+    for state in judges.states(name, 3):
+        state = fb.State(robot, state.q, state.v)
+        for chosen in stances(name):
+            eom = fb.equations_of_motion(state, fb.Contacts.points(robot, frames=chosen.names))
+            if not subspace.forces_are_unique(eom):
+                continue
+            tau = 10.0 * rng.normal(size=eom.d)
+            qdd, forces = pinocchios(eom, tau, pin.ContactType.CONTACT_3D)
+            assert judges.relative(subspace.forces_from_torques(eom)(tau), forces) < 1e-8, chosen
+            assert judges.relative(subspace.accelerations_from_torques(eom)(tau), qdd) < 1e-8, chosen
+            compared += 1
+    assert compared >= 3 * 14
+
+
+@pytest.mark.parametrize("name", judges.BALLS)
+def test_the_controllers_torques_make_the_forces_that_pinocchio_finds_under_its_ball_feet(name: str) -> None:
+    """At rest a ball's lowest point is a point of the link, so Pinocchio can be asked for the very feet."""
+    robot = judges.load(name)
+    standing = robot.standing()
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(standing))
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        step = 0.03 * rng.normal(size=robot.nv)
+        state = standing.at(q=standing.integrate(step))
+        command = controller(state.q, state.v)
+        eom = fb.equations_of_motion(state, controller.contacts)
+        qdd, forces = pinocchios(eom, command.tau, pin.ContactType.CONTACT_3D)
+        assert judges.relative(subspace.accelerations_from_torques(eom)(command.tau), qdd) < 1e-6
+        if subspace.forces_are_unique(eom):
+            assert judges.relative(subspace.forces_from_torques(eom)(command.tau), forces) < 1e-8
+            assert judges.relative(command.forces, forces) < 1e-6
+            assert judges.relative(command.qdd, qdd) < 1e-6
+        else:  # only what λ does is unique
+            found = subspace.forces_from_torques(eom)(command.tau)
+            assert judges.relative(eom.J.T @ found, eom.J.T @ forces) < 1e-6
+
+
+@pytest.mark.parametrize("name", judges.FLAT)
+def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: str) -> None:
+    """Twelve corner numbers a foot are not unique, the six of its wrench are; in motion, feet held."""
+    rng = np.random.default_rng(0)
+    for state in judges.states(name, 3):
+        contacts = fb.Contacts.flat_feet(state.robot)
+        eom = fb.equations_of_motion(kept(state, contacts), contacts)
+        assert np.linalg.norm(eom.state.v) > 0.5
+        tau = 10.0 * rng.normal(size=eom.d)
+        qdd, wrenches = pinocchios(eom, tau, pin.ContactType.CONTACT_6D)
+        forces = subspace.forces_from_torques(eom)(tau)
+        found = np.concatenate([c.generators(eom.state) @ forces[contacts.force_slice(c.name)] for c in contacts])
+        assert judges.relative(found, wrenches) < 1e-8
+        assert judges.relative(subspace.accelerations_from_torques(eom)(tau), qdd) < 1e-8
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str) -> None:
+    """Every configuration and stance, rank lost or not, against one least-squares solve of the whole system."""
+    rng = np.random.default_rng(0)
+    for case, eom in cases(name):
+        eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
+        tau = 5.0 * rng.normal(size=eom.d)
+        qdd, forces = constrained(eom, tau)
+        assert judges.relative(subspace.accelerations_from_torques(eom)(tau), qdd) < 1e-6, case
+        found = subspace.forces_from_torques(eom)(tau)
+        assert judges.relative(found, forces) < 1e-6, case
+        N = subspace.undetermined_forces(eom)
+        assert np.max(np.abs(N.T @ found), initial=0.0) < 1e-6 * (1.0 + np.abs(found).max(initial=0.0)), case
+
+
+def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground() -> None:
+    """§2.2.1: a leg that presses its foot down is pushed up. Torques that make -z at the foot raise λ_z."""
+    state = judges.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    pressing = eom.J[:, 6:].T @ np.tile([0.0, 0.0, -10.0], 4)  # joint torques of a downward force of the feet
+    change = subspace.forces_from_torques(eom).A @ pressing
+    assert np.all(change[2::3] > 1.0)
+
+
+def softness(name: str, moving: bool) -> float:
+    """Largest difference between ζ(τ) and MuJoCo's measured forces, as a part of the robot's weight.
+
+    Flat feet are compared by their wrench's force, as corner forces are not unique.
+    """
+    robot = judges.load(name)
+    standing, contacts = robot.standing(), judges.stance(robot)
+    com, tasks = standing.com, fb.standing_tasks(standing)
+    if moving:
+
+        def sway(t: float) -> Array:
+            return com + min(1.0, 4.0 * t) * np.array([0.02 * np.sin(6.0 * t), 0.0, 0.01 * np.sin(9.0 * t)])
+
+        tasks = (fb.CoMTask(sway), *tasks[1:])
+    controller = fb.WholeBodyController(robot, contacts, tasks)
+    run = fb.rollout(fb.Simulation(robot), controller, 0.5, control_period=2e-3)
+    assert run.outcome == "completed"
+    rows = range(100, len(run), 5) if moving else [len(run) - 1]
+    if moving:
+        assert np.abs(run.v[100:]).max() > 0.1
+    worst = 0.0
+    for i in rows:
+        eom = fb.equations_of_motion(run.state(i), contacts)
+        gap = subspace.forces_from_torques(eom)(run.tau[i]) - run.measured[i]
+        for contact in contacts:
+            worst = max(worst, float(np.abs(gap[contacts.force_slice(contact.name)].reshape(-1, 3).sum(axis=0)).max()))
+    return worst / robot.weight
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_mujocos_forces_at_rest_differ_from_zeta_by_less_than_three_millionths_of_the_weight(name: str) -> None:
+    """Measured: 1e-6 (go2, anymal_kinova), 6e-7 (solo12), 3e-7 (solo8), 5e-8 (talos) of the weight, after half a second."""
+    assert softness(name, moving=False) < 3e-6
+
+
+@pytest.mark.parametrize("name", judges.BALLS)
+def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth_of_the_weight(name: str) -> None:
+    """Measured while swaying at 1 rad/s and 2 cm: 2e-5 of the weight: a rigid contact is a good model of MuJoCo's stiffest."""
+    assert 1e-7 < softness(name, moving=True) < 1e-4
+
+
+# the whole space ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(name: str) -> None:
+    """(7) to 1e-9 of its largest term, the dynamics by Pinocchio's recursion, in motion that the contacts allow."""
+    rng = np.random.default_rng(0)
+    for case, eom in cases(name):
+        if case.split()[1] != "random" and not eom.k:
+            continue
+        eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
+        space = subspace.feasible_space(eom)
+        qdd, tau, forces = space(10.0 * rng.normal(size=space.dimension))
+        dynamics, motion = eom.residual(qdd, tau, forces)
+        scale = max(np.abs(eom.h).max(), np.abs(eom.J.T @ forces).max(initial=0.0), 1.0)
+        assert np.max(np.abs(dynamics)) < 1e-9 * scale, case
+        assert np.max(np.abs(motion), initial=0.0) < 1e-9 * max(1.0, np.abs(qdd).max()), case
+        assert judges.relative(judges.aba(eom, tau, forces), qdd) < 1e-7, case
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
+    """τ drawn at random, q̈ and λ by another solver, any part of null(Jᵀ) added: its coordinates lead back to it."""
+    rng = np.random.default_rng(1)
+    for case, eom in cases(name):
+        eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
+        space = subspace.feasible_space(eom)
+        tau = 5.0 * rng.normal(size=eom.d)
+        qdd, forces = constrained(eom, tau)
+        N = subspace.undetermined_forces(eom)
+        for unseen in (np.zeros(N.shape[1]), 30.0 * rng.normal(size=N.shape[1])):
+            point = (qdd, tau, forces + N @ unseen if eom.k else forces)
+            back = space(space.coordinates(*point))
+            scale = max(np.abs(part).max(initial=1.0) for part in point)
+            for found, wanted in zip(back, point, strict=True):
+                assert np.max(np.abs(found - wanted), initial=0.0) < 1e-7 * scale, case
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str) -> None:
+    rng = np.random.default_rng(2)
+    for case, eom in cases(name):
+        space = subspace.feasible_space(eom)
+        beta = rng.normal(size=space.dimension)
+        assert np.allclose(space.coordinates(*space(beta)), beta, atol=1e-8), case
+        assert np.allclose(space.map.A.T @ space.map.A, np.eye(space.dimension), atol=1e-10), case
+        assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, case  # (13) v has no part along V⊥
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_torque_and_force_blocks_of_C_and_of_B_describe_the_same_pairs(name: str) -> None:
+    rng = np.random.default_rng(3)
+    for case, eom in cases(name):
+        if case.split()[1] != "random":
+            continue
+        eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
+        pairs, space = subspace.torque_force_space(eom), subspace.feasible_space(eom)
+        beta = rng.normal(size=space.dimension)
+        pair = np.concatenate([space.tau(beta), space.forces(beta)])
+        back = pairs(pairs.A.T @ (pair - pairs.b))
+        assert judges.relative(back, pair) < 1e-7, case
+        point = pairs(rng.normal(size=pairs.n_in))
+        qdd = eom.acceleration(point[: eom.d], point[eom.d :])
+        assert np.max(np.abs(eom.A @ qdd - eom.b)) < 1e-7 * max(1.0, np.abs(qdd).max()), case
+
+
+def test_where_contacts_are_asked_for_what_they_cannot_do_the_dynamics_still_hold_and_the_motion_rows_are_met_nearest() -> None:
+    """solo8 with four feet that slide apart: A q̈ = b has no solution; Newton's law must not pay for that."""
+    state = judges.load("solo8").random_state(3, spread=0.6)
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    nearest = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=1e-10)[0]
+    assert np.max(np.abs(nearest - eom.b)) > 1e-3
+    space = subspace.feasible_space(eom)
+    qdd, tau, forces = space(np.random.default_rng(0).normal(size=space.dimension))
+    dynamics, _ = eom.residual(qdd, tau, forces)
+    assert np.max(np.abs(dynamics)) < 1e-9 * np.abs(forces).max()
+    assert np.allclose(eom.A @ qdd, nearest, atol=1e-8)
+    tau = np.ones(8)
+    assert np.allclose(eom.A @ subspace.accelerations_from_torques(eom)(tau), nearest, atol=1e-7)
+
+
+def test_torques_of_a_fixed_base_are_all_of_its_feasible_space() -> None:
+    eom = fb.equations_of_motion(judges.load("ur5").random_state(0), fb.Contacts.none())
+    space = subspace.feasible_space(eom)
+    assert space.dimension == 6
+    assert np.linalg.matrix_rank(space.tau.A) == 6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ((np.zeros(11),), r"beta has shape \(11,\); it must have shape \(12,\)"),
+        ((np.full(12, np.nan),), r"beta holds nan at index \[0\]"),
+    ],
+)
+def test_coordinates_that_do_not_fit_are_refused(arguments: tuple[Array], text: str) -> None:
+    state = judges.load("go2").standing()
+    space = subspace.feasible_space(fb.equations_of_motion(state, fb.Contacts.points(state.robot)))
+    with pytest.raises(fb.FloatbaseError, match=text):
+        space(*arguments)
+    with pytest.raises(fb.FloatbaseError, match=r"the point has shape \(41,\); it must have shape \(42,\)"):
+        space.coordinates(np.zeros(17), np.zeros(12), np.zeros(12))
