@@ -22,8 +22,7 @@ FOUND := $(shell for p in $(or $(PYTHON),python3 python3.13 python3.12 python3.1
 KEY := $(or $(firstword $(FOUND)),none)
 BASE := $(wordlist 2,99,$(FOUND))
 
-NOTEBOOKS := $(wildcard notebooks/*.ipynb)
-FIRST := $(firstword $(wildcard notebooks/00_start_here.ipynb notebooks))
+FIRST := /lab/tree/00_start_here.ipynb
 
 help:
 	@echo "make lab     open the course in JupyterLab"
@@ -34,16 +33,17 @@ help:
 	@echo
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
 
-# Nothing leaves the machine: no news, no look for updates, no list of extensions.
+# Nothing leaves the machine: no news, no look for updates, no list of extensions
 lab: setup
-	$(BIN)/jupyter lab --ServerApp.ip=127.0.0.1 --LabApp.news_url=None \
+	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
+		--LabApp.news_url=None --LabApp.extension_manager=readonly \
 		--LabApp.check_for_updates_class=jupyterlab.handlers.announcements.NeverCheckForUpdate \
-		--LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS) $(FIRST)
+		$(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
 test: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest tests $(if $(NOTEBOOKS),--nbval $(NOTEBOOKS)) $(PYTEST_ARGS)
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 setup: $(VENV)/ready-$(KEY)
 

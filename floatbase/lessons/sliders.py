@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import ipywidgets as widgets
@@ -22,10 +23,10 @@ def live(sim: Simulation, controller: Controller, view: Viewer, **options: Any) 
     return Live(sim, controller, show, **options)
 
 
-def push_panel(run: Live, most: float = 60.0) -> widgets.VBox:
-    """A slider for a sideways push in N, which acts for 0.1 s when it is let go, with buttons to run, pause and reset.
+def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
+    """The live picture with a slider for a sideways push, N, along +y, which acts for 0.1 s when the slider is let go.
 
-    Moving the slider starts the run when it is paused.
+    Moving the slider starts the run when it is paused; buttons run, pause and reset it. Nothing here waits.
     """
     force = widgets.FloatSlider(
         value=0.0,
@@ -38,23 +39,23 @@ def push_panel(run: Live, most: float = 60.0) -> widgets.VBox:
         layout=widgets.Layout(width="60%"),
     )
     status = widgets.Label(value=run.status)
-    start, pause, reset = (widgets.Button(description=text) for text in ("run", "pause", "reset"))
 
-    def act(then: Any) -> Any:
-        def handler(_: Any) -> None:
+    def button(text: str, then: Callable[[], None]) -> widgets.Button:
+        def act(_: widgets.Button) -> None:
             then()
             status.value = run.status
 
-        return handler
+        made = widgets.Button(description=text, layout=widgets.Layout(width="6em"))
+        made.on_click(act)
+        return made
 
-    def pushed(change: Any) -> None:
+    def pushed(change: dict[str, Any]) -> None:
         if change["new"]:
             run.start()
             run.push([0.0, change["new"], 0.0])
             status.value = f"pushed with {change['new']:.0f} N for 0.1 s"
 
     force.observe(pushed, names="value")
-    start.on_click(act(run.start))
-    pause.on_click(act(run.pause))
-    reset.on_click(act(run.reset))
-    return widgets.VBox([force, widgets.HBox([start, pause, reset, status])])
+    buttons = [button("run", run.start), button("pause", run.pause), button("reset", run.reset)]
+    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="100%"))
+    return widgets.VBox([picture, force, widgets.HBox([*buttons, status])])

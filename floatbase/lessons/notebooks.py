@@ -1,0 +1,66 @@
+"""The lessons as files: run them and keep their outputs, without pictures; put solutions in place of stubs.
+
+`python -m floatbase.lessons.notebooks` runs every lesson and stores what it printed (for those who write lessons).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import nbformat
+
+from floatbase.lessons.exercises import exercises
+
+FOLDER = Path(__file__).parents[2] / "notebooks"
+
+
+def read(path: Path) -> Any:
+    """A notebook."""
+    return nbformat.read(path, as_version=4)
+
+
+def without_outputs(notebook: Any) -> Any:
+    """The notebook as if it had never been run. Changes it in place."""
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
+    notebook.metadata.pop("widgets", None)
+    return notebook
+
+
+def solved(notebook: Any) -> Any:
+    """The notebook with the solution in place of each exercise's stub. Changes it in place."""
+    known = exercises()
+    for cell in notebook.cells:
+        name = cell.metadata.get("exercise")
+        if name is not None:
+            cell.source = known[name].solution
+    return notebook
+
+
+def execute(notebook: Any, folder: Path) -> Any:
+    """Run all cells in a fresh kernel whose working directory is `folder`; an error in a cell is raised. Changes it in place."""
+    from nbclient import NotebookClient
+
+    return NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}}).execute()
+
+
+def run(path: Path) -> None:
+    """Run a lesson and store its printed outputs; pictures are drawn anew by whoever opens it, so they are not stored."""
+    notebook = execute(read(path), path.parent)
+    for cell in notebook.cells:
+        if cell.cell_type != "code":
+            continue
+        cell.metadata.pop("execution", None)  # times of day
+        if "picture" in cell.metadata.get("tags", []):
+            cell.outputs = []
+    notebook.metadata.pop("widgets", None)
+    nbformat.write(notebook, path)
+
+
+if __name__ == "__main__":
+    for lesson in sorted(FOLDER.glob("*.ipynb")) if len(sys.argv) == 1 else map(Path, sys.argv[1:]):
+        print(lesson.name)
+        run(lesson)

@@ -1,0 +1,94 @@
+"""The lessons as files: they run, print what is stored, leave nothing behind, and their exercises can be solved."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from floatbase.lessons.exercises import check, exercises
+from floatbase.lessons.notebooks import FOLDER, execute, read, solved
+
+LESSONS = sorted(FOLDER.glob("*.ipynb"))
+
+
+def ids(path: Path) -> str:
+    return path.stem
+
+
+def nbval(path: Path) -> str:
+    """Run a lesson by nbval; what it printed."""
+    command = [sys.executable, "-m", "pytest", "--nbval", "-q", "-p", "no:cacheprovider", "-c", "/dev/null", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=path.parent, timeout=200)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    return done.stdout
+
+
+def left_behind(before: set[int]) -> list[str]:
+    """Processes that were not there before, were not started by this test run's own machinery, and are kernels or servers."""
+    found = []
+    for process in psutil.process_iter(["pid", "cmdline"]):
+        line = " ".join(process.info["cmdline"] or [])
+        if process.info["pid"] not in before and ("ipykernel" in line or "meshcat" in line):
+            found.append(line)
+    return found
+
+
+@pytest.mark.timeout(200)
+@pytest.mark.parametrize("path", LESSONS, ids=ids)
+def test_a_lesson_prints_what_is_stored_and_leaves_nothing_behind(path: Path) -> None:
+    before = set(psutil.pids())
+    start = time.monotonic()
+    assert "passed" in nbval(path)
+    assert time.monotonic() - start < 60.0  # seconds, with room for a slow machine; the aim is 30
+    time.sleep(0.5)
+    assert left_behind(before) == []
+
+
+@pytest.mark.timeout(200)
+def test_lesson_00_passes_again_right_away() -> None:
+    nbval(FOLDER / "00_start_here.ipynb")
+
+
+@pytest.mark.timeout(200)
+@pytest.mark.parametrize("path", LESSONS, ids=ids)
+def test_a_lesson_runs_with_its_exercises_solved(path: Path, tmp_path: Path) -> None:
+    notebook = solved(read(path))
+    for cell in notebook.cells:
+        if "check" in cell.metadata.get("tags", []):  # a solved lesson proves each check
+            cell.source = re.sub(r"^check\((.*)\)$", r"assert check(\1).right, check(\1)", cell.source, flags=re.M)
+    execute(notebook, tmp_path)
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=ids)
+def test_a_stored_lesson_is_small_has_short_cells_and_holds_no_picture(path: Path) -> None:
+    assert path.stat().st_size < 1_000_000
+    notebook = read(path)
+    assert "widgets" not in notebook.metadata
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            assert len(cell.source.splitlines()) <= 15, cell.source
+            assert not any("text/html" in output.get("data", {}) for output in cell.outputs), cell.source
+            assert not any(output.output_type == "error" for output in cell.outputs)
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=ids)
+def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
+    known = exercises()
+    cells = {c.metadata["exercise"]: c.source for c in read(path).cells if "exercise" in c.metadata}
+    number = path.stem.split("_")[0]
+    assert set(cells) == {name for name in known if name.startswith(f"{number}.")}
+    for name, source in cells.items():
+        assert source == known[name].stub
+
+
+@pytest.mark.parametrize("name", exercises())
+def test_an_exercise_has_no_answer_at_first_and_says_so(name: str) -> None:
+    verdict = check(name, None)
+    assert not verdict.right
+    assert "no answer yet" in verdict.text
