@@ -1,0 +1,278 @@
+"""The controller of objectives alone (§3.1): it stands, it is the optimum it claims, and it fails as §4 says it must."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cvxpy as cp
+import judges
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+
+import floatbase as fb
+from floatbase.control.analytic import AnalyticController, rotational_inertia
+
+Array = npt.NDArray[np.float64]
+PERIOD = 2e-3
+
+
+@cache
+def controller_of(name: str) -> AnalyticController:
+    robot = judges.load(name)
+    return AnalyticController(robot, judges.stance(robot), robot.standing())
+
+
+@cache
+def standing(name: str) -> fb.Rollout:
+    return fb.rollout(fb.Simulation(judges.load(name)), controller_of(name), 1.5, control_period=PERIOD)
+
+
+def near(name: str, seed: int, far: float = 0.03, fast: float = 0.3) -> fb.State:
+    """A state near standing, moving, with a velocity that the contacts allow."""
+    rng = np.random.default_rng(seed)
+    state = judges.load(name).standing()
+    state = judges.along(state, rng.normal(size=state.robot.nv), far)
+    v = fast * rng.normal(size=state.robot.nv)
+    A = judges.stance(state.robot).constraint(state)[0]
+    return state.at(v=v - np.linalg.pinv(A, rcond=1e-9) @ (A @ v))
+
+
+def inertia_about_com(state: fb.State) -> Array:
+    """Σ R I Rᵀ + m (‖r‖² 1 - r rᵀ) over MuJoCo's bodies about their common centre."""
+    judge = judges.mujoco_of(state.robot.name).at(state)
+    total = np.zeros((3, 3))
+    centre = (judge.model.body_mass[:, None] * judge.data.xipos).sum(axis=0) / judge.model.body_mass.sum()
+    for i in range(1, judge.model.nbody):
+        R, r = judge.data.ximat[i].reshape(3, 3), judge.data.xipos[i] - centre
+        total += R @ np.diag(judge.model.body_inertia[i]) @ R.T
+        total += judge.model.body_mass[i] * (r @ r * np.eye(3) - np.outer(r, r))
+    return total
+
+
+def written_out(name: str, state: fb.State) -> tuple[Array, Array, Array, float]:
+    """q̈, τ, λ and the value of the controller's objective, minimised by cvxpy over all three with (7) as equalities.
+
+    Every term is written from its formula: (22), (23), posture and torque with the default gains and weights.
+    """
+    robot, held = state.robot, judges.load(name).standing()
+    contacts = judges.stance(robot)
+    kp, kd, alpha, weights = 100.0, 20.0, 0.1, {"bias": 1e-3, "posture": 1e-3, "torque": 1e-6}
+    judge = judges.mujoco_of(name).at(state)
+    mass, g = float(judge.model.body_mass.sum()), 9.81
+    J = judges.jacobian_of(lambda s: s.com, state)
+    force = mass * (-kp * (state.com - held.com) - kd * J @ state.v + np.array([0.0, 0.0, g]))
+    R, R_held = (judges.quaternion_rotation(s.q[3:7]) for s in (state, held))
+    turn = -kp * judges.turn_between(R, R_held) - kd * R @ state.v[3:6]
+    moment = inertia_about_com(state) @ turn
+    eom = fb.equations_of_motion(state, contacts)
+    qdd, tau, f = cp.Variable(eom.nv), cp.Variable(eom.d), cp.Variable((contacts.n_points, 3))
+    points = contacts.positions(state)
+    centre = state.com
+    tau_c = sum(pin.skew(p - centre) @ f[i] for i, p in enumerate(points))
+    share = mass * g / contacts.n_points
+    joints = -kp * (state.q[7:] - held.q[7:]) - kd * state.v[6:]
+    cost = 0.5 * cp.sum_squares(cp.sum(f, axis=0) - force) + 0.5 * cp.sum_squares(tau_c - moment)
+    cost += weights["bias"] * 0.5 * (cp.sum_squares(f[:, :2]) + alpha * cp.sum_squares(f[:, 2] - share))
+    cost += weights["posture"] * 0.5 * cp.sum_squares(qdd[6:] - joints) + weights["torque"] * 0.5 * cp.sum_squares(tau)
+    U, s, Vt = np.linalg.svd(eom.A)
+    r = int(np.sum(s > 1e-9 * s[0]))
+    rows = [judge.M @ qdd + judge.h == eom.S @ tau + eom.J.T @ cp.vec(f, order="C")]
+    rows.append(Vt[:r] @ qdd == (U.T @ eom.b)[:r] / s[:r])
+    problem = cp.Problem(cp.Minimize(cost), rows)
+    problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=200)
+    assert problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
+    return qdd.value, tau.value, f.value.ravel(), float(problem.value)
+
+
+# standing ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_every_robot_stands_on_objectives_alone(name: str) -> None:
+    """1.5 s in MuJoCo: too few torques (solo8), enough (go2, solo12), redundant ones (anymal_kinova), flat feet (talos)."""
+    run, start = standing(name), judges.load(name).standing()
+    assert run.outcome == "completed"
+    assert np.linalg.norm(run.com[-1] - start.com) < 1e-4
+    assert np.max(np.abs(run.v[-1])) < 1e-5
+    assert np.max(run.slip()) < 2e-3
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_standing_the_planned_forces_carry_the_weight_and_are_the_measured_ones(name: str) -> None:
+    run, robot = standing(name), judges.load(name)
+    assert np.allclose(run.planned[-1].reshape(-1, 3).sum(axis=0), [0.0, 0.0, robot.weight], atol=1e-3 * robot.weight)
+    planned, measured = (
+        np.array([x[run.contacts.force_slice(c.name)].reshape(-1, 3).sum(axis=0) for c in run.contacts])
+        for x in (run.planned[-1], run.measured[-1])
+    )
+    assert np.max(np.abs(planned - measured)) < 1e-4 * robot.weight
+
+
+def test_it_goes_where_its_centre_of_mass_is_wanted() -> None:
+    robot = judges.load("go2")
+    start = robot.standing()
+    wanted = start.com + [0.02, -0.03, -0.02]
+    controller = AnalyticController(robot, fb.Contacts.points(robot), start, com=wanted)
+    run = fb.rollout(fb.Simulation(robot), controller, 1.5, control_period=PERIOD)
+    assert run.outcome == "completed"
+    assert np.linalg.norm(run.com[-1] - wanted) < 2e-3
+
+
+# the optimum -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", judges.BALLS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_its_answer_is_the_optimum_of_the_objective_written_out_in_cvxpy(name: str, seed: int) -> None:
+    """Value to 1e-6 everywhere; the answer itself too where weights of 1e-6 do not leave it to rounding."""
+    state, controller = near(name, seed), controller_of(name)
+    command = controller(state.q, state.v)
+    eom = fb.equations_of_motion(state, controller.contacts)
+    value = sum(cost(x) for cost, x in zip(controller.objective(eom), (command.qdd, command.tau, command.forces), strict=True))
+    qdd, tau, forces, best = written_out(name, state)
+    assert value == pytest.approx(best, rel=1e-5, abs=1e-6)
+    scale = max(1.0, float(np.abs(forces).max()))
+    assert np.max(np.abs(command.tau - tau)) < 1e-3 * scale
+    assert np.max(np.abs(eom.J.T @ (command.forces - forces))) < 1e-3 * scale
+    assert np.max(np.abs(command.qdd - qdd)) < 1e-2 * max(1.0, float(np.abs(qdd).max()))
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_its_answer_satisfies_the_equations_of_motion(name: str) -> None:
+    for seed in range(3):
+        state, controller = near(name, seed), controller_of(name)
+        command = controller(state.q, state.v)
+        eom = fb.equations_of_motion(state, controller.contacts)
+        scale = max(1.0, float(np.abs(command.forces).max()))
+        assert np.max(np.abs(judges.aba(eom, command.tau, command.forces) - command.qdd)) < 1e-6 * scale
+        held = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=1e-9)[0]
+        assert np.max(np.abs(eom.A @ command.qdd - held)) < 1e-7 * scale
+
+
+def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_same() -> None:
+    """§4: the QP is a strict generalisation. The same terms as tasks, limits far away: the same torques."""
+    from floatbase.control.controller import Limits, build_qp
+    from floatbase.control.qp import QP, solve
+
+    for seed in range(3):
+        state, controller = near("go2", seed, far=0.003, fast=0.01), controller_of("go2")
+        eom = fb.equations_of_motion(state, controller.contacts)
+        base = build_qp(eom, (), Limits(np.full(12, np.inf), facets=8))
+        H, g = np.zeros((base.n, base.n)), np.zeros(base.n)
+        for cost, block in zip(controller.objective(eom), ("qdd", "tau", "forces"), strict=True):
+            H[base.blocks[block], base.blocks[block]] += cost.H
+            g[base.blocks[block]] += cost.g
+        solution = solve(QP(H, g, base.A, base.b, base.G, base.h, blocks=base.blocks))
+        assert solution.active == ()
+        command = controller(state.q, state.v)
+        assert judges.relative(solution["tau"], command.tau) < 1e-6
+        assert judges.relative(solution["forces"], command.forces) < 1e-6
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_the_inertia_about_the_centre_of_mass_is_the_sum_over_mujocos_bodies(name: str) -> None:
+    for state in judges.states(name, 3):
+        assert judges.relative(rotational_inertia(state), inertia_about_com(state)) < 1e-9
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_robot_that_leans_is_turned_back(axis: int) -> None:
+    """The sign of τ̃_c: the angular momentum planned changes against the lean."""
+    state = judges.load("go2").standing()
+    contacts = fb.Contacts.points(state.robot)
+    lean = np.zeros(18)
+    lean[3 + axis] = 0.05
+    leaning = judges.along(state, lean, 1.0)
+    wanted = -100.0 * 0.05 * inertia_about_com(leaning)[axis, axis]
+    for controller, gained in (
+        (AnalyticController(state.robot, contacts, state, posture=1e-7), pytest.approx(wanted, rel=0.02)),
+        (controller_of("go2"), pytest.approx(0.65 * wanted, rel=0.55)),  # the default posture term takes its share
+    ):
+        command = controller(leaning.q, leaning.v)
+        model, data = state.robot.model, state.robot.model.createData()
+        rate = pin.computeCentroidalMomentumTimeVariation(model, data, leaning.q, leaning.v, command.qdd).angular
+        assert rate[axis] == gained
+
+
+# the failure that §4 is for ----------------------------------------------------------------------------------------------
+
+
+@cache
+def pushed(controller: str, weights: float) -> fb.Rollout:
+    """go2 pushed sideways for 0.1 s with a part of its weight, by the analytic or the QP controller."""
+    robot = judges.load("go2")
+    state, contacts = robot.standing(), fb.Contacts.points(robot)
+    program = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
+    chosen = controller_of("go2") if controller == "analytic" else program
+    push = fb.Push(np.array([0.0, weights * robot.weight, 0.0]), start=0.1, duration=0.1)
+    return fb.rollout(fb.Simulation(robot), chosen, 1.0, pushes=[push], control_period=PERIOD)
+
+
+def test_a_light_push_costs_it_nothing() -> None:
+    run = pushed("analytic", 0.2)
+    assert run.outcome == "completed"
+    assert np.min(run.planned[:, 2::3]) > 1.0
+    assert np.linalg.norm(run.com[-1] - run.com[0]) < 1e-3
+
+
+def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls() -> None:
+    """A foot is told to hold on by more than 1 N; MuJoCo's ground never does, and within half a second the robot is down."""
+    run = pushed("analytic", 0.5)
+    asks = np.flatnonzero(run.planned[:, 2::3].min(axis=1) < -1.0)
+    assert run.outcome == "fell"
+    assert run.time[-1] < 0.6
+    assert len(asks) > 0
+    assert 0.1 < run.time[asks[0]] < 0.2, "the plan pulls while the push still acts, before the fall"
+    assert run.measured[:, 2::3].min() >= 0.0
+
+
+def test_from_then_on_planned_and_measured_forces_have_nothing_to_do_with_each_other() -> None:
+    run, weight = pushed("analytic", 0.5), judges.load("go2").weight
+    gap = np.abs(run.planned - run.measured).max(axis=1) / weight
+    before = run.time < 0.1
+    assert gap[before][10:].max() < 0.05
+    assert gap.max() > 1.0
+
+
+def test_its_torques_then_exceed_what_the_motors_can_give() -> None:
+    run, robot = pushed("analytic", 0.5), judges.load("go2")
+    assert max(robot.torque_violation(tau) for tau in run.tau[run.time < 0.1]) < 0.0
+    assert max(robot.torque_violation(tau) for tau in run.tau) > 10.0
+
+
+def test_the_quadratic_program_keeps_every_force_pushing_and_stands_through_the_same_push() -> None:
+    run, robot = pushed("qp", 0.5), judges.load("go2")
+    assert run.outcome == "completed"
+    assert np.min(run.planned[:, 2::3]) > -1e-6
+    assert max(robot.torque_violation(tau) for tau in run.tau) < 1e-6
+    assert np.linalg.norm(run.com[-1] - run.com[0]) < 1e-3
+
+
+# what does not fit -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"com": [0.0, 0.0]}, r"com has shape \(2,\); it must have shape \(3,\)"),
+        ({"kp": -1.0}, "kp is -1; it must be > 0"),
+        ({"kd": 0.0}, "kd is 0; it must be > 0"),
+        ({"alpha": -0.1}, "alpha is -0.1; it must be ≥ 0"),
+        ({"bias_weight": 0.0}, "bias_weight is 0; it must be > 0"),
+        ({"posture": 0.0}, "posture is 0; it must be > 0"),
+        ({"torque": np.nan}, "torque is nan; it must be > 0"),
+        ({"a": np.nan}, "nominal normal force a must be finite"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_named(arguments: dict[str, object], text: str) -> None:
+    robot = judges.load("go2")
+    with pytest.raises(fb.FloatbaseError, match=text):
+        AnalyticController(robot, fb.Contacts.points(robot), robot.standing(), **arguments)
+
+
+def test_a_state_of_another_robot_is_refused() -> None:
+    go2, solo = judges.load("go2"), judges.load("solo12")
+    with pytest.raises(fb.FloatbaseError, match="the state to hold belongs to another robot than go2"):
+        AnalyticController(go2, fb.Contacts.points(go2), solo.standing())

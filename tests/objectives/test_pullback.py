@@ -1,0 +1,302 @@
+"""Costs moved between spaces (15)(18)(19), against direct minimisation by cvxpy over all of (q̈, τ, λ)."""
+
+from __future__ import annotations
+
+import cvxpy as cp
+import judges
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import floatbase as fb
+from floatbase.affine import Affine, Quadratic
+from floatbase.dynamics import EquationsOfMotion, subspace
+from floatbase.dynamics.constraints import fixed_frame
+from floatbase.objectives import pullback
+
+Array = npt.NDArray[np.float64]
+BLOCKS = ("qdd", "tau", "forces")
+TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
+
+
+def eom_of(name: str, feet: int, seed: int | None = None) -> EquationsOfMotion:
+    """A robot at rest on its first feet, standing or at random."""
+    robot = judges.load(name)
+    contacts = judges.stance(robot)
+    state = robot.standing() if seed is None else robot.random_state(seed).at(v=np.zeros(robot.nv))
+    return fb.equations_of_motion(state, contacts.only(*contacts.names[:feet]))
+
+
+def sizes(eom: EquationsOfMotion) -> dict[str, int]:
+    return {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}
+
+
+def costs(eom: EquationsOfMotion, seed: int = 0) -> dict[str, tuple[Array, Array]]:
+    """A residual (A, r) on each block, random, square and well conditioned."""
+    rng = np.random.default_rng(seed)
+    weight = {"qdd": 1.0, "tau": 0.3, "forces": 0.1}
+    found = {}
+    for block, n in sizes(eom).items():
+        Q = np.linalg.qr(rng.normal(size=(n, n)))[0] * rng.uniform(0.5, 2.0, n)
+        found[block] = (weight[block] * Q, 5.0 * weight[block] * rng.normal(size=n))
+    return found
+
+
+def as_quadratics(residuals: dict[str, tuple[Array, Array]]) -> dict[str, Quadratic]:
+    return {block: Quadratic.from_residual(A, r) for block, (A, r) in residuals.items()}
+
+
+def by_cvxpy(eom: EquationsOfMotion, residuals: dict[str, tuple[Array, Array]], fixed: dict[str, Array] | None = None) -> float:
+    """The smallest sum of ½‖A x - r‖² over all (q̈, τ, λ) with (7), some blocks held: written around a point of (7)."""
+    parts = {block: cp.Variable(n) for block, n in sizes(eom).items()}
+    qdd, tau, forces = (parts[block] for block in BLOCKS)
+    constraints = [eom.M @ qdd + eom.h == eom.S @ tau + eom.J.T @ forces]
+    rows = np.linalg.svd(eom.A)  # dependent rows, when J loses rank, make interior points stumble: keep the independent
+    r = int(np.sum(rows[1] > 1e-9 * rows[1][0]))
+    constraints.append(rows[2][:r] @ qdd == (rows[0].T @ eom.b)[:r] / rows[1][:r])
+    for block, value in (fixed or {}).items():
+        # a value in the block's range fixes it; its independent coordinates are enough
+        V = subspace.feasible_space(eom).map[block].A
+        U, s, _ = np.linalg.svd(V)
+        U = U[:, : int(np.sum(s > 1e-9))]
+        constraints.append(U.T @ parts[block] == U.T @ value)
+    objective = sum(0.5 * cp.sum_squares(A @ parts[block] - b) for block, (A, b) in residuals.items())
+    problem = cp.Problem(cp.Minimize(objective), constraints)
+    problem.solve(**TIGHT)
+    assert problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
+    return float(problem.value)
+
+
+# (15)(18) ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(name: str) -> None:
+    """(15) at random torques, the acceleration by one solve of the whole system."""
+    rng = np.random.default_rng(0)
+    for seed in (None, 0):
+        eom = eom_of(name, 4, seed)
+        cost = Quadratic.from_residual(*costs(eom)["qdd"])
+        seen = pullback.cost_on_torques(cost, eom)
+        for _ in range(5):
+            tau = rng.normal(size=eom.d)
+            kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
+            qdd = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b]), rcond=1e-11)[0][: eom.nv]
+            assert seen(tau) == pytest.approx(cost(qdd), rel=1e-7)
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_a_cost_pulled_back_to_the_torques_has_the_minimum_that_cvxpy_finds_over_everything(name: str) -> None:
+    eom = eom_of(name, 4)
+    residuals = {"qdd": costs(eom)["qdd"]}
+    seen = pullback.cost_on_torques(as_quadratics(residuals)["qdd"], eom)
+    assert seen(seen.minimiser()) == pytest.approx(by_cvxpy(eom, residuals), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+@pytest.mark.parametrize("feet", [1, 4])
+def test_costs_on_all_three_pulled_back_to_beta_have_the_minimum_that_cvxpy_finds(name: str, feet: int) -> None:
+    """(18): q̈, τ and λ weighed at once."""
+    eom = eom_of(name, feet)
+    residuals = costs(eom)
+    space = subspace.feasible_space(eom)
+    seen = pullback.cost_on_space(space, **as_quadratics(residuals))
+    beta = seen.minimiser()
+    assert seen(beta) == pytest.approx(by_cvxpy(eom, residuals), rel=1e-6)
+    assert sum(Quadratic.from_residual(*residuals[b])(x) for b, x in zip(BLOCKS, space(beta), strict=True)) == pytest.approx(
+        seen(beta), rel=1e-9
+    )
+
+
+def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
+    eom = eom_of("go2", 3)
+    space, parts = subspace.feasible_space(eom), as_quadratics(costs(eom))
+    beta = np.random.default_rng(0).normal(size=space.dimension)
+    values = {b: pullback.cost_on_space(space, **{b: parts[b]})(beta) for b in BLOCKS}
+    for block, x in zip(BLOCKS, space(beta), strict=True):
+        assert values[block] == pytest.approx(parts[block](x), rel=1e-10)
+    assert pullback.cost_on_space(space, **parts)(beta) == pytest.approx(sum(values.values()), rel=1e-10)
+    assert pullback.cost_on_space(space)(beta) == 0.0
+
+
+def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
+    """(18) for Q(q̈, τ, λ) that is no sum: joint power τᵀ q̇ has none, but (τ - K q̈)² does."""
+    eom = eom_of("go2", 2)
+    space = subspace.feasible_space(eom)
+    rng = np.random.default_rng(0)
+    A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
+    seen = pullback.pullback(Quadratic.from_residual(A, r), space.map)
+    beta = rng.normal(size=space.dimension)
+    assert seen(beta) == pytest.approx(0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10)
+
+
+def test_a_pullback_of_a_pullback_is_the_pullback_by_the_composed_map() -> None:
+    rng = np.random.default_rng(1)
+    cost = Quadratic.from_residual(rng.normal(size=(7, 5)), rng.normal(size=7))
+    f, g = Affine(rng.normal(size=(5, 4)), rng.normal(size=5)), Affine(rng.normal(size=(4, 3)), rng.normal(size=4))
+    twice, once = cost.pullback(f).pullback(g), cost.pullback(f @ g)
+    assert np.allclose(twice.H, once.H)
+    assert np.allclose(twice.g, once.g)
+    assert twice.c == pytest.approx(once.c)
+
+
+def test_the_gradient_of_a_pullback_is_the_chain_rule() -> None:
+    eom = eom_of("go2", 4, 0)
+    cost, eta = Quadratic.from_residual(*costs(eom)["qdd"]), subspace.accelerations_from_torques(eom)
+    seen, tau = pullback.cost_on_torques(cost, eom), np.random.default_rng(0).normal(size=12)
+    slope = [(seen(tau + 1e-4 * e) - seen(tau - 1e-4 * e)) / 2e-4 for e in np.eye(12)]
+    assert judges.relative(seen.gradient(tau), slope) < 1e-6
+    assert judges.relative(seen.gradient(tau), eta.A.T @ cost.gradient(eta(tau))) < 1e-10
+
+
+# (19) --------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", judges.FLOATING)
+@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("feet", [1, 2, 4])
+def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name: str, block: str, feet: int) -> None:
+    """Every block, against cvxpy with that block held and everything else free; the literal reading is never below it."""
+    eom = eom_of(name, feet)
+    residuals = costs(eom)
+    space = subspace.feasible_space(eom)
+    cost = pullback.cost_on_space(space, **as_quadratics(residuals))
+    best, smallest = (f(cost, space, block) for f in (pullback.seen_from_best, pullback.seen_from_smallest))
+    rng = np.random.default_rng(0)
+    for seed in range(2):
+        x = space.map[block](3.0 * rng.normal(size=space.dimension))
+        assert best(x) <= smallest(x) * (1 + 1e-9)
+        if seed == 0:
+            assert best(x) == pytest.approx(by_cvxpy(eom, residuals, {block: x}), rel=1e-6)
+        beta = pullback.best_coordinates(cost, space, block)(x)
+        assert np.allclose(space.map[block](beta), x, atol=1e-7 * max(1.0, np.abs(x).max()))
+
+
+@pytest.mark.parametrize("name", judges.BALLS)
+def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(name: str) -> None:
+    """V_q̈ on one foot has full column rank, on four it has not: there the literal reading costs visibly more."""
+    for feet, agree in ((1, True), (4, False)):
+        eom = eom_of(name, feet, 0)
+        space, found = subspace.feasible_space(eom), subspace.dimensions(eom)
+        assert (found.rank_V_qdd == found.null_B) == agree
+        cost = pullback.cost_on_space(space, **as_quadratics(costs(eom)))
+        best, smallest = (f(cost, space, "qdd") for f in (pullback.seen_from_best, pullback.seen_from_smallest))
+        rng = np.random.default_rng(0)
+        for _ in range(4):
+            x = space.qdd(rng.normal(size=space.dimension))
+            assert (smallest(x) == pytest.approx(best(x), rel=1e-7)) == agree
+
+
+def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19() -> None:
+    """go2, cost = friction squared and a little torque: the smallest β leaves friction in that the best β squeezes out."""
+    eom = eom_of("go2", 4)
+    space = subspace.feasible_space(eom)
+    sideways = np.kron(np.eye(4), np.diag([1.0, 1.0, 0.0]))
+    cost = pullback.cost_on_space(
+        space,
+        tau=Quadratic.from_residual(np.eye(12), np.zeros(12), 1e-3),
+        forces=Quadratic.from_residual(sideways, np.zeros(12)),
+    )
+    still = np.zeros(18)
+    smallest, best = (f(cost, space, "qdd")(still) for f in (pullback.seen_from_smallest, pullback.seen_from_best))
+    wanted = by_cvxpy(
+        eom, {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))}, {"qdd": still}
+    )
+    assert best == pytest.approx(wanted, rel=1e-6)
+    assert smallest / best == pytest.approx(29.0, abs=0.5)
+
+
+def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
+    """go2 bolted with its feet on the ground: V_q̈ = 0 but for rounding, so q̈ must not be turned into β by 1 / rounding."""
+    robot = judges.load("go2")
+    contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
+    eom = fb.equations_of_motion(robot.standing(), contacts)
+    space = subspace.feasible_space(eom)
+    assert np.max(np.abs(space.qdd.A)) < 1e-10
+    assert np.max(np.abs(pullback.smallest_coordinates(space, "qdd").A)) < 1e6
+    cost = pullback.cost_on_space(space, tau=Quadratic.from_residual(np.eye(12), np.zeros(12)))
+    least = cost(cost.minimiser())  # q̈ leaves everything free
+    assert pullback.seen_from_best(cost, space, "qdd")(np.zeros(18)) == pytest.approx(least, abs=1e-6)
+
+
+def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
+    """A reward for internal force has no least cost: said, not returned."""
+    eom = eom_of("go2", 4)
+    space = subspace.feasible_space(eom)
+    squeeze = subspace.internal_forces(eom)[:, 0]
+    reward = pullback.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
+    for call in (pullback.seen_from_best, pullback.best_coordinates):
+        with pytest.raises(fb.FloatbaseError, match="falls for ever along a direction that it should be minimised over"):
+            call(reward, space, "qdd")
+    assert np.isfinite(pullback.seen_from_smallest(reward, space, "qdd")(np.zeros(18)))
+
+
+def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
+    """Negative curvature has no minimum either: the stationary point there is the worst, not the best."""
+    eom = eom_of("go2", 4)
+    space = subspace.feasible_space(eom)
+    hill = pullback.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
+    with pytest.raises(fb.FloatbaseError):
+        pullback.seen_from_best(hill, space, "qdd")
+
+
+def test_directions_that_cost_nothing_are_left_alone() -> None:
+    eom = eom_of("go2", 4)
+    space = subspace.feasible_space(eom)
+    free = Quadratic.zero(space.dimension)
+    x = space.qdd(np.ones(space.dimension))
+    smallest = pullback.smallest_coordinates(space, "qdd")(x)
+    assert np.allclose(pullback.best_coordinates(free, space, "qdd")(x), smallest)
+
+
+def test_weights_eight_orders_apart_do_not_blind_the_best_reading() -> None:
+    """A force cost of 1e-8 beside a torque cost of 1 still decides where the torque cost is silent.
+
+    solo8 on four feet: null(Jᵀ) changes forces alone, so the torque cost leaves it to the small weight.
+    """
+    eom = eom_of("solo8", 4)
+    space = subspace.feasible_space(eom)
+    wanted = np.arange(12.0)
+    for weight in (1e-2, 1e-5, 1e-8):
+        cost = pullback.cost_on_space(
+            space,
+            tau=Quadratic.from_residual(np.eye(8), np.zeros(8)),
+            forces=Quadratic.from_residual(np.eye(12), wanted, weight),
+        )
+        beta = pullback.best_coordinates(cost, space, "qdd")(np.zeros(14))
+        N = subspace.undetermined_forces(eom)
+        assert np.allclose(N.T @ (space.forces(beta) - wanted), 0.0, atol=1e-3), weight
+
+
+def test_minimising_on_a_subspace_is_what_cvxpy_finds_there() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        A, r = rng.normal(size=(9, 7)), rng.normal(size=9)
+        line = Affine(rng.normal(size=(7, 3)), rng.normal(size=7))
+        x, beta = cp.Variable(7), cp.Variable(3)
+        cp.Problem(cp.Minimize(cp.sum_squares(A @ x - r)), [x == line.A @ beta + line.b]).solve(**TIGHT)
+        assert np.allclose(pullback.minimise_on(Quadratic.from_residual(A, r), line), x.value, atol=1e-6)
+
+
+def test_minimised_over_a_span_is_the_schur_complement() -> None:
+    """Keep x1, minimise over x2: H11 - H12 H22⁻¹ H21."""
+    rng = np.random.default_rng(2)
+    A = rng.normal(size=(9, 6))
+    cost, N = Quadratic.from_residual(A, rng.normal(size=9)), np.eye(6)[:, 4:]
+    seen = cost.pullback(pullback.minimised_over(cost, N))
+    H = cost.H
+    assert np.allclose(seen.H[:4, :4], H[:4, :4] - H[:4, 4:] @ np.linalg.solve(H[4:, 4:], H[4:, :4]), atol=1e-10)
+    assert np.allclose(seen.H[4:], 0.0, atol=1e-10)
+    assert pullback.minimised_over(cost, np.zeros((6, 0))).n_in == 6
+
+
+def test_a_block_that_does_not_exist_is_named() -> None:
+    space = subspace.feasible_space(eom_of("go2", 4))
+    with pytest.raises(fb.FloatbaseError, match=r"no block 'lambda'; its blocks are \['qdd', 'tau', 'forces'\]"):
+        pullback.seen_from_best(Quadratic.zero(12), space, "lambda")
+
+
+def test_a_cost_of_another_size_is_refused() -> None:
+    eom = eom_of("go2", 4)
+    with pytest.raises(fb.FloatbaseError, match="the map gives 18 numbers, the cost takes 12"):
+        pullback.cost_on_torques(Quadratic.zero(12), eom)
