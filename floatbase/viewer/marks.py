@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from floatbase.viewer import geometry, three
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
-from floatbase.viewer.shapes import Item, Picture, arrow, label, placed
+from floatbase.viewer.shapes import Item, Picture, arrow, flat_polygon, label, placed
 from floatbase.viewer.three import Shape
 
 
@@ -52,8 +52,8 @@ def support_region(positions: npt.ArrayLike, height: float) -> Picture:
         corners = points[:0]
     if not len(corners):
         return {}
-    key = tuple((round(float(x), 3), round(float(y), 3)) for x, y in corners)
-    return {"": Item(_region(key), placed([0.0, 0.0, height]))}
+    flat = np.hstack([np.round(corners, 3), np.zeros((len(corners), 1))])
+    return {"": Item(flat_polygon(flat, CALM, 0.22), placed([0.0, 0.0, height]))}
 
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
@@ -76,12 +76,6 @@ def _unit_curl(colour: RGB) -> Shape:
     along = np.array([-at[1], at[0], 0.0])
     turned = head @ geometry.frame_along(along).T + at
     return three.mesh(*geometry.merged([ring, (turned, faces)]), colour)
-
-
-@lru_cache(maxsize=256)
-def _region(corners: tuple[tuple[float, float], ...]) -> Shape:
-    flat = np.array([(x, y, 0.0) for x, y in corners])
-    return three.mesh(*geometry.fan(flat), CALM, opacity=0.22, lit=False)
 
 
 @lru_cache(maxsize=1)

@@ -77,7 +77,7 @@ class Painter:
         """Everything that was asked for, as path -> item; the arguments are those of `Viewer.show`."""
         self._check_state(state)
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
-        picture = {"ground": self._ground} | self._robot(state, "robot", self._shapes)
+        picture = self.stage() | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
             picture |= self._contacts(state, contacts, both, cones)
             if support:
@@ -99,6 +99,10 @@ class Painter:
         if any(path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench") for path in picture):
             picture |= self._scale_bar
         return picture | dict(extra or {})
+
+    def stage(self) -> Picture:
+        """The ground alone."""
+        return {"ground": self._ground}
 
     @cached_property
     def home(self) -> State:

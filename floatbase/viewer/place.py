@@ -6,7 +6,7 @@ import os
 import sys
 
 # set by JupyterHub and Binder, Codespaces, VS Code on another machine, Deepnote, Kaggle, SageMaker, and by ssh
-_SIGNS = (
+SIGNS = (
     "JUPYTERHUB_USER", "JUPYTERHUB_SERVICE_PREFIX", "BINDER_LAUNCH_HOST", "CODESPACES", "VSCODE_IPC_HOOK_CLI",
     "REMOTE_CONTAINERS", "DEEPNOTE_PROJECT_ID", "KAGGLE_KERNEL_RUN_TYPE", "SAGEMAKER_INTERNAL_IMAGE_URI", "COLAB_RELEASE_TAG",
     "SSH_CONNECTION",
@@ -21,4 +21,4 @@ def kernel_is_remote() -> bool:
     asked = os.environ.get("FLOATBASE_VIEWER", "")
     if asked in ("live", "static"):
         return asked == "static"
-    return "google.colab" in sys.modules or any(os.environ.get(sign) for sign in _SIGNS)
+    return "google.colab" in sys.modules or any(os.environ.get(sign) for sign in SIGNS)

@@ -69,7 +69,7 @@ class Viewer:
             raise InputError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}.")
         if facets is not None:
             FrictionPolyhedron(np.array(UP), 1.0, facets)  # says what is wrong with the number
-        self.robot = robot
+        self.robot, self.background = robot, background
         self.height = int(positive("height", height, "pixels"))
         asked = None if scale is None else positive("scale", scale, "m/N")
         lines, text = BACKGROUNDS[background][2:]

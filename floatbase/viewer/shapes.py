@@ -120,6 +120,16 @@ def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float,
     return picture | {"/label": label(text_at, f"{force:g} N", 0.055 * size, colour)}
 
 
+def rod(start: npt.ArrayLike, turned: npt.ArrayLike, length: float, radius: float, colour: RGB) -> Item:
+    """A rod from `start` along the z axis of the rotation `turned`, shape (3, 3), m, world."""
+    return Item(_unit_rod(colour), placed(start, turned, (radius, radius, length)))
+
+
+def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
+    """A flat convex polygon with corners, shape (n, 3), m, seen from both sides."""
+    return _polygon(tuple(tuple(float(x) for x in corner) for corner in np.asarray(corners)), colour, opacity)
+
+
 def ground(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
     """Lines on the ground z = 0 every `step` m."""
     return Item(_grid(colour, step, half), np.eye(4))
@@ -178,6 +188,11 @@ def _facet(mu: float, facets: int, inside: bool, facet: int) -> Shape:
 @lru_cache(maxsize=256)
 def _label(text: str, height: float, plate: bool, colour: RGB) -> Shape:
     return three.label(text, height, plate, colour)
+
+
+@lru_cache(maxsize=256)
+def _polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float) -> Shape:
+    return three.mesh(*geometry.fan(corners), colour, opacity=opacity, lit=False)
 
 
 @lru_cache(maxsize=8)

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import umsgpack
-from PIL import Image, ImageDraw, ImageFont
 
 from floatbase.viewer.colours import RGB
+from floatbase.viewer.text import LETTER, text_picture
 
 _EXT = {"Uint8Array": 0x12, "Int16Array": 0x13, "Uint16Array": 0x14, "Uint32Array": 0x16, "Float32Array": 0x17}
 _TYPES = {"Uint8Array": "u1", "Int16Array": "<i2", "Uint16Array": "<u2", "Uint32Array": "<u4", "Float32Array": "<f4"}
@@ -104,8 +104,8 @@ def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
 
 
 def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.13, 0.13)) -> Shape:
-    """Text that faces the reader, its letters `height` m high: a picture on a sprite."""
-    picture = _text_picture(text, plate, colour)
+    """Text that faces the reader, its letters `height` m high: a picture on a sprite. Braces lower a part: "f{c}"."""
+    picture = text_picture(text, plate, colour)
     tall, wide = picture.shape[:2]
     image = {"type": "Uint8Array", "width": wide, "height": tall, "data": umsgpack.Ext(0x12, picture[::-1].tobytes())}
     material = {"type": "SpriteMaterial", "map": "texture", "transparent": True, "depthTest": False, "depthWrite": False}
@@ -114,26 +114,7 @@ def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.1
     # 1025: two bytes a pixel, grey and alpha; 1006: smooth when scaled
     texture = {"uuid": "texture", "image": "image", "format": 1025, "minFilter": 1006, "magFilter": 1006}
     lowered["textures"] = [texture | {"generateMipmaps": False}]
-    size = height / _LETTER
+    size = height / LETTER
     lowered["object"]["matrix"] = [float(x) for x in np.diag([wide * size, tall * size, 1.0, 1.0]).ravel()]
     lowered["object"]["renderOrder"] = 10
     return Shape(lowered, text)
-
-
-_LETTER = 28  # pixels
-
-
-def _text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
-    """Grey and alpha of the text, shape (height, width, 2)."""
-    font = ImageFont.load_default(_LETTER)
-    probe = ImageDraw.Draw(Image.new("L", (1, 1)))
-    left, top, right, bottom = (int(x) for x in probe.multiline_textbbox((0, 0), text, font=font))
-    margin = 10
-    picture = Image.new("LA", (right - left + 2 * margin, bottom - top + 2 * margin), (255, 0))
-    draw = ImageDraw.Draw(picture)
-    grey = round(255 * sum(colour) / 3)
-    if plate:
-        box = (0, 0, picture.width - 1, picture.height - 1)
-        draw.rounded_rectangle(box, 10, fill=(255 if grey < 128 else 30, 215))
-    draw.multiline_text((margin - left, margin - top), text, font=font, fill=(grey, 255))
-    return np.asarray(picture)

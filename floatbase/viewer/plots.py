@@ -1,0 +1,108 @@
+"""Curves of a record, in the colours of the scene: centre of mass, forces against their cones, torques against limits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from floatbase._arrays import Array
+from floatbase.viewer.colours import ALARM, COM, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
+
+if TYPE_CHECKING:
+    from floatbase.simulation.rollout import Rollout
+
+
+def plot(rollout: Rollout) -> Figure:
+    """Centre of mass, friction used and torques used, one below the other."""
+    figure, axes = plt.subplots(3, 1, figsize=(8, 8), sharex=True, layout="constrained")
+    plot_com(rollout, axes[0])
+    plot_friction(rollout, axes[1])
+    plot_torques(rollout, axes[2])
+    axes[0].set_title(f"{rollout.robot.name}: {rollout.outcome}")
+    for axis in axes[:-1]:
+        axis.set_xlabel("")
+    return figure
+
+
+def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
+    """How far the centre of mass has moved since the start, mm, in x, y and z."""
+    axis = _axis(axis)
+    moved = 1000.0 * (rollout.com - rollout.com[0])
+    for column, name, colour in zip(moved.T, "xyz", (X_AXIS, Y_AXIS, Z_AXIS), strict=True):
+        axis.plot(rollout.time, column, color=colour, label=name)
+    return _finished(axis, rollout, "centre of mass moved [mm]")
+
+
+def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
+    """Normal force at every contact point, N: measured, planned as a wider line behind it."""
+    axis = _axis(axis)
+    for i, (planned, measured) in enumerate(
+        zip(_normal(rollout, rollout.planned), _normal(rollout, rollout.measured), strict=True)
+    ):
+        axis.plot(rollout.time, planned, color=PLANNED, linewidth=3.5, alpha=0.6, label="" if i else "planned")
+        axis.plot(rollout.time, measured, color=MEASURED, linewidth=1.2, label="" if i else "measured")
+    return _finished(axis, rollout, "normal forces [N]")
+
+
+def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
+    """(28) Share of the friction that every contact uses: ‖f_tangent‖ / (μ f_normal); beyond 1 the force is outside the cone.
+
+    Points that carry less than a hundredth of the weight have no meaningful share and are left out.
+    """
+    axis = _axis(axis)
+    for forces, colour, name, width in (
+        (rollout.planned, PLANNED, "planned", 3.5),
+        (rollout.measured, MEASURED, "measured", 1.2),
+    ):
+        for i, share in enumerate(friction_used(rollout, forces)):
+            axis.plot(rollout.time, share, color=colour, linewidth=width, alpha=0.7, label="" if i else name)
+    axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
+    return _finished(axis, rollout, "friction used, of μ · normal force")
+
+
+def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
+    """Torque at every joint as a share of its limit; joints without a limit are left out."""
+    axis = _axis(axis)
+    limited = np.isfinite(rollout.robot.torque_limits)
+    share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
+    axis.plot(rollout.time, share, color=COM, linewidth=0.8, alpha=0.7)
+    for limit in (-1.0, 1.0):
+        axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else "")
+    return _finished(axis, rollout, "torques, of their limits")
+
+
+def friction_used(rollout: Rollout, forces: Array) -> Array:
+    """‖f_tangent‖ / (μ f_normal) at each point through time, shape (k/3, n), NaN where little is carried; forces (n, k), N."""
+    f = np.reshape(forces, (len(rollout.time), -1, 3))
+    normals, mus = rollout.contacts.normals, rollout.contacts.mus
+    push = np.einsum("nij,ij->ni", f, normals)
+    slide = np.linalg.norm(f - push[:, :, None] * normals, axis=2)
+    carried = push > 0.01 * rollout.robot.weight
+    share = np.full_like(push, np.nan)
+    np.divide(slide, mus * push, out=share, where=carried)
+    return np.asarray(share.T)
+
+
+def _normal(rollout: Rollout, forces: Array) -> Array:
+    """Normal force at each point through time, shape (k/3, n), N."""
+    f = np.reshape(forces, (len(rollout.time), -1, 3))
+    return np.asarray(np.einsum("nij,ij->in", f, rollout.contacts.normals))
+
+
+def _axis(axis: Axes | None) -> Axes:
+    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else axis
+
+
+def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:
+    """Labels, legend, and when the robot was pushed."""
+    for i, push in enumerate(rollout.pushes):
+        axis.axvspan(push.start, push.start + push.duration, color=PUSH, alpha=0.12, label="" if i else "push")
+    axis.set(xlabel="time [s]", ylabel=label)
+    axis.grid(alpha=0.25)
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc="upper right", fontsize="small")
+    return axis

@@ -1,0 +1,49 @@
+"""Text as a picture: what labels in the scene are made of."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
+
+from floatbase.viewer.colours import RGB
+
+LETTER = 28  # pixels
+_LOWERED = 0.68  # size of a subscript
+
+
+def text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
+    """Grey and alpha of a line of text, shape (height, width, 2); braces lower a part: "f{c}". plate: behind the text."""
+    # re.split with a group gives plain and lowered parts in turn
+    parts = [(part, i % 2 == 1) for i, part in enumerate(re.split(r"\{([^}]*)\}", text)) if part]
+    widths = [_font(lowered).getlength(part) for part, lowered in parts]
+    margin = LETTER // 3
+    size = (round(sum(widths)) + 2 * margin, round(1.3 * LETTER) + 2 * margin)
+    picture = Image.new("LA", size, (255, 0))
+    draw = ImageDraw.Draw(picture)
+    grey = round(255 * sum(colour) / 3)
+    if plate:
+        draw.rounded_rectangle((0, 0, size[0] - 1, size[1] - 1), margin, fill=(255 if grey < 128 else 30, 215))
+    x = float(margin)
+    for (part, lowered), width in zip(parts, widths, strict=True):
+        base = margin + LETTER + (0.25 * LETTER if lowered else 0.0)
+        draw.text((x, base), part, font=_font(lowered), fill=(grey, 255), anchor="ls")
+        x += width
+    return np.asarray(picture)
+
+
+@cache
+def _font(lowered: bool) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """matplotlib's DejaVu Sans, which has Greek and mathematics; Pillow's own letters without it."""
+    size = LETTER * (_LOWERED if lowered else 1.0)
+    spec = find_spec("matplotlib")
+    if spec is not None and spec.submodule_search_locations:
+        font = Path(spec.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
+        if font.is_file():
+            return ImageFont.truetype(str(font), size)
+    return ImageFont.load_default(size)

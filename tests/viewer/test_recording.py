@@ -1,0 +1,243 @@
+"""Recordings, saved files and plots, from a record made by hand: no physics needed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+import umsgpack
+
+from floatbase.dynamics.contacts import Contacts
+from floatbase.errors import InputError, ViewerError
+from floatbase.robots import Robot, State, load, robots
+from floatbase.simulation.physics import Push
+from floatbase.simulation.rollout import Rollout
+from floatbase.viewer import place, recording
+from floatbase.viewer.colours import CONE, MEASURED
+from floatbase.viewer.scene import Viewer
+
+from .conftest import SCREENSHOTS
+from .looks import picture, settle
+
+matplotlib.use("agg")
+
+
+def record(robot: Robot, duration: float = 2.0, walk: float = 0.0) -> Rollout:
+    """The robot sways and leans harder on its front left foot, at 1 kHz; that foot slips in the middle and is pushed."""
+    state, contacts = robot.standing(), Contacts.points(robot, mu=0.6)
+    time = np.arange(0.0, duration, 1e-3)
+    q = np.tile(state.q, (time.size, 1))
+    q[:, 1] += 0.03 * np.sin(2 * np.pi * time)
+    q[:, 0] += walk * time
+    forces = np.zeros((time.size, contacts.n_points, 3))
+    forces[:, :, 2] = robot.weight / contacts.n_points
+    forces[:, 0, 2] *= 1 + 0.5 * np.sin(2 * np.pi * time)
+    slips = (time > 0.8) & (time < 1.2)
+    forces[slips, 0, 0] = 0.9 * forces[slips, 0, 2]
+    forces[time > 1.5, -1] = 0.0
+    flat = forces.reshape(time.size, contacts.k)
+    zeros = np.zeros((time.size, robot.d))
+    feet = np.tile(contacts.positions(state), (time.size, 1, 1))
+    return Rollout(
+        robot, contacts, time, q, np.zeros((time.size, robot.nv)), zeros, zeros, flat, flat, feet,
+        (Push([0.0, 30.0, 0.0], start=0.3, duration=0.2),), "completed",
+    )  # fmt: skip
+
+
+def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]:
+    """Times and values of every track in the scene."""
+    found = {}
+    for clip in viewer.window.scene.commands()["/", "set_animation", ""]["animations"]:
+        for track in clip["clip"]["tracks"]:
+            times, values = (numbers(track[name]) for name in ("times", "values"))
+            found[clip["path"].removeprefix("/meshcat/"), track["name"]] = (times, values.reshape(times.size, -1))
+    return found
+
+
+def numbers(packed: umsgpack.Ext | list[float]) -> np.ndarray:
+    return np.frombuffer(packed.data, "<f4") if isinstance(packed, umsgpack.Ext) else np.array(packed)
+
+
+def test_a_record_is_thinned_to_thirty_pictures_a_second() -> None:
+    rows = recording.thinned(np.arange(0.0, 2.0, 1e-3), 30.0)
+    assert rows[0] == 0 and rows[-1] == 1999
+    assert 60 <= rows.size <= 62
+    assert list(recording.thinned([0.0], 30.0)) == [0]
+
+
+def test_the_robot_and_its_forces_move_as_recorded(viewer: Viewer, go2: Robot) -> None:
+    rollout = record(go2)
+    viewer.play(rollout)
+    moving = tracks(viewer)
+    times, positions = moving["robot/root_joint", ".position"]
+    rows = np.round(times / 1e-3).astype(int)
+    np.testing.assert_allclose(positions, rollout.q[rows, :3], atol=1e-5)
+    _, scales = moving["measured/FL_foot", ".scale"]
+    np.testing.assert_allclose(scales[:, 2], viewer.scale * np.linalg.norm(rollout.measured[rows, :3], axis=1), rtol=1e-4)
+    assert times[-1] == pytest.approx(rollout.time[-1])
+
+
+def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hidden(viewer: Viewer, go2: Robot) -> None:
+    viewer.play(record(go2))
+    moving = tracks(viewer)
+    times, colours = moving["cone/FL_foot/surface", "shape.material.color"]
+    slips = (times > 0.8) & (times < 1.2)
+    np.testing.assert_allclose(colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6)
+    np.testing.assert_allclose(colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6)
+    times, visible = moving["measured/RR_foot", ".visible"]
+    np.testing.assert_array_equal(visible[:, 0], times <= 1.5)
+    times, pushed = moving["push", ".visible"]
+    np.testing.assert_array_equal(pushed[:, 0], (times >= 0.3 - 1e-6) & (times < 0.5 - 1e-6))
+
+
+def test_quaternions_do_not_jump(go2: Robot, viewer: Viewer) -> None:
+    rollout = record(go2)
+    angle = 4 * np.pi * rollout.time / rollout.time[-1]
+    rollout.q.flags.writeable = True
+    rollout.q[:, 3:7] = np.stack([0 * angle, 0 * angle, np.sin(angle / 2), np.cos(angle / 2)], axis=1)
+    viewer.play(rollout)
+    _, quaternions = tracks(viewer)["robot/root_joint", ".quaternion"]
+    assert np.abs(np.diff(quaternions, axis=0)).max() < 0.2
+
+
+def test_facets_that_light_up_become_tracks(go2: Robot) -> None:
+    viewer = Viewer(go2, facets=4)
+    viewer.play(record(go2))
+    lit = {path for path, name in tracks(viewer) if "facet" in path and name == ".visible"}
+    assert lit == {"cone/FL_foot/facet 0"}
+    viewer.close()
+
+
+def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(viewer: Viewer, go2: Robot, standing: State) -> None:
+    viewer.show(standing)
+    before = {key: value for key, value in viewer.window.scene.commands().items() if key[0].startswith("/meshcat")}
+    viewer.play(record(go2))
+    viewer.show(standing)
+    after = viewer.window.scene.commands()
+    assert after["/", "set_animation", ""]["animations"] == []
+    assert {key: value for key, value in after.items() if key[0].startswith("/meshcat")} == before
+
+
+@pytest.mark.parametrize("name", robots())
+def test_every_robot_saves_to_less_than_a_megabyte(name: str, tmp_path: Path) -> None:
+    viewer = Viewer(load(name))
+    viewer.show(viewer.robot.standing())
+    saved = viewer.save(tmp_path / "still.html")
+    assert saved.stat().st_size < 1_000_000
+    assert not re.search(r"(src|href)=\"(?!data:)", saved.read_text())
+    viewer.close()
+
+
+def test_ten_seconds_with_forces_are_less_than_two_megabytes(viewer: Viewer, go2: Robot, tmp_path: Path) -> None:
+    viewer.play(record(go2, duration=10.0))
+    assert viewer.save(tmp_path / "moving.html").stat().st_size < 2_000_000
+
+
+def test_wrong_records_and_file_names_are_explained(viewer: Viewer, go2: Robot, standing: State, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="this viewer shows go2, but the record is one of solo12"):
+        viewer.play(record(load("solo12")))
+    with pytest.raises(InputError, match="record has no rows"):
+        viewer.play(record(go2, duration=0.0))
+    with pytest.raises(InputError, match="speed is 0; it must be > 0"):
+        viewer.play(record(go2), speed=0)
+    viewer.show(standing)
+    with pytest.raises(ViewerError, match=r"cannot save 'x.png': .* end the name in .html"):
+        viewer.save(tmp_path / "x.png")
+    with pytest.raises(ViewerError, match="cannot write .* choose a folder that exists"):
+        viewer.save(tmp_path / "nowhere" / "x.html")
+
+
+@pytest.mark.parametrize("sign", ["JUPYTERHUB_USER", "CODESPACES", "COLAB_RELEASE_TAG", "SSH_CONNECTION"])
+def test_a_remote_kernel_shows_the_scene_itself(
+    viewer: Viewer, standing: State, monkeypatch: pytest.MonkeyPatch, sign: str
+) -> None:
+    for name in place.SIGNS:
+        monkeypatch.delenv(name, raising=False)
+    viewer.show(standing)
+    assert f'src="{viewer.url}"' in viewer._repr_html_()
+    monkeypatch.setenv(sign, "yes")
+    shown = viewer._repr_html_()
+    assert "srcdoc=" in shown and viewer.url not in shown
+    monkeypatch.setenv("FLOATBASE_VIEWER", "live")
+    assert f'src="{viewer.url}"' in viewer._repr_html_()
+
+
+def test_a_saved_animation_plays_from_disk_without_network(page, viewer: Viewer, go2: Robot, tmp_path: Path) -> None:
+    rollout = record(go2)
+    viewer.play(rollout, paused=True, title="saved")
+    viewer.close()
+    saved = tmp_path / "moving.html"
+    saved.write_text(viewer.static_html())
+    page.context.set_offline(True)
+    frame = tmp_path / "frame.html"
+    frame.write_text('<iframe src="moving.html" style="width: 100%; height: 95vh"></iframe>')
+    for address in (saved, frame):
+        page.goto(address.as_uri())
+        inside = page.frames[-1]
+        inside.wait_for_function("window.viewer && viewer.num_messages_received > 0")
+        assert inside.evaluate("viewer.animator.duration") == pytest.approx(rollout.time[-1], abs=1e-3)
+        slider = inside.locator("#player input")
+        slider.evaluate("(node) => { node.value = 0.25; node.dispatchEvent(new Event('input')); }")
+        where = inside.evaluate("viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.toArray()")
+        np.testing.assert_allclose(where, rollout.q[250, :3], atol=1e-3)
+    page.context.set_offline(False)
+    inside.wait_for_function("!viewer.needs_render")
+    picture(page, "saved_animation")
+    inside.locator("#player button").click()
+    inside.wait_for_function("viewer.animator.playing && viewer.animator.time > 0.3")
+    inside.locator("#player select").select_option("0.25")
+    assert inside.evaluate("viewer.animator.mixer.timeScale") == 0.25
+
+
+def test_the_camera_goes_with_the_robot(page, viewer: Viewer, go2: Robot) -> None:
+    page.set_viewport_size({"width": 300, "height": 200})
+    viewer.play(record(go2, walk=1.0), paused=True)
+    page.goto(viewer.url)
+    settle(page, viewer)
+    before = page.evaluate("viewer.controls.target.toArray()")
+    page.evaluate("viewer.animator.seek(1.5)")
+    page.wait_for_function("!viewer.needs_render")
+    after = page.evaluate("viewer.controls.target.toArray()")
+    assert after[0] - before[0] == pytest.approx(1.5, abs=0.01)
+    assert after[1] == before[1]
+
+
+def test_controls_in_the_page_call_back(page, viewer: Viewer, standing: State) -> None:
+    heard: list[object] = []
+    viewer.show(standing)
+    viewer.slider("friction", heard.append, 0.6, 0.1, 1.5)
+    viewer.button("push", lambda: heard.append("pushed"))
+    page.goto(viewer.url)
+    settle(page, viewer)
+    page.evaluate("viewer.gui_controllers['friction'].setValue(0.9)")
+    page.evaluate("viewer.gui_controllers['push'].fire()")
+    for _ in range(100):
+        if len(heard) == 2:
+            break
+        page.wait_for_timeout(20)
+    assert heard == [0.9, "pushed"]
+    assert b"set_control" not in b"".join(viewer.window.scene.lasting())
+
+
+def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
+    from floatbase.viewer import plots
+
+    rollout = record(go2)
+    used = plots.friction_used(rollout, rollout.measured)
+    assert used[0, 1000] == pytest.approx(0.9 / 0.6)
+    assert used[1, 1000] == 0.0
+    assert np.isnan(used[3, -1])
+    figure = plots.plot(rollout)
+    assert [axis.get_ylabel() for axis in figure.axes] == [
+        "centre of mass moved [mm]", "friction used, of μ · normal force", "torques, of their limits"
+    ]  # fmt: skip
+    assert MEASURED in [line.get_color() for line in figure.axes[1].lines]
+    forces = plots.plot_forces(rollout)
+    np.testing.assert_allclose(forces.lines[1].get_ydata(), rollout.measured[:, 2])
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    figure.savefig(SCREENSHOTS / "plots.png")
+    forces.figure.savefig(SCREENSHOTS / "plot_forces.png")
+    matplotlib.pyplot.close("all")

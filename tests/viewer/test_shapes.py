@@ -1,0 +1,203 @@
+"""Marks, props and figures: their numbers, from the items themselves, and their pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from floatbase.dynamics.contacts import Contacts
+from floatbase.robots import Robot, State
+from floatbase.viewer import geometry, marks, props, shapes
+from floatbase.viewer.camera import View
+from floatbase.viewer.canvas import Canvas
+from floatbase.viewer.colours import BACKGROUNDS, CONE, LEGEND, MEASURED, PLANNED
+from floatbase.viewer.cones import cone_status, polyhedron_status
+from floatbase.viewer.figures import FIGURES
+from floatbase.viewer.painter import below, nice
+from floatbase.viewer.scene import Viewer
+from floatbase.viewer.text import text_picture
+from floatbase.viewer.window import Window
+
+from .looks import picture, settle
+
+
+@pytest.mark.parametrize(
+    ("mesh", "volume"),
+    [
+        (geometry.ball(1.0), 4 / 3 * np.pi),
+        (geometry.rod([0, 0, 0], [1, 2, 2], 0.5), 0.75 * np.pi),
+        (geometry.revolved([(0, 0), (1, 0), (1, 1), (0, 1)]), np.pi),
+        (geometry.revolved([(0, 0), (1, 1), (0, 1)]), np.pi / 3),
+    ],
+    ids=["ball", "rod", "cylinder", "cone"],
+)
+def test_closed_meshes_face_outwards_and_hold_their_volume(mesh: geometry.Mesh, volume: float) -> None:
+    vertices, faces = mesh
+    a, b, c = (vertices[faces[:, i]].astype(float) for i in range(3))
+    assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=0.06)
+
+
+@pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (-0.36, 0.48, 0.8)])
+def test_frame_along_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
+    turned = geometry.frame_along(direction)
+    np.testing.assert_allclose(turned[:, 2], direction, atol=1e-12)
+    np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(turned) == pytest.approx(1.0)
+
+
+def test_a_cones_status_changes_at_the_friction_limit() -> None:
+    up = np.array([0.0, 0.0, 1.0])
+    for slide, status in ((0.0, "inside"), (5.8, "inside"), (6.0, "active"), (6.2, "outside")):
+        for angle in np.linspace(0, 2 * np.pi, 7):
+            force = [slide * np.cos(angle), slide * np.sin(angle), 10.0]
+            assert cone_status(force, up, 0.6) == status
+    assert cone_status([0, 0, -1.0], up, 0.6) == "outside"
+
+
+def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it() -> None:
+    from floatbase.control.friction import FrictionPolyhedron
+
+    up, force = np.array([0.0, 0.0, 1.0]), np.array([5.0, 0.0, 10.0])
+    assert cone_status(force, up, 0.6) == "inside"
+    assert polyhedron_status(force, FrictionPolyhedron(up, 0.6, 4, True)) == ("outside", [0])
+    assert polyhedron_status(force, FrictionPolyhedron(up, 0.6, 4, False)) == ("inside", [])
+
+
+def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
+    moment = np.array([0.1, -0.2, 0.2])
+    item = marks.curled_arrow([1.0, 2.0, 3.0], moment)
+    assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
+    np.testing.assert_allclose(item.matrix[:3, 2], moment)
+    assert np.linalg.det(item.matrix[:3, :3]) > 0
+
+
+def test_a_push_ends_where_it_acts() -> None:
+    item = marks.push([1.0, 0.0, 0.5], [0.0, 0.2, 0.0], 1.0)
+    np.testing.assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
+
+
+def test_two_points_have_no_support_region() -> None:
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
+    assert set(marks.support_region(square, 0.0)) == {""}
+    assert marks.support_region(square[:2], 0.0) == {}
+    assert marks.support_region(np.outer(np.arange(4.0), [1.0, 2.0, 0.0]), 0.0) == {}
+
+
+def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
+    # about +y, a quarter turn takes the mark from the top to the front
+    start, quarter = (props.wheel([0, 0, 1], [0, 1, 0], 1.0, angle).matrix[:3, 0] for angle in (0.0, np.pi / 2))
+    np.testing.assert_allclose(start, [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(quarter, [1, 0, 0], atol=1e-12)
+
+
+def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> None:
+    def middle(length: float) -> float:
+        items = props.hydraulic_cylinder([0, 0, 0], [0, 0, length], (0.3, 0.5))
+        rod = items["/rod"].matrix
+        assert rod[2, 3] + rod[2, 2] == pytest.approx(length)
+        assert items["/base chamber"].matrix[2, 2] + items["/rod chamber"].matrix[2, 2] == pytest.approx(0.92 * 0.3)
+        return float(items["/piston"].matrix[2, 3])
+
+    assert middle(0.45) - middle(0.40) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(("value", "wanted"), [(1.0, 1.0), (3.0, 2.0), (3.3, 5.0), (0.0044, 0.005), (800, 1000.0)])
+def test_nice_numbers_are_one_two_or_five(value: float, wanted: float) -> None:
+    assert nice(value) == pytest.approx(wanted)
+
+
+def test_braces_lower_a_part_of_a_label() -> None:
+    plain, lowered = (text_picture(text, False, (0, 0, 0)) for text in ("fc", "f{c}"))
+    assert lowered.shape[1] < plain.shape[1]
+    rows = [np.flatnonzero(image[:, :, 1].any(axis=1)).max() for image in (plain, lowered)]
+    assert rows[1] > rows[0]
+
+
+def _simulated(colour: tuple[float, ...], matrix: np.ndarray) -> np.ndarray:
+    return np.clip(matrix @ np.asarray(colour[:3]), 0, 1)
+
+
+# Machado, Oliveira, Fernandes (2009), severity 1
+DEFICIENCIES = {
+    "protanopia": np.array([[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]]),
+    "deuteranopia": np.array([[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]),
+    "tritanopia": np.array([[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]]),
+}
+
+
+@pytest.mark.parametrize("name", DEFICIENCIES)
+def test_the_colour_code_is_readable_for_the_colour_blind(name: str) -> None:
+    for one, other in [(MEASURED, PLANNED), (CONE["inside"], CONE["active"]), (CONE["inside"], CONE["outside"]),
+                       (CONE["active"], CONE["outside"])]:  # fmt: skip
+        difference = _simulated(one, DEFICIENCIES[name]) - _simulated(other, DEFICIENCIES[name])
+        assert np.linalg.norm(difference) > 0.2
+
+
+def test_every_background_has_readable_text() -> None:
+    for top, bottom, _, text in BACKGROUNDS.values():
+        assert min(abs(np.mean(top) - np.mean(text)), abs(np.mean(bottom) - np.mean(text))) > 0.5
+    assert len(LEGEND) == len({text for *_, text in LEGEND})
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures(page, name: str) -> None:
+    viewer = FIGURES[name]()
+    page.goto(viewer.url)
+    settle(page, viewer)
+    image = picture(page, name)
+    assert (np.abs(image - image[300, 5]).sum(axis=2) > 60).mean() > 0.03
+    viewer.close()
+
+
+def test_figure_1_adds_up() -> None:
+    """f_c is the sum of the f_i, and the bolts' moment balances the wall's force."""
+    right, left = FIGURES["figure_1_right"](), FIGURES["figure_1_left"]()
+    drawn = right.canvas.picture
+    feet = [item.matrix[:3, 2] for path, item in drawn.items() if path.startswith("measured/")]
+    np.testing.assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
+    force, ring = left.canvas.picture["f/wall"].matrix, left.canvas.picture["f/base"].matrix
+    balance = -np.cross(force[:3, 3], force[:3, 2])
+    np.testing.assert_allclose(ring[:3, 2] / np.linalg.norm(ring[:3, 2]), balance / np.linalg.norm(balance), atol=1e-9)
+    right.close(), left.close()
+
+
+def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
+    extra = below("wheel", {"": props.wheel([0.7, -0.5, 0.15], [0, 1, 0], 0.15, 0.6)})
+    extra |= below("cylinder", props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)))
+    extra |= below("wall", {"": props.wall([-0.6, 0, 0.3], [1, 0, 0], 0.6, 0.6)})
+    extra |= below("bolts", props.bolts([0.3, -0.6, 0.0], 0.1))
+    forces = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
+    q = standing.q.copy()
+    q[2] += 0.08
+    viewer.show(
+        standing, contacts, forces, planned=1.2 * forces, support=True, wrench=[10, 0, go2.weight, 0, 20, 10],
+        push=("base", [0, 40.0, 0]), frames=["base"], labels=True, ghost=State(go2, q), extra=extra, title="shapes",
+    )  # fmt: skip
+    viewer.camera(View(40.0, 25.0, 1.7))
+    page.goto(viewer.url)
+    settle(page, viewer)
+    drawn = page.evaluate(
+        "(() => { let n = 0; viewer.scene_tree.children.meshcat.object.traverse((o) => { n += o.name == 'shape'; });"
+        " return n; })()"
+    )
+    assert drawn == len(viewer.canvas.picture)
+    picture(page, "shapes")
+
+
+def test_no_path_of_a_picture_lies_below_another(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
+    forces = np.tile([20.0, 0.0, 30.0], (4, 1))
+    drawn = viewer.painter.picture(
+        standing, contacts, forces, forces, support=True, wrench=np.ones(6), push=("base", [0, 9.0, 0]), ghost=standing,
+        frames=["base"], labels=True,
+    )  # fmt: skip
+    paths = sorted(drawn)
+    assert not [(a, b) for a in paths for b in paths if b.startswith(a + "/")]
+
+
+def test_a_canvas_redraws_what_has_another_shape() -> None:
+    with Window() as window:
+        canvas = Canvas(window)
+        one, other = (shapes.Item(shapes.arrow([0, 0, 0], [0, 0, 1.0], c).shape, np.eye(4)) for c in (MEASURED, PLANNED))
+        assert canvas.draw({"a": one}) == 2
+        assert canvas.draw({"a": other}) == 1
+        assert canvas.draw({}) == 1
