@@ -170,7 +170,7 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
 
 
 def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> None:
-    """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges and neither holds the other."""
+    """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges, neither holds the other."""
     for state in judges.states("go2", 5, 0.3):
         outside = [solve(controller_of("go2", facets=n, inside=False).qp(state)).objective for n in (4, 8, 16, 32)]
         slack = 1e-9 * abs(outside[0])
