@@ -59,7 +59,7 @@ def cart(tmp_path: Path) -> Robot:
 
 def pose(robot: Robot, R: Array, position: npt.ArrayLike, omega: npt.ArrayLike, velocity: npt.ArrayLike) -> fb.State:
     """A floating body's state from world quantities."""
-    q = np.concatenate([np.asarray(position, float), pin.Quaternion(R).coeffs()])
+    q = np.concatenate([np.asarray(position, float), pin.Quaternion(R).normalized().coeffs()])
     return fb.State(robot, q, np.concatenate([R.T @ np.asarray(velocity, float), R.T @ np.asarray(omega, float)]))
 
 
