@@ -1,4 +1,8 @@
-"""Friction: the polyhedron with n facets that stands in for the cone (28)."""
+"""Friction (28): the force taken apart, the exact cone, and the polyhedron with n facets that stands in for it.
+
+Everything here is about one contact force f, shape (3,), N, world: what the ground does to the robot. The normal
+points out of the ground. Source: the document, §4.2 and Figure 3.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,14 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked, positive, read_only, unit_vector
 from floatbase.errors import InputError
 
+TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding, well below what a solver leaves
+
 
 def tangents(normal: npt.ArrayLike) -> Array:
     """Two unit vectors t1, t2 with t1 × t2 = normal, as rows, shape (2, 3).
 
-    t1 is the world's x axis laid into the surface (its y axis where x stands on it), so pictures and rows do not jump.
+    t1 is the world's x axis laid into the surface (its y axis where x stands on it), so pictures and rows do not
+    jump.
     """
     n = unit_vector("normal", normal)
     axis = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
@@ -25,12 +32,88 @@ def tangents(normal: npt.ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class Decomposition:
+    """Figure 3: a contact force taken apart along the normal and in the surface; f = f_perp + f_par.
+
+    f_perp = n nᵀ f and f_par = (I - n nᵀ) f, shape (3,), N, world. alpha_perp: α_⊥ = nᵀ f, N, negative where the
+    force pulls. alpha_par: α_∥ = ‖f_par‖ ≥ 0, N.
+    """
+
+    f_perp: Array
+    f_par: Array
+    alpha_perp: float
+    alpha_par: float
+
+
+def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
+    """(28) The two components of a contact force that friction compares: α_∥ ≤ μ α_⊥.
+
+    force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source: the document, Figure
+    3.
+    """
+    f, n = checked("force", force, (3,), "N"), unit_vector("normal", normal)
+    alpha = float(n @ f)
+    f_perp = alpha * n
+    f_par = f - f_perp
+    return Decomposition(read_only(f_perp), read_only(f_par), alpha, float(np.linalg.norm(f_par)))
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCone:
+    """(28) The forces that Coulomb friction can make: α_∥ ≤ μ α_⊥, a round cone about the normal.
+
+    normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. (28) keeps the force
+    pushing too: α_⊥ ≥ α_∥ / μ ≥ 0. Source: the document, §4.2.
+    """
+
+    normal: Array
+    mu: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "normal", unit_vector("normal", self.normal))
+        object.__setattr__(self, "mu", positive("friction coefficient mu", self.mu))
+
+    @property
+    def angle(self) -> float:
+        """The angle between the normal and the cone's surface, rad: arctan μ."""
+        return float(np.arctan(self.mu))
+
+    def margin(self, force: npt.ArrayLike) -> float:
+        """The slack of (28), N: μ α_⊥ - α_∥, negative outside.
+
+        It is the tangential force that may be added, whatever its direction, before the foot slips. The distance from
+        a force inside to the cone's surface is margin / √(1 + μ²).
+        """
+        parts = decompose(force, self.normal)
+        return self.mu * parts.alpha_perp - parts.alpha_par
+
+    def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
+        """(28) Whether friction can make this force: margin ≥ -tolerance, N."""
+        return self.margin(force) >= -positive("tolerance", tolerance, "N", allow_zero=True)
+
+    def project(self, force: npt.ArrayLike) -> Array:
+        """The force of the cone nearest to the one given, shape (3,), N: the Euclidean projection.
+
+        A force inside stays. One that pulls so hard that no force of the cone has a part along it (μ α_∥ ≤ -α_⊥, the
+        polar cone) gives 0. Any other falls at a right angle onto the line of the surface below it, n + μ f_par /
+        α_∥.
+        """
+        parts = decompose(force, self.normal)
+        if parts.alpha_par <= self.mu * parts.alpha_perp:
+            return checked("force", force, (3,), "N")
+        if self.mu * parts.alpha_par <= -parts.alpha_perp:
+            return read_only(np.zeros(3))
+        along = (parts.alpha_perp + self.mu * parts.alpha_par) / (1.0 + self.mu**2)
+        return read_only(along * (self.normal + self.mu * parts.f_par / parts.alpha_par))
+
+
+@dataclass(frozen=True, eq=False)
 class FrictionPolyhedron:
     """(28) as linear rows: a polyhedron with n facets in place of the cone ‖f_tangent‖ ≤ μ f_normal.
 
-    normal: shape (3,), world, out of the ground. mu: coefficient of friction. facets: n ≥ 3. inside: the polyhedron lies
-    inside the cone (safe: it allows no force that slips) or outside it, touching it (optimistic). Inside, a facet allows
-    μ cos(π/n) and only the edges reach μ. Source: the document, §4.2.
+    normal: shape (3,), world, out of the ground. mu: coefficient of friction. facets: n ≥ 3. inside: the polyhedron
+    lies inside the cone (safe: it allows no force that slips) or outside it, touching it (optimistic). Inside, a
+    facet allows μ cos(π/n) and only the edges reach μ. Source: the document, §4.2.
     """
 
     normal: Array
@@ -40,27 +123,37 @@ class FrictionPolyhedron:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("normal", self.normal))
-        positive("friction coefficient mu", self.mu)
-        if int(self.facets) != self.facets or self.facets < 3:
-            raise InputError(f"facets is {self.facets}; a polyhedron around a cone needs a whole number ≥ 3.")
+        object.__setattr__(self, "mu", positive("friction coefficient mu", self.mu))
+        object.__setattr__(self, "facets", _whole_facets(self.facets))
 
     @property
     def mu_facet(self) -> float:
         """The friction that the middle of a facet allows: μ cos(π/n) inside, μ outside."""
         return self.mu * float(np.cos(np.pi / self.facets)) if self.inside else self.mu
 
+    @property
+    def area_ratio(self) -> float:
+        """Area of the polyhedron's cross-section over the cone's: sin(2π/n) / (2π/n) inside, tan(π/n) / (π/n)
+        outside."""
+        half = np.pi / self.facets
+        return float(np.sin(2.0 * half) / (2.0 * half) if self.inside else np.tan(half) / half)
+
     @cached_property
     def rows(self) -> Array:
         """Rows, shape (n, 3), with rows @ f ≤ 0 for f in the polyhedron; each is d_i - μ_facet · normal.
 
-        d_i is the unit tangent that facet i looks along; facet 0 looks along t1 of `tangents`. Their intersection also
-        keeps normal · f ≥ 0.
+        d_i is the unit tangent that facet i looks along; facet 0 looks along t1 of `tangents`. Their intersection
+        also keeps normal · f ≥ 0.
         """
         return read_only(self._directions(0.0) - self.mu_facet * self.normal)
 
     @cached_property
     def rays(self) -> Array:
-        """The edges, shape (n, 3), each with normal component 1: forces in the polyhedron are their sums with weights ≥ 0."""
+        """The edges, shape (n, 3), each with normal component 1: forces in the polyhedron are their sums with weights
+        ≥ 0.
+
+        Ray i lies between facets i and i + 1.
+        """
         reach = self.mu_facet / float(np.cos(np.pi / self.facets))
         return read_only(self.normal + reach * self._directions(0.5))
 
@@ -70,11 +163,46 @@ class FrictionPolyhedron:
         return tuple(f"facet {i}" for i in range(self.facets))
 
     def margin(self, force: npt.ArrayLike) -> float:
-        """How far inside its facets a force is, N: the smallest of -rows @ f; negative outside."""
+        """How far inside its facets a force is, N: the smallest of -rows @ f; negative outside.
+
+        It is the tangential force that may be added towards the nearest facet before that facet is reached, as
+        `FrictionCone.margin` is for the cone.
+        """
         return float(np.min(-self.rows @ checked("force", force, (3,), "N")))
+
+    def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
+        """Whether a force lies in the polyhedron: margin ≥ -tolerance, N."""
+        return self.margin(force) >= -positive("tolerance", tolerance, "N", allow_zero=True)
+
+    def active_facets(self, force: npt.ArrayLike, tolerance: float = 1e-6) -> tuple[str, ...]:
+        """Names of the facets that a force lies on or has passed, within a tolerance in N; all of them for no
+        force."""
+        slack = -self.rows @ checked("force", force, (3,), "N")
+        reached = slack <= positive("tolerance", tolerance, "N", allow_zero=True)
+        return tuple(name for name, at in zip(self.names, reached, strict=True) if at)
+
+    def project(self, force: npt.ArrayLike) -> Array:
+        """The force of the polyhedron nearest to the one given, shape (3,), N: min ‖raysᵀ w - f‖ over weights w ≥
+        0."""
+        from scipy.optimize import nnls  # here, so that a controller does not pay for loading it
+
+        f = checked("force", force, (3,), "N")
+        size = float(np.linalg.norm(f))
+        if size == 0.0 or self.margin(f) >= 0.0:
+            return f
+        weights, _ = nnls(self.rays.T, f / size)
+        return read_only(size * (self.rays.T @ weights))
 
     def _directions(self, shift: float) -> Array:
         """Unit tangents, shape (n, 3), turned by `shift` of a facet's angle."""
         angles = 2.0 * np.pi * (np.arange(self.facets) + shift) / self.facets
         t1, t2 = tangents(self.normal)
         return np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
+
+
+def _whole_facets(facets: object) -> int:
+    """The number of facets, checked."""
+    number = float(facets) if isinstance(facets, (int, float, np.number)) else np.nan
+    if not number.is_integer() or number < 3:
+        raise InputError(f"facets is {facets!r}; a polyhedron around a cone needs a whole number ≥ 3.")
+    return int(number)
