@@ -48,12 +48,11 @@ class ViewerError(FloatbaseError):
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:
-    """An `UnknownNameError` that lists the names nearest to `name` (or all of them when there are few)."""
+    """An `UnknownNameError` that lists the names nearest to `name`, and all of them when there are few."""
     known = sorted(known)
     near = get_close_matches(str(name), known, n=5, cutoff=0.5)
     near = near or [k for k in known if str(name).lower() in k.lower()][:5]
-    if near:
-        listed = "near names: " + ", ".join(near)
-    else:
-        listed = "known: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
-    return UnknownNameError(f"unknown {kind} {name!r}; {listed}." + (f" {hint}" if hint else ""))
+    parts = ["near names: " + ", ".join(near)] if near else []
+    if not near or len(known) <= 6:
+        parts.append("known: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else ""))
+    return UnknownNameError(f"unknown {kind} {name!r}; {'; '.join(parts)}." + (f" {hint}" if hint else ""))

@@ -16,7 +16,7 @@ from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
-from floatbase.robots.robot import Robot
+from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
 
 
@@ -158,13 +158,15 @@ class WholeBodyController:
     ):
         if solver not in solvers():
             raise unknown_name("solver", solver, solvers())
+        if not isinstance(robot, Robot):
+            raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
         if not isinstance(contacts, Contacts):
             raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(contacts).__name__}.")
         self.robot = robot
         self.contacts = contacts
         self.tasks = _with_regularisation(tasks)
         self.limits = Limits(
-            torque_limits=_limits(robot, torque_limits),
+            torque_limits=robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits),
             facets=FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets).facets,
             inside=inside,
             min_normal_force=positive("min_normal_force", min_normal_force, "N", allow_zero=True),
@@ -204,18 +206,11 @@ class WholeBodyController:
 
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
+    if isinstance(tasks, Task) or not isinstance(tasks, Sequence):
+        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {type(tasks).__name__}.")
     tasks = tuple(tasks)
     for task in tasks:
         if not isinstance(task, Task):
             raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {task!r} is none.")
     missing = [kind() for kind in (ForceTask, TorqueTask) if not any(task.block == kind.block for task in tasks)]
     return tasks + tuple(missing)
-
-
-def _limits(robot: Robot, asked: npt.ArrayLike | None) -> Array:
-    if asked is None:
-        return robot.torque_limits
-    limits = np.broadcast_to(np.asarray(asked, dtype=np.float64), (robot.d,)) if np.ndim(asked) == 0 else asked
-    if np.shape(limits) != (robot.d,) or not np.all(np.asarray(limits) > 0):
-        raise InputError(f"torque_limits must be one number > 0 or {robot.d} of them (N·m).")
-    return read_only(limits)

@@ -53,9 +53,9 @@ class LinearConstraint:
         """No points: shape (0, 3)."""
         return np.zeros((0, 3))
 
-    def jacobian(self, state: State) -> Array:
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
         """A itself, shape (m, nv): the constraint's force is Aᵀ λ."""
-        return self.constraint(state)[0]
+        return self.constraint(state, t)[0]
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), checked."""
@@ -86,8 +86,8 @@ class RollingWheel:
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(f"axis of {self.frame}", self.axis))
         object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
-        positive(f"radius of {self.frame}", self.radius, "m")
-        positive(f"friction coefficient mu of {self.frame}", self.mu)
+        object.__setattr__(self, "radius", positive(f"radius of {self.frame}", self.radius, "m"))
+        object.__setattr__(self, "mu", positive(f"friction coefficient mu of {self.frame}", self.mu))
 
     @property
     def name(self) -> str:
@@ -117,7 +117,7 @@ class RollingWheel:
         """g(q, q̇), shape (3,), m/s, world: the velocity of the touching point, zero when the wheel rolls."""
         return self.jacobian(state) @ state.v
 
-    def jacobian(self, state: State) -> Array:
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
         """∂g/∂q̇, shape (3, nv): also brings the contact force into (4)."""
         return read_only(point_jacobian(state, self.frame, self._arm(state)))
 

@@ -56,8 +56,8 @@ class Contact(Protocol):
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n_points, 3), m."""
 
-    def jacobian(self, state: State) -> Array:
-        """J of (4): Jᵀ λ is the generalised force of λ; shape (k, nv)."""
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
+        """J of (4): Jᵀ λ is the generalised force of λ at time t, s; shape (k, nv)."""
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) The rows A, shape (m, nv), and b, shape (m,), of A q̈ = b at time t, s."""
@@ -80,8 +80,8 @@ class PointContact:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
-        positive(f"friction coefficient mu of {self.frame}", self.mu)
-        positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True)
+        object.__setattr__(self, "mu", positive(f"friction coefficient mu of {self.frame}", self.mu))
+        object.__setattr__(self, "radius", positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True))
         object.__setattr__(self, "centre", checked(f"centre of {self.frame}", self.centre, (3,), "m"))
 
     @property
@@ -108,7 +108,7 @@ class PointContact:
         """World position of the contact point, shape (1, 3), m."""
         return read_only([state.point(self.frame, self.centre) - self.radius * self.normal])
 
-    def jacobian(self, state: State) -> Array:
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
         """Jacobian of the contact point, shape (3, nv), world-aligned."""
         return read_only(point_jacobian(state, self.frame, self._arm(state)))
 
@@ -142,7 +142,7 @@ class FlatFootContact:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
-        positive(f"friction coefficient mu of {self.frame}", self.mu)
+        object.__setattr__(self, "mu", positive(f"friction coefficient mu of {self.frame}", self.mu))
         object.__setattr__(self, "corners", checked(f"corners of {self.frame}", self.corners, (None, 3), "m"))
 
     @property
@@ -174,7 +174,7 @@ class FlatFootContact:
         R = state.frame_pose(self.frame).rotation
         return read_only(np.hstack([np.vstack([np.eye(3), pin.skew(R @ corner)]) for corner in self.corners]))
 
-    def jacobian(self, state: State) -> Array:
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
         """Jacobian of the corners, shape (k, nv), world-aligned; its rank is at most 6."""
         return read_only(self.generators(state).T @ state.frame_jacobian(self.frame))
 
@@ -201,6 +201,9 @@ class Contacts:
         self._set(tuple(contacts))
 
     def _set(self, contacts: tuple[Contact, ...]) -> None:
+        for contact in contacts:
+            if not isinstance(contact, Contact):
+                raise InputError(f"{contact!r} is no contact; fb.Contacts.points(robot, frames=[…]) makes them from names.")
         names = [contact.name for contact in contacts]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -292,10 +295,10 @@ class Contacts:
         """World positions of the points, shape (n, 3), m."""
         return read_only(np.vstack([np.zeros((0, 3))] + [contact.positions(state) for contact in self._contacts]))
 
-    def jacobian(self, state: State) -> Array:
-        """J of (4), shape (k, nv)."""
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
+        """J of (4), shape (k, nv), at time t, s."""
         empty = np.zeros((0, state.robot.nv))
-        return read_only(np.vstack([empty] + [contact.jacobian(state) for contact in self._contacts]))
+        return read_only(np.vstack([empty] + [contact.jacobian(state, t) for contact in self._contacts]))
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
@@ -332,6 +335,8 @@ class Contacts:
         raise unknown_name("contact", name, self.names)
 
     def __add__(self, other: Contacts) -> Contacts:
+        if not isinstance(other, Contacts):
+            raise InputError(f"only Contacts can be added to Contacts, not {type(other).__name__}.")
         return Contacts([*self._contacts, *other])
 
     def __iter__(self) -> Iterator[Contact]:
@@ -345,6 +350,8 @@ class Contacts:
 
 
 def _feet(robot: Robot, frames: Sequence[str] | None) -> tuple[Foot, ...]:
+    if not isinstance(robot, Robot):
+        raise InputError(f"contacts are made for a Robot, as from fb.load, not for {robot!r}.")
     if isinstance(frames, str):
         raise InputError(f'frames must be a list of names, as in frames=["{frames}"].')
     feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in frames)
@@ -361,8 +368,7 @@ def _normals(feet: Sequence[Foot], normals: npt.ArrayLike | Mapping[str, npt.Arr
         for frame in normals:
             if frame not in [foot.frame for foot in feet]:
                 raise unknown_name("contact frame in normals", frame, [foot.frame for foot in feet])
-        return [np.asarray(normals.get(foot.frame, UP), dtype=np.float64) for foot in feet]
-    array = np.asarray(normals, dtype=np.float64)
-    if array.shape == (3,):
-        return [array] * len(feet)
-    return list(checked("normals", array, (len(feet), 3)))
+        return [checked(f"normal of {foot.frame}", normals.get(foot.frame, UP), (3,)) for foot in feet]
+    if np.ndim(normals) == 1:
+        return [checked(f"normal of {foot.frame}", normals, (3,)) for foot in feet]
+    return list(checked("normals", normals, (len(feet), 3)))

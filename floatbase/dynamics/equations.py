@@ -16,7 +16,7 @@ from floatbase.robots.state import State
 
 @dataclass(frozen=True, eq=False)
 class EquationsOfMotion:
-    """(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
+    """(1)(4)(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
 
     M: (nv, nv) inertia. h: (nv,) Coriolis, centrifugal and gravity forces. S: (nv, d) actuation (3). J: (k, nv)
     Jacobian of the points where λ acts, world-aligned. A: (m, nv), b: (m,) the rows of (5), in m/s²; for point contacts
@@ -77,4 +77,4 @@ def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> Equ
     if not isinstance(contacts, Contacts):
         raise InputError(f"equations_of_motion needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
     A, b = contacts.constraint(state, t)
-    return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, contacts.jacobian(state), A, b)
+    return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, contacts.jacobian(state, t), A, b)

@@ -16,48 +16,79 @@ from floatbase.dynamics.equations import EquationsOfMotion
 RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
 
 
-def rank(A: npt.ArrayLike, tolerance: float = RANK_TOLERANCE) -> int:
-    """Number of singular values of A above `tolerance` times the largest."""
-    s = np.linalg.svd(np.asarray(A, dtype=np.float64), compute_uv=False)
-    return int(np.sum(s > tolerance * s[0])) if s.size and s[0] > 0 else 0
+def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
+    """Number of singular values of A above `RANK_TOLERANCE` times the largest.
 
-
-def null_space(A: npt.ArrayLike, tolerance: float = RANK_TOLERANCE) -> Array:
-    """Orthonormal columns that span {x : A x = 0}, shape (n, n - rank)."""
-    A = np.asarray(A, dtype=np.float64)
-    if A.shape[0] == 0 or A.shape[1] == 0:
-        return np.eye(A.shape[1])
-    return read_only(np.linalg.svd(A)[2][rank(A, tolerance) :].T)
-
-
-def solution_space(A: Array, b: Array, tolerance: float = RANK_TOLERANCE) -> Affine:
-    """(11)(13) All x with A x = b, as β -> A† b + V⊥ β with orthonormal V⊥.
-
-    Where b is not in the range of A the least-squares solutions are meant.
+    absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding altogether.
     """
-    V = null_space(A, tolerance)
-    return Affine(V, np.linalg.lstsq(A, b, rcond=tolerance)[0] if A.size else np.zeros(A.shape[1]))
+    s = np.linalg.svd(np.asarray(A, dtype=np.float64), compute_uv=False)
+    largest = 1.0 if absolute else float(s.max(initial=0.0))
+    return int(np.sum(s > RANK_TOLERANCE * largest))
+
+
+def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
+    """Orthonormal columns that span {x : A x = 0}, shape (n, n - rank); absolute as for `rank`."""
+    A = np.asarray(A, dtype=np.float64)
+    if A.size == 0:
+        return np.eye(A.shape[1])
+    return read_only(np.linalg.svd(A)[2][rank(A, absolute) :].T)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSpace:
+    """The contacts of (7) without their repetitions: r = rank J independent motions and forces.
+
+    Where J loses rank, or nearly does, rows repeat each other up to rounding. The rank is decided here, once, and all that
+    follows is written in orthonormal coordinates, so that nothing divides by rounding.
+    rows: (r, nv), orthonormal, and b: (r,), with rows q̈ = b for A q̈ = b, in the least-squares sense where rows contradict
+    each other. push: (nv, r), orthonormal: Jᵀ λ = push y. lift: (k, r): the smallest λ of a y. free: (k, k - r): null(Jᵀ).
+    """
+
+    rows: Array
+    b: Array
+    push: Array
+    lift: Array
+    free: Array
+
+    @property
+    def r(self) -> int:
+        """rank J."""
+        return int(self.rows.shape[0])
+
+
+def contact_space(eom: EquationsOfMotion) -> ContactSpace:
+    """The independent part of the contacts of (7), by singular values (tolerance `RANK_TOLERANCE`)."""
+    r = rank(eom.A)
+    U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
+    U_J, s_J, Vt_J = np.linalg.svd(eom.J, full_matrices=True)
+    return ContactSpace(
+        rows=read_only(Vt[:r]),
+        b=read_only((U[:, :r].T @ eom.b) / s[:r]),
+        push=read_only(Vt_J[:r].T),
+        lift=read_only(U_J[:, :r] / s_J[:r]),
+        free=read_only(U_J[:, r:]),
+    )
 
 
 def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
-    """A M⁻¹ Jᵀ of (8), shape (m, k): how the contacts' accelerations answer to their forces; J M⁻¹ Jᵀ for points."""
-    return eom.A @ _inverse_inertia(eom, eom.J.T)
+    """(8) A M⁻¹ Jᵀ, shape (m, k): how the contacts' accelerations answer to their forces; J M⁻¹ Jᵀ for points."""
+    return read_only(eom.A @ _inverse_inertia(eom, eom.J.T))
 
 
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     """(9) ζ: τ -> λ, from (8) A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ).
 
-    Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet,
-    straight knees, corners of a flat foot) the pseudo-inverse picks the smallest λ. Source: the document, §2.2.1.
+    Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet, straight
+    knees, corners of a flat foot) this is the smallest λ, as the pseudo-inverse has it. Source: the document, §2.2.1.
     """
-    inverse = np.linalg.pinv(contact_inertia_inverse(eom), rcond=RANK_TOLERANCE)
-    h, S = _inverse_inertia(eom, eom.h), _inverse_inertia(eom, eom.S)
-    return Affine(-inverse @ eom.A @ S, inverse @ (eom.b + eom.A @ h))
+    space = contact_space(eom)
+    y = _independent_forces(eom, space)
+    return Affine(space.lift @ y.A, space.lift @ y.b)
 
 
 def forces_are_unique(eom: EquationsOfMotion) -> bool:
     """Whether torques determine the contact forces, so that (9) needs no choice: J has full row rank k."""
-    return rank(eom.J) == eom.k
+    return contact_space(eom).r == eom.k
 
 
 def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
@@ -65,9 +96,10 @@ def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
 
     Source: the document, §3.
     """
-    zeta = forces_from_torques(eom)
-    A = _inverse_inertia(eom, eom.S + eom.J.T @ zeta.A)
-    return Affine(A, _inverse_inertia(eom, eom.J.T @ zeta.b - eom.h))
+    space = contact_space(eom)
+    y = _independent_forces(eom, space)
+    A = _inverse_inertia(eom, eom.S + space.push @ y.A)
+    return Affine(A, _inverse_inertia(eom, space.push @ y.b - eom.h))
 
 
 def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -78,8 +110,9 @@ def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
     """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
-    space = solution_space(*torque_force_matrix(eom))
-    return Affine(space.A, space.b, {"tau": slice(0, eom.d), "forces": slice(eom.d, eom.d + eom.k)})
+    space = contact_space(eom)
+    y = _independent_forces(eom, space)
+    return _with_forces(Affine.stack(tau=Affine.identity(eom.d), y=y), space, {"tau": slice(0, eom.d)})
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -130,34 +163,40 @@ class FeasibleSpace:
 
 
 def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
-    """(13) The space of all motions that the robot and its contacts allow at this state."""
-    space = solution_space(*motion_matrix(eom))
-    nv, d, k = eom.nv, eom.d, eom.k
-    blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
-    return FeasibleSpace(eom, Affine(space.A, space.b, blocks))
+    """(13) The space of all motions that the robot and its contacts allow at this state: v + V⊥ β.
+
+    The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the independent part
+    of the contacts, which gives the same space as the SVD of B and keeps its digits where J nearly loses rank.
+    """
+    space = contact_space(eom)
+    y = _independent_forces(eom, space)
+    qdd = Affine(_inverse_inertia(eom, eom.S + space.push @ y.A), _inverse_inertia(eom, space.push @ y.b - eom.h))
+    motions = Affine.stack(qdd=qdd, tau=Affine.identity(eom.d), y=y)
+    blocks = {"qdd": slice(0, eom.nv), "tau": slice(eom.nv, eom.nv + eom.d)}
+    return FeasibleSpace(eom, _with_forces(motions, space, blocks))
 
 
 def internal_forces(eom: EquationsOfMotion) -> Array:
     """Forces that torques can squeeze in without moving anything: orthonormal columns of null(J_bᵀ), shape (k, n).
 
-    J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint columns. n = k -
-    rank J_b: 6 for four point feet. With a fixed base every λ is internal.
+    J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint columns.
+    n = k - rank J_b: 6 for four point feet. With a fixed base every λ is internal.
     """
-    return null_space(_base_columns(eom).T) if eom.k else np.zeros((0, 0))
+    return null_space(_base_columns(eom).T)
 
 
 def undetermined_forces(eom: EquationsOfMotion) -> Array:
     """Forces that change nothing at all, orthonormal columns of null(Jᵀ), shape (k, k - rank J): why λ may not be unique."""
-    return null_space(eom.J.T) if eom.k else np.zeros((0, 0))
+    return contact_space(eom).free
 
 
 @dataclass(frozen=True)
 class Dimensions:
     """Sizes, ranks and dimensions of (7) at one state, by singular values.
 
-    d, k, nv: lengths of τ, λ, q̈. rank_J, rank_J_base: of J and of its base columns. null_B, null_C: dimensions of the
-    null spaces of (12) and (10), both d + k - rank J. internal: of null(J_bᵀ). undetermined: of null(Jᵀ). rank_V_qdd:
-    how many of the directions of β move the robot at all: d - rank J + rank J_b.
+    d, k, nv: lengths of τ, λ, q̈. rank_J, rank_J_base: of J and of its base columns. null_B, null_C: dimensions of the null
+    spaces of (12) and (10), both d + k - rank J. internal: of null(J_bᵀ). undetermined: of null(Jᵀ). rank_V_qdd: how many of
+    the directions of β move the robot at all: d - rank J + rank J_b.
     """
 
     nv: int
@@ -173,20 +212,45 @@ class Dimensions:
 
 
 def dimensions(eom: EquationsOfMotion) -> Dimensions:
-    """Counts every dimension of §2.2 at this state, each from its own singular values (tolerance `RANK_TOLERANCE`)."""
-    B, C = motion_matrix(eom)[0], torque_force_matrix(eom)[0]
+    """Counts every dimension of §2.2 at this state.
+
+    The rank of J is decided once (`contact_space`). B and C are then counted, each by its own singular values, with the
+    independent rows and forces in place of A and J, whose r numbers say the same; null(Jᵀ) comes on top.
+    """
+    space = contact_space(eom)
+    B = np.block([[eom.M, -eom.S, -space.push], [space.rows, np.zeros((space.r, eom.d + space.r))]])
+    C = space.rows @ _inverse_inertia(eom, np.hstack([eom.S, space.push]))
+    free = eom.k - space.r
     return Dimensions(
         nv=eom.nv,
         d=eom.d,
         k=eom.k,
-        rank_J=rank(eom.J),
+        rank_J=space.r,
         rank_J_base=rank(_base_columns(eom)),
-        null_B=B.shape[1] - rank(B),
-        null_C=C.shape[1] - rank(C),
+        null_B=B.shape[1] - rank(B) + free,
+        null_C=C.shape[1] - rank(C) + free,
         internal=internal_forces(eom).shape[1],
-        undetermined=undetermined_forces(eom).shape[1],
-        rank_V_qdd=rank(feasible_space(eom).qdd.A),
+        undetermined=space.free.shape[1],
+        rank_V_qdd=rank(null_space(B)[: eom.nv], absolute=True),
     )
+
+
+def _independent_forces(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
+    """τ -> y, the forces of (9) in the r independent coordinates in which J M⁻¹ Jᵀ is always invertible."""
+    inertia = space.rows @ _inverse_inertia(eom, space.push)
+    right = Affine(-space.rows @ _inverse_inertia(eom, eom.S), space.b + space.rows @ _inverse_inertia(eom, eom.h))
+    return Affine(np.linalg.solve(inertia, right.A), np.linalg.solve(inertia, right.b))
+
+
+def _with_forces(motions: Affine, space: ContactSpace, blocks: dict[str, slice]) -> Affine:
+    """All points of `motions`, whose last block is y, with every λ that belongs to y: as v + V⊥ β, v ⊥ V⊥ orthonormal."""
+    rest = motions.n_out - space.r
+    k, free = space.free.shape
+    lift = np.block([[np.eye(rest), np.zeros((rest, space.r))], [np.zeros((k, rest)), space.lift]])
+    directions = np.hstack([lift @ motions.A, np.vstack([np.zeros((rest, free)), space.free])])
+    V = np.linalg.qr(directions)[0]
+    point = lift @ motions.b
+    return Affine(V, point - V @ (V.T @ point), {**blocks, "forces": slice(rest, rest + k)})
 
 
 def _base_columns(eom: EquationsOfMotion) -> Array:

@@ -13,7 +13,7 @@ from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.dynamics.subspace import RANK_TOLERANCE, null_space, torque_force_matrix, torque_force_space
+from floatbase.dynamics.subspace import RANK_TOLERANCE, null_space, rank, torque_force_matrix, torque_force_space
 from floatbase.errors import InputError
 from floatbase.robots.state import State
 
@@ -77,10 +77,8 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
 
     a: one number for all points or shape (n,).
     """
-    wanted = np.broadcast_to(np.asarray(a, dtype=np.float64), (contacts.n_points,))
-    if not np.all(np.isfinite(wanted)):
-        raise InputError("the nominal normal force a must be finite, N.")
-    values = iter(wanted)
+    n = contacts.n_points
+    values = iter(checked("the nominal normal force a", [a] * n if np.ndim(a) == 0 else a, (n,), "N"))
     return _per_point(contacts, lambda n: (np.outer(n, n), next(values) * n))
 
 
@@ -126,12 +124,11 @@ def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
     C, a = torque_force_matrix(eom)
     C_tau, C_forces = C[:, : eom.d], C[:, eom.d :]
     inverse = np.linalg.pinv(C_tau, rcond=RANK_TOLERANCE)
-    space = torque_force_space(eom)["forces"]
-    U, s, _ = np.linalg.svd(space.A, full_matrices=False)
-    reach = U[:, s > RANK_TOLERANCE * s[0]] if s.size else U
+    forces = torque_force_space(eom)["forces"]
+    U = np.linalg.svd(forces.A, full_matrices=False)[0]
     return TorqueForForces(
         torque=Affine(-inverse @ C_forces, inverse @ a),
-        reachable=Affine(reach, space.b),
+        reachable=Affine(U[:, : rank(forces.A, absolute=True)], forces.b),
         free_torques=null_space(C_tau),
     )
 

@@ -9,10 +9,11 @@ import numpy as np
 from floatbase._arrays import Array
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.dynamics.subspace import RANK_TOLERANCE, FeasibleSpace, accelerations_from_torques, null_space
+from floatbase.dynamics.subspace import FeasibleSpace, accelerations_from_torques, null_space, rank
 from floatbase.errors import InputError
 
 Block = Literal["qdd", "tau", "forces"]
+_FLAT = 1e-14  # curvature below this part of the largest counts as none
 
 
 def pullback(cost: Quadratic, f: Affine) -> Quadratic:
@@ -44,8 +45,10 @@ def cost_on_space(
 
 def smallest_coordinates(space: FeasibleSpace, block: Block) -> Affine:
     """The β that (19) takes: the smallest β that gives a value of the block, β = V† (x - v)."""
-    f = _block(space, block)
-    V_pinv = np.linalg.pinv(f.A, rcond=RANK_TOLERANCE)
+    f = space.map[block]
+    U, s, Vt = np.linalg.svd(f.A, full_matrices=False)
+    r = rank(f.A, absolute=True)  # rows of orthonormal columns: what is below the tolerance is rounding
+    V_pinv = (Vt[:r].T / s[:r]) @ U[:, :r].T
     return Affine(V_pinv, -V_pinv @ f.b)
 
 
@@ -64,7 +67,7 @@ def best_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> Aff
     Raises `InputError` where the cost has no minimum over what is left open.
     """
     start = smallest_coordinates(space, block)
-    return minimised_over(cost, null_space(_block(space, block).A)) @ start
+    return minimised_over(cost, null_space(space.map[block].A, absolute=True)) @ start
 
 
 def seen_from_best(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
@@ -83,19 +86,19 @@ def minimised_over(cost: Quadratic, N: Array) -> Affine:
     """
     if N.shape[1] == 0:
         return Affine.identity(cost.n)
-    H = N.T @ cost.H @ N
-    H_pinv = np.linalg.pinv(H, rcond=RANK_TOLERANCE, hermitian=True)
-    flat = np.eye(len(H)) - H @ H_pinv
-    slope = N.T @ cost.g
-    if np.max(np.abs(flat @ slope)) > 1e-7 * (1.0 + float(np.max(np.abs(cost.g)))):
+    values, vectors = np.linalg.eigh(N.T @ cost.H @ N)
+    largest = float(np.abs(values).max())
+    if values[0] < -1e-9 * largest:
+        raise InputError("the cost bends down along a direction that it should be minimised over: it has no least value there.")
+    curved = values > _FLAT * largest
+    slope = vectors.T @ (N.T @ cost.g)
+    if np.any(np.abs(slope[~curved]) > 1e-7 * (1.0 + float(np.abs(cost.g).max(initial=0.0)))):
         raise InputError("the cost falls for ever along a direction that it should be minimised over; add a cost there.")
-    return Affine(np.eye(cost.n) - N @ H_pinv @ N.T @ cost.H, -N @ H_pinv @ slope)
+    W = N @ vectors[:, curved]
+    step = W / values[curved]
+    return Affine(np.eye(cost.n) - step @ W.T @ cost.H, -step @ slope[curved])
 
 
 def minimise_on(cost: Quadratic, subspace: Affine) -> Array:
     """The point of least cost on an affine subspace x = subspace(β), shape (n,): unconstrained in β."""
     return subspace(cost.pullback(subspace).minimiser())
-
-
-def _block(space: FeasibleSpace, block: Block) -> Affine:
-    return space.map[block]

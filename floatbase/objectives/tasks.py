@@ -50,21 +50,18 @@ def _value(name: str, target: Target, t: float, shape: tuple[int, ...]) -> Array
     return checked(name, target(t) if callable(target) else target, shape)
 
 
-def _check_gains(name: str, kp: float, kd: float | None, weight: float) -> None:
-    positive(f"kp of {name}", kp, "1/s²", allow_zero=True)
-    if kd is not None:
-        positive(f"kd of {name}", kd, "1/s", allow_zero=True)
-    positive(f"weight of {name}", weight, allow_zero=True)
+def _set_gains(task: CoMTask | OrientationTask | FrameTask | PostureTask) -> None:
+    """Check gains and weight and keep them as plain numbers; kd is critically damped, 2 √kp, where none is given."""
+    kp = positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
+    kd = 2.0 * kp**0.5 if task.kd is None else positive(f"kd of {task.name}", task.kd, "1/s", allow_zero=True)
+    weight = positive(f"weight of {task.name}", task.weight, allow_zero=True)
+    for name, value in (("kp", kp), ("kd", kd), ("weight", weight)):
+        object.__setattr__(task, name, value)
 
 
 def _fixed(name: str, target: Target, shape: tuple[int, ...]) -> Target:
     """The target, checked and copied at once when it does not move."""
     return target if callable(target) else checked(name, target, shape)
-
-
-def _damping(kp: float, kd: float | None) -> float:
-    """kd, critically damped when none is given: 2 √kp."""
-    return 2.0 * float(np.sqrt(kp)) if kd is None else kd
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +82,7 @@ class CoMTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _check_gains(self.name, self.kp, self.kd, self.weight)
+        _set_gains(self)
         for part in ("position", "velocity", "acceleration"):
             object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
 
@@ -95,7 +92,7 @@ class CoMTask:
         e = state.com - _value("position", self.position, t, (3,))
         e_dot = state.com_velocity - _value("velocity", self.velocity, t, (3,))
         feed = _value("acceleration", self.acceleration, t, (3,))
-        return _motion_residual(state.com_jacobian, state.com_drift, feed, self.kp, self.kd, e, e_dot)
+        return _motion_residual(self, state.com_jacobian, state.com_drift, feed, e, e_dot)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +113,7 @@ class OrientationTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _check_gains(self.name, self.kp, self.kd, self.weight)
+        _set_gains(self)
         object.__setattr__(self, "rotation", _fixed(f"rotation of {self.name}", self.rotation, (3, 3)))
         if not callable(self.rotation):
             _check_rotation(self.name, np.asarray(self.rotation))
@@ -137,7 +134,7 @@ class OrientationTask:
         e_dot = state.frame_velocity(self.frame)[3:] - _value("angular velocity", self.angular_velocity, t, (3,))
         feed = _value("angular acceleration", self.angular_acceleration, t, (3,))
         J, drift = state.frame_jacobian(self.frame)[3:], state.frame_drift(self.frame)[3:]
-        return _motion_residual(J, drift, feed, self.kp, self.kd, e, e_dot)
+        return _motion_residual(self, J, drift, feed, e, e_dot)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +154,7 @@ class FrameTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _check_gains(self.name, self.kp, self.kd, self.weight)
+        _set_gains(self)
         for part in ("position", "velocity", "acceleration"):
             object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
 
@@ -173,7 +170,7 @@ class FrameTask:
         e_dot = state.frame_velocity(self.frame)[:3] - _value("velocity", self.velocity, t, (3,))
         feed = _value("acceleration", self.acceleration, t, (3,))
         J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
-        return _motion_residual(J, drift, feed, self.kp, self.kd, e, e_dot)
+        return _motion_residual(self, J, drift, feed, e, e_dot)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +185,7 @@ class PostureTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _check_gains(self.name, self.kp, self.kd, self.weight)
+        _set_gains(self)
         if not callable(self.q):
             object.__setattr__(self, "q", checked("q of posture", self.q, (None,)))
 
@@ -197,7 +194,7 @@ class PostureTask:
         state, robot = eom.state, eom.robot
         e = state.difference(_value("q of posture", self.q, t, (robot.nq,)))[-robot.d :]
         e_dot = state.v[-robot.d :]
-        return _motion_residual(robot.S.T, np.zeros(robot.d), np.zeros(robot.d), self.kp, self.kd, e, e_dot)
+        return _motion_residual(self, robot.S.T, np.zeros(robot.d), np.zeros(robot.d), e, e_dot)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +210,7 @@ class ForceTask:
     block: ClassVar[Block] = "forces"
 
     def __post_init__(self) -> None:
-        positive(f"weight of {self.name}", self.weight, allow_zero=True)
+        _keep_target(self)
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """λ - target, shape (k,), N."""
@@ -231,7 +228,7 @@ class TorqueTask:
     block: ClassVar[Block] = "tau"
 
     def __post_init__(self) -> None:
-        positive(f"weight of {self.name}", self.weight, allow_zero=True)
+        _keep_target(self)
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """τ - target, shape (d,), N·m."""
@@ -239,15 +236,27 @@ class TorqueTask:
         return Affine.identity(eom.d) - wanted
 
 
+def _keep_target(task: ForceTask | TorqueTask) -> None:
+    """Check the weight, and copy a target that does not move."""
+    object.__setattr__(task, "weight", positive(f"weight of {task.name}", task.weight, allow_zero=True))
+    if task.target is not None and not callable(task.target):
+        object.__setattr__(task, "target", checked(f"target of {task.name}", np.ravel(task.target), (None,)))
+
+
 def standing_tasks(state: State) -> tuple[Task, ...]:
     """The tasks that keep a robot where `state` has it: centre of mass, base orientation, posture."""
+    if not isinstance(state, State):
+        raise InputError(f"standing_tasks needs a State, as robot.standing(), not {type(state).__name__}.")
     rotation = state.frame_pose("base").rotation
     return (CoMTask(state.com), OrientationTask("base", rotation), PostureTask(state.q))
 
 
-def _motion_residual(J: Array, drift: Array, feed: Array, kp: float, kd: float | None, e: Array, e_dot: Array) -> Affine:
+def _motion_residual(
+    task: CoMTask | OrientationTask | FrameTask | PostureTask, J: Array, drift: Array, feed: Array, e: Array, e_dot: Array
+) -> Affine:
     """J q̈ + J̇ q̇ - (a_ff - kp e - kd ė)."""
-    return Affine(J, drift - feed + kp * e + _damping(kp, kd) * e_dot)
+    assert task.kd is not None  # set when the task was made
+    return Affine(J, drift - feed + task.kp * e + task.kd * e_dot)
 
 
 def _check_rotation(name: str, R: Array) -> None:

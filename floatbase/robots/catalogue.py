@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.errors import InputError, unknown_name
-from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.robot import Foot, Robot, torque_limits_of
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def load(
     entry = CATALOGUE.get(name)
     root = Path(loader.model_root)
     model = pin.buildModelFromUrdf(str(root / loader.urdf), *([pin.JointModelFreeFlyer()] if loader.free_flyer else []))
-    posture = _posture(model, loader, entry, posture)
+    posture = _posture(name, model, loader, entry, posture)
     limits = _torque_limits(model, loader.free_flyer, entry, torque_limits)
     robot = Robot(
         name=name,
@@ -150,7 +150,7 @@ def _loader(name: str) -> _Loader:
     return _Loader(str(root), urdf, srdf, loader.ref_posture, loader.free_flyer, loader.has_rotor_parameters)
 
 
-def _posture(model: pin.Model, loader: _Loader, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:
+def _posture(name: str, model: pin.Model, loader: _Loader, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:
     """The posture asked for, or the reference of the SRDF with the catalogue's joint angles on top; loads rotor inertia too."""
     q = pin.neutral(model)
     if loader.srdf:
@@ -163,6 +163,8 @@ def _posture(model: pin.Model, loader: _Loader, entry: Entry | None, asked: npt.
         q = references.get(loader.reference, q)
     if asked is not None:
         q = checked("posture", asked, (model.nq,))
+        if loader.free_flyer and abs(float(np.linalg.norm(q[3:7])) - 1.0) > 1e-6:
+            raise InputError(f"the base quaternion posture[3:7] of {name} (x y z w) must have length 1, not {q[3:7]}.")
     elif entry is not None:
         q = q.copy()
         for joint, angle in entry.joints.items():
@@ -173,11 +175,7 @@ def _posture(model: pin.Model, loader: _Loader, entry: Entry | None, asked: npt.
 def _torque_limits(model: pin.Model, free_flyer: bool, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:
     d = model.nv - (6 if free_flyer else 0)
     if asked is not None:
-        limits = np.broadcast_to(np.asarray(asked, dtype=np.float64), (d,)) if np.ndim(asked) == 0 else asked
-        limits = np.array(limits, dtype=np.float64)
-        if limits.shape != (d,) or not np.all(limits > 0):
-            raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); got shape {limits.shape}.")
-        return read_only(limits)
+        return torque_limits_of(d, asked)
     if entry is not None and entry.torque_limit is not None:
         return read_only(np.full(d, entry.torque_limit))
     effort = np.array(model.effortLimit)[model.nv - d :]
@@ -188,6 +186,8 @@ def _feet(
     name: str, entry: Entry | None, asked: Sequence[str | Foot] | None, radius: float | None, free_flyer: bool
 ) -> tuple[Foot, ...]:
     if asked is None:
+        if radius is not None:
+            raise InputError("foot_radius goes with feet=[…]: the catalogue's feet have their own radius.")
         if entry is None and free_flyer:
             raise InputError(
                 f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be given: "

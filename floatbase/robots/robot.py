@@ -102,7 +102,7 @@ class Robot:
 
     @cached_property
     def mass(self) -> float:
-        """Total mass, kg."""
+        """Total mass, kg. With a fixed base it includes what is bolted down, which `State.com` does not."""
         return float(sum(inertia.mass for inertia in self.model.inertias))
 
     @property
@@ -189,3 +189,14 @@ class Robot:
     def __repr__(self) -> str:
         base = "floating" if self.is_floating else "fixed"
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
+
+
+def torque_limits_of(d: int, asked: npt.ArrayLike) -> Array:
+    """Torque limits asked for, one number or (d,), N·m, +inf for none, as shape (d,). Raises `InputError`."""
+    try:
+        limits = np.array([asked] * d if np.ndim(asked) == 0 else asked, dtype=np.float64)
+    except (TypeError, ValueError):
+        limits = np.zeros(0)
+    if limits.shape != (d,) or not np.all(limits > 0):  # NaN is not > 0 either
+        raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); got shape {np.shape(asked)}: {asked!r}.")
+    return read_only(limits)

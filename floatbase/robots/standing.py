@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, checked
 from floatbase.errors import InputError
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
@@ -17,6 +17,7 @@ _STEPS = 50
 def stand(robot: Robot, height: float | None = None) -> State:
     """The standing state nearest to `robot.posture`, at rest; see `Robot.standing`."""
     posture = State(robot, robot.posture)
+    height = None if height is None else float(checked("height", height, (), "m"))
     if not robot.is_floating or not robot.feet:
         return posture
     q = posture.q.copy()

@@ -53,8 +53,7 @@ class State:
     @cached_property
     def M(self) -> Array:
         """The generalised inertia matrix M(q) of (1), shape (nv, nv), symmetric positive definite, rotor inertia included."""
-        upper = np.triu(self._data.M)
-        return read_only(upper + np.triu(upper, 1).T)
+        return read_only(self._data.M)
 
     @cached_property
     def h(self) -> Array:
@@ -92,7 +91,7 @@ class State:
 
     def point(self, frame: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """World position, shape (3,), m, of a point at `offset` (m, in the frame)."""
-        return read_only(self._data.oMf[self.robot.frame_id(frame)].act(np.asarray(offset, dtype=np.float64)))
+        return read_only(self._data.oMf[self.robot.frame_id(frame)].act(checked("offset", offset, (3,), "m")))
 
     def frame_jacobian(self, frame: str) -> Array:
         """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows, world-aligned."""

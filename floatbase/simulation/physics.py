@@ -62,11 +62,13 @@ class Simulation:
 
     The model is edited from the robot's own URDF: free joint for a floating base, a ball at each foot (or at each
     corner of a flat foot), a plane with friction, a torque motor with its limit on each joint, rotor inertia as in the
-    robot. Joint friction and damping are off, as in (1)-(7). Only feet and ground touch. ground: a `Ground`, or the
+    robot. Joint friction and damping are off, as in (1)-(7), joint limits of the URDF are on. Only feet and ground touch. ground: a `Ground`, or the
     coefficient of friction of a level one. timestep: s. Raises `SimulationError` when MuJoCo cannot build the robot.
     """
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
+        if not isinstance(robot, Robot):
+            raise InputError(f"Simulation needs a Robot, as from fb.load, not {robot!r}.")
         self.robot = robot
         self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self.timestep = positive("timestep", timestep, "s")
@@ -107,8 +109,9 @@ class Simulation:
 
     @property
     def diverged(self) -> bool:
-        """Whether MuJoCo met numbers it could not go on with since the last reset."""
-        kinds = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+        """Whether MuJoCo met numbers it could not go on with since the last reset; it drops torques beyond 1e10."""
+        warning = mujoco.mjtWarning
+        kinds = (warning.mjWARN_BADQPOS, warning.mjWARN_BADQVEL, warning.mjWARN_BADQACC, warning.mjWARN_BADCTRL)
         bad = any(self.data.warning[int(kind)].number for kind in kinds)
         return bad or not np.all(np.isfinite(self.data.qpos)) or not np.all(np.isfinite(self.data.qvel))
 
@@ -123,6 +126,8 @@ class Simulation:
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing by default, at time 0."""
         state = self.robot.standing() if state is None else state
+        if not isinstance(state, State):
+            raise InputError(f"reset needs a State, as robot.standing(), not {state!r}.")
         if state.robot is not self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
         mujoco.mj_resetData(self.model, self.data)
@@ -132,9 +137,7 @@ class Simulation:
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
-        tau = np.asarray(tau, dtype=np.float64)
-        if tau.shape != (self.robot.d,) or not np.all(np.isfinite(tau)):
-            raise InputError(f"torques must be {self.robot.d} finite numbers (N·m); got {tau!r}.")
+        tau = checked("torques", tau, (self.robot.d,), "N·m")
         self.data.ctrl[self._motors] = tau
         self.data.xfrc_applied[:] = 0.0
         for push in pushes:

@@ -105,6 +105,7 @@ def rollout(
     returned and says so.
     Raises `InputError` for a period that does not divide, a push that is none, and a controller without `.tau`.
     """
+    _check(sim, controller, pushes)
     positive("duration", duration, "s")
     period = sim.timestep if control_period is None else positive("control_period", control_period, "s")
     substeps = round(period / sim.timestep)
@@ -112,9 +113,6 @@ def rollout(
         raise InputError(
             f"control_period {period:g} s is not a whole multiple of the simulation's timestep {sim.timestep:g} s."
         )
-    for push in pushes:
-        if not isinstance(push, Push):
-            raise InputError(f"pushes must hold fb.Push values; {push!r} is none.")
     run = _Run(sim, controller, tuple(pushes), actuators)
     outcome: Outcome = "completed"
     error: FloatbaseError | None = None
@@ -132,6 +130,24 @@ def rollout(
             outcome = "fell"
             break
     return run.record(outcome, error)
+
+
+def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> None:
+    """What a rollout is handed must be of the right kind, and of one robot."""
+    if not isinstance(sim, Simulation):
+        raise InputError(f"rollout needs a Simulation first, as fb.Simulation(robot), not {sim!r}.")
+    if not callable(controller):
+        raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
+    if getattr(controller, "robot", sim.robot) is not sim.robot:
+        raise InputError(
+            f"the controller is one for {controller.robot.name}, the simulation holds {sim.robot.name}: "
+            "make both from one fb.load."
+        )
+    if not isinstance(pushes, Sequence):
+        raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {pushes!r}.")
+    for push in pushes:
+        if not isinstance(push, Push):
+            raise InputError(f"pushes must hold fb.Push values; {push!r} is none.")
 
 
 class _Run:

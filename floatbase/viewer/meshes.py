@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import floatbase
+from floatbase._assets import assets_root
 from floatbase.robots.robot import Robot
 from floatbase.viewer import geometry
 from floatbase.viewer.colours import ROBOT
@@ -28,13 +28,6 @@ class JointMesh:
     vertices: npt.NDArray[np.float32]
     faces: npt.NDArray[np.uint32]
     colours: npt.NDArray[np.uint8]
-
-
-def assets_root() -> Path:
-    """The folder `assets/`: inside an installed package, else at the top of the repository."""
-    package = Path(floatbase.__file__).parent
-    installed = package / "_assets"
-    return installed if installed.is_dir() else package.parent / "assets"
 
 
 def robot_meshes(robot: Robot) -> list[JointMesh]:

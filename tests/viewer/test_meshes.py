@@ -8,8 +8,9 @@ import sys
 import numpy as np
 import pytest
 
+from floatbase._assets import assets_root
 from floatbase.robots import load, robots
-from floatbase.viewer.meshes import assets_root, robot_meshes
+from floatbase.viewer.meshes import robot_meshes
 
 
 @pytest.mark.parametrize("name", robots())
