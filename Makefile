@@ -22,6 +22,8 @@ FOUND := $(shell for p in $(or $(PYTHON),python3 python3.13 python3.12 python3.1
 KEY := $(or $(firstword $(FOUND)),none)
 BASE := $(wordlist 2,99,$(FOUND))
 
+# the part of JupyterLab that asks the network for news and updates, off in .venv
+NEWS := @jupyterlab/apputils-extension:announcements
 FIRST := /lab/tree/00_start_here.ipynb
 
 help:
@@ -33,12 +35,9 @@ help:
 	@echo
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
 
-# Nothing leaves the machine: no news, no look for updates, no list of extensions
 lab: setup
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
-		--LabApp.news_url=None --LabApp.extension_manager=readonly \
-		--LabApp.check_for_updates_class=jupyterlab.handlers.announcements.NeverCheckForUpdate \
-		$(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
+		--LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
 test: setup
 	$(BIN)/ruff check .
@@ -53,6 +52,7 @@ $(VENV)/locked-$(KEY): environment.txt | python
 	@rm -rf $(VENV)
 	@"$(BASE)" -m venv $(VENV)
 	@$(PIP) install -q -r environment.txt
+	@$(BIN)/jupyter labextension disable $(NEWS) >/dev/null 2>&1
 	@touch $@
 
 $(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
