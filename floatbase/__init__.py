@@ -21,7 +21,7 @@ from floatbase.objectives.tasks import (
     TorqueTask,
     standing_tasks,
 )
-from floatbase.robots import Foot, State, load, robots
+from floatbase.robots import Foot, State, load, load_urdf, robots
 
 if TYPE_CHECKING:
     from floatbase.simulation.physics import Push, Simulation
@@ -61,6 +61,7 @@ __all__ = [
     "WholeBodyController",
     "equations_of_motion",
     "load",
+    "load_urdf",
     "robots",
     "rollout",
     "standing_tasks",

@@ -6,16 +6,17 @@ value by other expressions than the one asked for.
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from floatbase.errors import unknown_name
 
-LESSONS = ("lesson00",)  # modules with EXERCISES
 
 
 @dataclass(frozen=True)
@@ -86,10 +87,11 @@ class Numeric:
 def exercises() -> dict[str, Exercise]:
     """All exercises by name, such as "00.1"."""
     found: dict[str, Exercise] = {}
-    for module in LESSONS:
-        for exercise in import_module(f"floatbase.lessons.{module}").EXERCISES:
-            found[exercise.name] = exercise
-    return found
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        if module.name.startswith("lesson"):
+            for exercise in import_module(f"floatbase.lessons.{module.name}").EXERCISES:
+                found[exercise.name] = exercise
+    return dict(sorted(found.items()))
 
 
 def check(name: str, answer: Any) -> Verdict:

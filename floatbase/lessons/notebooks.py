@@ -41,7 +41,7 @@ def solved(notebook: Any) -> Any:
 
 
 def execute(notebook: Any, folder: Path) -> Any:
-    """Run all cells in a fresh kernel whose working directory is `folder`; an error in a cell is raised. Changes it in place."""
+    """Run all cells in a fresh kernel in `folder`, in place; an error in a cell is raised."""
     from nbclient import NotebookClient
 
     return NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}}).execute()

@@ -103,18 +103,65 @@ def load(
     """
     loader = _loader(name)
     entry = CATALOGUE.get(name)
-    root = Path(loader.model_root)
-    model = pin.buildModelFromUrdf(str(root / loader.urdf), *([pin.JointModelFreeFlyer()] if loader.free_flyer else []))
-    posture = _posture(name, model, loader, entry, posture)
-    limits = _torque_limits(model, loader.free_flyer, entry, torque_limits)
+    model = _model(loader.urdf, loader.free_flyer)
+    start = _reference(model, loader, entry)
+    return _robot(name, model, loader, entry, start, feet, foot_radius, torque_limits, posture)
+
+
+def load_urdf(
+    path: str | Path,
+    *,
+    name: str | None = None,
+    floating: bool = True,
+    package_dirs: Sequence[str | Path] = (),
+    feet: Sequence[str | Foot] = (),
+    foot_radius: float | None = None,
+    torque_limits: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | None = None,
+) -> Robot:
+    """Load a robot of your own from a URDF file.
+
+    name: the file's name without its ending by default. floating: whether the root link is free to move. package_dirs: where
+    meshes named package://… lie; the file's own folder is always searched. The rest as for `load`; the posture is that of
+    all joints at zero by default. Raises `InputError` for a file that is not there or cannot be read.
+    """
+    urdf = Path(path).expanduser().resolve()
+    if not urdf.is_file():
+        raise InputError(f"there is no file {urdf}; give the path of a URDF file.")
+    name = urdf.stem if name is None else name
+    dirs = (*(Path(folder) for folder in package_dirs), urdf.parent)
+    loader = _Loader(urdf, None, None, floating, False, dirs)
+    try:
+        model = _model(urdf, floating)
+    except (RuntimeError, ValueError) as error:
+        raise InputError(f"Pinocchio cannot read {urdf.name} as a URDF: {error}") from None
+    return _robot(name, model, loader, None, pin.neutral(model), list(feet), foot_radius, torque_limits, posture)
+
+
+def _model(urdf: Path, floating: bool) -> pin.Model:
+    return pin.buildModelFromUrdf(str(urdf), *([pin.JointModelFreeFlyer()] if floating else []))
+
+
+def _robot(
+    name: str,
+    model: pin.Model,
+    loader: _Loader,
+    entry: Entry | None,
+    start: Array,
+    feet: Sequence[str | Foot] | None,
+    foot_radius: float | None,
+    torque_limits: npt.ArrayLike | None,
+    posture: npt.ArrayLike | None,
+) -> Robot:
+    """The robot, after every argument was checked."""
     robot = Robot(
         name=name,
         model=model,
-        urdf=root / loader.urdf,
-        package_dirs=(root.parent.parent, root),
+        urdf=loader.urdf,
+        package_dirs=loader.package_dirs,
         feet=_feet(name, entry, feet, foot_radius, loader.free_flyer),
-        torque_limits=limits,
-        posture=posture,
+        torque_limits=_torque_limits(model, loader.free_flyer, entry, torque_limits),
+        posture=start if posture is None else _checked_posture(name, model, loader.free_flyer, posture),
         description=entry.description if entry else "",
         sources=entry.sources if entry else {},
     )
@@ -125,17 +172,18 @@ def load(
 
 @dataclass(frozen=True)
 class _Loader:
-    """Where example-robot-data keeps a robot."""
+    """Where a robot's files are, and what is said in them."""
 
-    model_root: str
-    urdf: str
-    srdf: str
+    urdf: Path
+    srdf: Path | None
     reference: str | None
     free_flyer: bool
     rotors: bool
+    package_dirs: tuple[Path, ...]
 
 
 def _loader(name: str) -> _Loader:
+    """A robot of example-robot-data."""
     import example_robot_data as data
 
     known = data.robots_loader.ROBOTS
@@ -145,31 +193,32 @@ def _loader(name: str) -> _Loader:
     if not loader.urdf_filename:
         raise InputError(f"{name} comes as an SDF file; floatbase reads URDF. Choose one of {', '.join(CATALOGUE)}.")
     urdf = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
-    srdf = f"{loader.path}/{loader.srdf_subpath}/{loader.srdf_filename}" if loader.srdf_filename else ""
     root = Path(data.getModelPath(urdf)).resolve()
-    return _Loader(str(root), urdf, srdf, loader.ref_posture, loader.free_flyer, loader.has_rotor_parameters)
+    srdf = root / loader.path / loader.srdf_subpath / loader.srdf_filename if loader.srdf_filename else None
+    dirs = (root.parent.parent, root)
+    return _Loader(root / urdf, srdf, loader.ref_posture, loader.free_flyer, loader.has_rotor_parameters, dirs)
 
 
-def _posture(name: str, model: pin.Model, loader: _Loader, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:
-    """The posture asked for, or the reference of the SRDF with the catalogue's joint angles on top; loads rotor inertia too."""
+def _reference(model: pin.Model, loader: _Loader, entry: Entry | None) -> Array:
+    """The SRDF's reference configuration with the catalogue's joint angles on top; loads rotor inertia too."""
     q = pin.neutral(model)
-    if loader.srdf:
-        srdf = str(Path(loader.model_root) / loader.srdf)
+    if loader.srdf is not None:
         if loader.rotors:
-            pin.loadRotorParameters(model, srdf, False)
+            pin.loadRotorParameters(model, str(loader.srdf), False)
             model.armature = model.rotorInertia * model.rotorGearRatio**2
-        pin.loadReferenceConfigurations(model, srdf, False)
+        pin.loadReferenceConfigurations(model, str(loader.srdf), False)
         references = {entry.key(): entry.data() for entry in model.referenceConfigurations}
-        q = references.get(loader.reference, q)
-    if asked is not None:
-        q = checked("posture", asked, (model.nq,))
-        if loader.free_flyer and abs(float(np.linalg.norm(q[3:7])) - 1.0) > 1e-6:
-            raise InputError(f"the base quaternion posture[3:7] of {name} (x y z w) must have length 1, not {q[3:7]}.")
-    elif entry is not None:
-        q = q.copy()
-        for joint, angle in entry.joints.items():
-            q[model.idx_qs[model.getJointId(joint)]] = angle
-    return read_only(pin.normalize(model, np.array(q)))
+        q = np.array(references.get(loader.reference, q))
+    for joint, angle in (entry.joints if entry else {}).items():
+        q[model.idx_qs[model.getJointId(joint)]] = angle
+    return read_only(pin.normalize(model, q))
+
+
+def _checked_posture(name: str, model: pin.Model, floating: bool, asked: npt.ArrayLike) -> Array:
+    q = checked("posture", asked, (model.nq,))
+    if floating and abs(float(np.linalg.norm(q[3:7])) - 1.0) > 1e-6:
+        raise InputError(f"the base quaternion posture[3:7] of {name} (x y z w) must have length 1, not {q[3:7]}.")
+    return q
 
 
 def _torque_limits(model: pin.Model, free_flyer: bool, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:

@@ -62,8 +62,9 @@ class Simulation:
 
     The model is edited from the robot's own URDF: free joint for a floating base, a ball at each foot (or at each
     corner of a flat foot), a plane with friction, a torque motor with its limit on each joint, rotor inertia as in the
-    robot. Joint friction and damping are off, as in (1)-(7), joint limits of the URDF are on. Only feet and ground touch. ground: a `Ground`, or the
-    coefficient of friction of a level one. timestep: s. Raises `SimulationError` when MuJoCo cannot build the robot.
+    robot. Joint friction and damping are off, as in (1)-(7); joint limits of the URDF are on. Only feet and ground touch.
+    ground: a `Ground`, or the coefficient of friction of a level one. timestep: s.
+    Raises `SimulationError` when MuJoCo cannot build the robot.
     """
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):

@@ -1,0 +1,39 @@
+"""Robots of one's own: the models that come with the course, and what is said when a file cannot be used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase._assets import assets_root
+from floatbase.errors import InputError
+
+MODELS = sorted((assets_root() / "models").glob("*.urdf"))
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_a_model_of_our_own_is_the_same_to_mujoco(path: Path) -> None:
+    robot = fb.load_urdf(path)
+    assert robot.is_floating
+    state = robot.random_state(0)
+    M, h = judges.mujoco_dynamics(state)
+    assert np.allclose(state.M, M, rtol=0, atol=1e-9 * np.abs(M).max())
+    assert np.allclose(state.h, h, rtol=0, atol=1e-9 * np.abs(h).max())
+
+
+def test_an_arm_may_be_bolted_down_or_float() -> None:
+    urdf = fb.load("ur5").urdf
+    assert (fb.load_urdf(urdf, floating=False).nv, fb.load_urdf(urdf).nv) == (6, 12)
+
+
+def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"there is no file .*nothing\.urdf; give the path of a URDF file"):
+        fb.load_urdf(tmp_path / "nothing.urdf")
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot>")
+    with pytest.raises(InputError, match=r"Pinocchio cannot read broken\.urdf as a URDF"):
+        fb.load_urdf(broken)
