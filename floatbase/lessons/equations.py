@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import floatbase
 from floatbase.lessons.notebooks import FOLDER, read
@@ -70,15 +71,20 @@ class Entry:
 
 
 def entries() -> list[Entry]:
-    """Everything public whose docstring starts with an equation number or an appendix, with its tests."""
+    """Everything public whose docstring starts with an equation number or an appendix, with its tests.
+
+    A class is tested where it is named or where a function that returns it is; a member where both it and its class are.
+    """
     named = _names_in_tests()
     found = []
-    for path, docstring in _public():
+    for path, docstring, makers in _public():
         start = _START.match(docstring)
         if start:
-            equations = re.findall(r"\(\d+\)|App\. [ABC]", start.group(1))
-            tests = named.get(path.rsplit(".", 1)[1], set())
-            found.append(Entry(path, tuple(equations), tuple(sorted(tests))))
+            owner, name = path.rsplit(".", 2)[1:]
+            tests = set().union(*(named.get(maker, set()) for maker in makers))
+            if owner[0].isupper():
+                tests &= named.get(name, set())
+            found.append(Entry(path, tuple(re.findall(r"\(\d+\)|App\. [ABC]", start.group(1))), tuple(sorted(tests))))
     return found
 
 
@@ -107,26 +113,42 @@ def table() -> str:
         here = [entry for entry in found if equation in entry.equations]
         functions = "<br>".join(f"`{entry.path.removeprefix('floatbase.')}`" for entry in here)
         tests = sorted({test.split("::")[0] for entry in here for test in entry.tests})
-        count = len({test for entry in here for test in entry.tests})
         lessons = ", ".join(f"[{name.split('_')[0]}]({name})" for name in lessons_of(equation))
-        lines.append(f"| {equation} | {title} | {functions} | {count} in {', '.join(tests)} | {lessons} |")
+        lines.append(f"| {equation} | {title} | {functions} | {', '.join(tests)} | {lessons} |")
     return "\n".join(lines) + "\n"
 
 
-def _public() -> Iterator[tuple[str, str]]:
-    """Import path and docstring of every public function, class, method and property of the package."""
-    for module in pkgutil.walk_packages(floatbase.__path__, "floatbase."):
-        if module.name.rsplit(".", 1)[1].startswith("_") or ".viewer" in module.name:
-            continue
-        loaded = import_module(module.name)
-        for name, value in vars(loaded).items():
-            if name.startswith("_") or getattr(value, "__module__", None) != module.name:
-                continue
-            yield f"{module.name}.{name}", inspect.getdoc(value) or ""
-            if inspect.isclass(value):
-                for member, thing in vars(value).items():
-                    if not member.startswith("_"):
-                        yield f"{module.name}.{name}.{member}", inspect.getdoc(thing) or ""
+def _public() -> Iterator[tuple[str, str, list[str]]]:
+    """Import path, docstring and the names that make it, of every public function, class, method and property."""
+    names = [found.name for found in pkgutil.walk_packages(floatbase.__path__, "floatbase.") if _counts(found.name)]
+    modules = [import_module(name) for name in names]
+    own = [(m.__name__, name, value) for m in modules for name, value in vars(m).items() if _is_own(m, name)]
+    for module, name, value in own:
+        makers = [name] + [maker for _, maker, made in own if _returns(made) == name]
+        yield f"{module}.{name}", inspect.getdoc(value) or "", makers
+        for member, thing in vars(value).items() if inspect.isclass(value) and not _is_protocol(value) else ():
+            if not member.startswith("_"):
+                yield f"{module}.{name}.{member}", inspect.getdoc(thing) or "", makers
+
+
+def _counts(module: str) -> bool:
+    """Whether a module can hold equations: pictures, lessons and what starts with an underscore do not."""
+    return not re.search(r"\._|\.viewer|\.lessons", module)
+
+
+def _is_own(module: ModuleType, name: str) -> bool:
+    """Whether a public name was defined in the module, not imported into it."""
+    return not name.startswith("_") and getattr(vars(module)[name], "__module__", None) == module.__name__
+
+
+def _is_protocol(value: type) -> bool:
+    """Whether a class only says what others must offer."""
+    return bool(getattr(value, "_is_protocol", False))
+
+
+def _returns(value: object) -> str:
+    """Name of what a function returns, as its annotation says."""
+    return str(getattr(value, "__annotations__", {}).get("return", ""))
 
 
 def _names_in_tests() -> dict[str, set[str]]:

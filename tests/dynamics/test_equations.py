@@ -126,3 +126,16 @@ def test_rotor_inertia_counts() -> None:
     light = pin.crba(bare, bare.createData(), state.q)
     light = np.triu(light) + np.triu(light, 1).T
     assert np.allclose(state.M - light, np.diag(robot.model.armature), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", fb.robots())
+def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name: str) -> None:
+    """(8): pushing with unit forces one by one, the contact points accelerate by the columns of J M⁻¹ Jᵀ."""
+    from floatbase.dynamics.subspace import contact_inertia_inverse
+
+    state = judges.states(name, 1)[0]
+    contacts = judges.stance(state.robot) if state.robot.is_floating else fb.Contacts.points(state.robot, frames=["tool0"])
+    eom = fb.equations_of_motion(state, contacts)
+    rest = judges.aba(eom, np.zeros(eom.d), np.zeros(eom.k))
+    columns = [eom.A @ (judges.aba(eom, np.zeros(eom.d), unit) - rest) for unit in np.eye(eom.k)]
+    assert judges.relative(contact_inertia_inverse(eom), np.column_stack(columns)) < 1e-9
