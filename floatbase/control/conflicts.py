@@ -2,31 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from scipy.optimize import linprog
 
 from floatbase._arrays import Array
+from floatbase.errors import InfeasibleError, SolverError
 
-_TOLERANCE = 1e-8  # a violation below this part of the rows' size counts as none
+_TOLERANCE = 1e-9  # a violation below this counts as none
+_ROUNDING = 1e-12  # part of the largest |h| that a linear program may leave as a violation
+_HIGHS = 1e-10  # the most exact that HiGHS can be asked to be
+
+
+def contradiction(rows: Iterable[str]) -> InfeasibleError:
+    """The error that names the inequality rows in conflict."""
+    rows = tuple(rows)
+    return InfeasibleError(
+        "no point satisfies all rows. Given the equalities, these contradict each other: "
+        + ", ".join(rows)
+        + ". Loosen or drop any one of them.",
+        rows,
+    )
 
 
 def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:
     """Indices of rows of G y ≤ h that cannot hold together, while any of them dropped leaves the others satisfiable.
 
-    G: (l, n), h: (l,). Empty when a point satisfies all rows. A linear program finds the least common violation; the rows
-    with a multiplier there form a contradiction (Farkas), which a second pass thins out row by row.
+    G: (l, n), h: (l,), in units that make violations of different rows comparable. Empty when a point satisfies all
+    rows. A linear program finds the least common violation; the rows with a multiplier there form a contradiction
+    (Farkas), which a second pass thins out row by row. Raises `SolverError` when the linear program fails.
     """
-    size = np.maximum(np.linalg.norm(G, axis=1), 1e-12)
-    G, h = G / size[:, None], h / size
-    violation, rows = _least_violation(G, h)
-    if violation <= _TOLERANCE * (1.0 + float(np.max(np.abs(h), initial=0.0))):
+    tolerance = _TOLERANCE + _ROUNDING * float(np.max(np.abs(h), initial=0.0))
+    violation, kept = _least_violation(G, h)
+    if violation <= tolerance:
         return ()
-    kept = list(rows)
-    for row in rows:
+    for row in tuple(kept):
         rest = [i for i in kept if i != row]
-        if rest and _least_violation(G[rest], h[rest])[0] > 0.5 * _TOLERANCE:
+        if _least_violation(G[rest], h[rest])[0] > tolerance:
             kept = rest
     return tuple(sorted(kept))
+
+
+def contradicting_equalities(A: Array, b: Array, tolerance: float) -> tuple[int, ...]:
+    """Indices of rows of A x = b that cannot hold together, while any of them dropped leaves the others satisfiable.
+
+    A: (m, n) with rows of unit length, b: (m,), known to contradict each other by more than `tolerance`.
+    """
+    kept = list(range(len(A)))
+    for row in range(len(A)):
+        rest = [i for i in kept if i != row]
+        x = np.linalg.lstsq(A[rest], b[rest], rcond=None)[0]
+        if np.max(np.abs(A[rest] @ x - b[rest]), initial=0.0) > tolerance:
+            kept = rest
+    return tuple(kept)
 
 
 def _least_violation(G: Array, h: Array) -> tuple[float, list[int]]:
@@ -38,7 +67,9 @@ def _least_violation(G: Array, h: Array) -> tuple[float, list[int]]:
         b_ub=h,
         bounds=[(None, None)] * n + [(0.0, None)],
         method="highs",
+        options={"primal_feasibility_tolerance": _HIGHS, "dual_feasibility_tolerance": _HIGHS},
     )
     if found.status != 0:
-        return np.inf, list(range(len(G)))
-    return float(found.x[-1]), [int(i) for i in np.flatnonzero(np.abs(found.ineqlin.marginals) > 1e-9)]
+        raise SolverError(f"the linear program that looks for conflicting rows ended with: {found.message}")
+    violation = float(np.max(G @ found.x[:n] - h, initial=0.0))
+    return violation, [int(i) for i in np.flatnonzero(np.abs(found.ineqlin.marginals) > 1e-9)]

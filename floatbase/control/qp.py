@@ -1,29 +1,49 @@
-"""Quadratic programs with named rows, and the solvers behind one function (§4, Appendix C)."""
+"""Quadratic programs with named rows, what makes a point their optimum, and one function to solve them (§4, App. C).
+
+    min ½ xᵀ H x + gᵀ x   subject to   A x = b,   G x ≤ h
+
+The document's g_i(x) = 0 are the rows of A x - b = 0; its h_j(x) < 0 are those of G x - h ≤ 0, with the ≤ that it
+means: an active row holds with equality. x is an optimum, for H positive semidefinite, exactly if there are multipliers
+ν, one for each equality, and μ, one for each inequality, with (Karush, Kuhn, Tucker)
+
+    H x + g + Aᵀ ν + Gᵀ μ = 0     stationarity: the objective's slope is held by the rows
+    A x = b,  G x ≤ h             feasibility
+    μ ≥ 0                         a table top pushes, it never pulls
+    μ_i (G x - h)_i = 0           complementarity: only the rows we rest on push
+
+μ_i is what one unit of room on row i (h_i + 1) would lower the objective by, to first order; ν_i likewise, of either
+sign. Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
+"""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from floatbase._arrays import Array, checked, read_only
-from floatbase.affine import Affine
-from floatbase.control.conflicts import conflicting_rows
+from floatbase.affine import Affine, Quadratic
+from floatbase.control.conflicts import conflicting_rows, contradicting_equalities, contradiction
 from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_name
 
-RANK_TOLERANCE = 1e-10  # singular values below this part of the largest count as zero
-FEASIBILITY_TOLERANCE = 1e-9  # what DAQP may leave of an inequality, in the row's unit
+if TYPE_CHECKING:
+    from floatbase.control.backends import BackEnd
+
+RANK_TOLERANCE = 1e-10  # singular values of equality rows of unit length below this part of the largest count as zero
+FEASIBILITY_TOLERANCE = 1e-9  # what a solver may leave of an inequality of unit length
+_ROUNDING = 1e-14  # part of a sum's terms that may be rounding
 
 
 @dataclass(frozen=True, eq=False)
 class QP:
     """min ½ xᵀ H x + gᵀ x  subject to  A x = b,  G x ≤ h (Appendix C, with the ≤ that it means).
 
-    H: (n, n) symmetric, positive semidefinite. g: (n,). A: (m, n), b: (m,). G: (l, n), h: (l,). `blocks` names slices of
-    x; `equality_names` and `inequality_names` name the rows. Raises `InputError` when shapes or names do not fit.
+    H: (n, n) symmetric, positive semidefinite where A x = b. g: (n,). A: (m, n), b: (m,). G: (l, n), h: (l,). `blocks`
+    names slices of x; `equality_names` and `inequality_names` name the rows. Raises `InputError` when shapes or names
+    do not fit.
     """
 
     H: Array
@@ -45,10 +65,13 @@ class QP:
         for name, value in values.items():
             object.__setattr__(self, name, value)
         for kind, rows in (("equality", len(A)), ("inequality", len(G))):
-            names = getattr(self, f"{kind}_names") or tuple(f"{kind} {i}" for i in range(rows))
+            names = tuple(getattr(self, f"{kind}_names")) or tuple(f"{kind} {i}" for i in range(rows))
             if len(names) != rows:
                 raise InputError(f"{len(names)} {kind} names for {rows} rows; give one for each row, or none at all.")
-            object.__setattr__(self, f"{kind}_names", tuple(names))
+            if len(set(names)) != rows:
+                twice = next(name for name in names if names.count(name) > 1)
+                raise InputError(f"{kind} name {twice!r} stands twice; each row needs a name of its own.")
+            object.__setattr__(self, f"{kind}_names", names)
 
     @property
     def n(self) -> int:
@@ -63,18 +86,42 @@ class QP:
     def equality_space(self) -> Affine:
         """All x with A x = b, as the map β -> x0 + Z β with orthonormal Z and x0 of smallest norm (13).
 
-        Raises `InfeasibleError` naming rows when the equalities contradict each other.
+        Rows count at unit length, so that multiplying an equation changes nothing. Raises `InfeasibleError` naming rows
+        when the equalities contradict each other.
         """
         if not len(self.A):
             return Affine.identity(self.n)
-        U, s, Vt = np.linalg.svd(self.A)
+        size = _sizes(self.A)
+        A, b = self.A / size[:, None], self.b / size
+        U, s, Vt = np.linalg.svd(A)
         rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s.size else 0
-        left = U[:, rank:].T @ self.b
-        if np.max(np.abs(left), initial=0.0) > 1e-7 * (1.0 + float(np.max(np.abs(self.b)))):
-            weight = np.abs(U[:, rank:] @ left)
-            rows = [self.equality_names[i] for i in np.flatnonzero(weight > 1e-3 * weight.max())]
-            raise InfeasibleError(f"these equality rows contradict each other: {', '.join(rows)}.", rows)
-        return Affine(Vt[rank:].T, Vt[:rank].T @ ((U[:, :rank].T @ self.b) / s[:rank]))
+        left = U[:, rank:].T @ b
+        tolerance = 1e-7 * (1.0 + float(np.max(np.abs(b))))
+        if np.max(np.abs(left), initial=0.0) > tolerance:
+            rows = [self.equality_names[i] for i in contradicting_equalities(A, b, tolerance)]
+            raise InfeasibleError(f"these equality rows contradict each other: {', '.join(rows)}. Drop one.", rows)
+        return Affine(Vt[rank:].T, Vt[:rank].T @ ((U[:, :rank].T @ b) / s[:rank]))
+
+    @cached_property
+    def reduced(self) -> QP:
+        """The same problem in β: the objective pulled back through `equality_space` (18), the same inequality rows."""
+        if not len(self.A):
+            return self
+        space = self.equality_space
+        Z, x0 = space.A, space.b
+        cost = Quadratic(self.H, self.g).pullback(space)
+        # what vanishes on the space must come out as zero: its rounding would pass for a curvature, a slope or a row
+        H = _without_rounding(cost.H, np.max(np.abs(self.H), initial=0.0))
+        g = _without_rounding(cost.g, np.max(np.abs(self.H) @ np.abs(x0) + np.abs(self.g), initial=0.0))
+        G, h = self.G @ Z, self.h - self.G @ x0
+        G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_sizes] = 0.0
+        h[np.abs(h) <= _ROUNDING * (np.abs(self.G) @ np.abs(x0) + np.abs(self.h))] = 0.0
+        return QP(H, g, np.zeros((0, space.n_in)), np.zeros(0), G, h, inequality_names=self.inequality_names)
+
+    @cached_property
+    def row_sizes(self) -> Array:
+        """Length of each row of G, shape (l,), 1 for a row of zeros: the unit to compare violations of rows in."""
+        return read_only(_sizes(self.G))
 
     def __repr__(self) -> str:
         return f"QP({self.n} variables, {len(self.A)} equalities, {len(self.G)} inequalities)"
@@ -126,14 +173,14 @@ class Solution:
 
     @cached_property
     def active(self) -> tuple[str, ...]:
-        """Names of the inequality rows that push: those with a multiplier that counts, relative to the objective's slope."""
-        mu = self.inequality_multipliers
-        threshold = 1e-9 * (1.0 + float(np.max(np.abs(self.qp.g), initial=0.0)))
-        return tuple(self.qp.inequality_names[i] for i in np.flatnonzero(mu > threshold))
+        """Names of the inequality rows that push: those whose multiplier counts beside the slopes it holds."""
+        qp, push = self.qp, self.inequality_multipliers * self.qp.row_sizes
+        slopes = np.concatenate([qp.g, qp.H @ self.x, push])
+        return tuple(qp.inequality_names[i] for i in np.flatnonzero(push > 1e-9 * np.max(np.abs(slopes), initial=0.0)))
 
     @property
     def multipliers(self) -> dict[str, float]:
-        """Multiplier of each active inequality row, by name: what a unit of room on that row would lower the objective by."""
+        """Multiplier of each active inequality row, by name: what a unit of room there would lower the objective by."""
         mu = dict(zip(self.qp.inequality_names, self.inequality_multipliers, strict=True))
         return {name: float(mu[name]) for name in self.active}
 
@@ -152,113 +199,84 @@ class Solution:
 def solve(qp: QP, solver: str = "daqp") -> Solution:
     """Solve a QP.
 
-    solver: one of `solvers()`: "daqp" is what controllers use; "cvxpy" (Clarabel at tight tolerances) is the judge, slow
-    and independent. Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the solver gives
-    up, `UnknownNameError` for a solver that does not exist.
+    solver: one of `solvers()`. "daqp" is what controllers use; "cvxpy" (Clarabel at tight tolerances) is the judge,
+    slow and independent; "active_set" is the method of `active_set.py`, written to be read; "proxsuite" (ProxQP) needs
+    that package. Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has
+    no minimum or the solver gives up, `UnknownNameError` for a solver that does not exist, `InputError` for one that is
+    not installed.
     """
-    if solver not in _SOLVERS:
-        raise unknown_name("solver", solver, _SOLVERS)
-    found = _SOLVERS[solver](qp)
+    check_solver(solver)
+    found = _installed()[solver](qp)
     if found is None:
         raise _infeasible(qp)
-    x, mu, iterations = found
-    slope = qp.H @ x + qp.g + qp.G.T @ mu
-    nu = -np.linalg.lstsq(qp.A.T, slope, rcond=RANK_TOLERANCE)[0] if len(qp.A) else np.zeros(0)
-    return Solution(qp, read_only(x), read_only(nu), read_only(mu), solver, iterations)
+    return found
 
 
 def solvers() -> tuple[str, ...]:
-    """Names that `solve` takes."""
-    return tuple(_SOLVERS)
+    """Names that `solve` takes here; "proxsuite" is among them where that package is installed."""
+    return tuple(_installed())
 
 
-_Found = tuple[Array, Array, int] | None
+def check_solver(solver: str) -> None:
+    """Raises for a solver that `solve` does not take: `UnknownNameError`, or `InputError` saying what to install."""
+    from floatbase.control.backends import ALWAYS, OPTIONAL
+
+    if solver in OPTIONAL and solver not in solvers():
+        raise InputError(
+            f"solver {solver!r} needs a package that is not installed: pip install {solver}. "
+            f"Here without it: {', '.join(solvers())}."
+        )
+    if solver not in solvers():
+        raise unknown_name("solver", solver, [*ALWAYS, *OPTIONAL])
 
 
-def _daqp(qp: QP) -> _Found:
-    """Eliminate the equalities, then DAQP's dual active set on what is left: x, μ, iterations; None when infeasible."""
-    import daqp
+def finished(qp: QP, x: Array, mu: Array, solver: str, iterations: int) -> Solution:
+    """The `Solution` of a back end that found x and μ; ν follows from stationarity, by least squares."""
+    slope, size = qp.H @ x + qp.g + qp.G.T @ mu, _sizes(qp.A)
+    nu = np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size if len(qp.A) else np.zeros(0)
+    return Solution(qp, read_only(x), read_only(nu), read_only(mu), solver, iterations)
 
-    space = qp.equality_space
-    if space.n_in == 0:
-        return _single_point(qp, space.b)
-    H = np.ascontiguousarray(space.A.T @ qp.H @ space.A)
-    g = space.A.T @ (qp.H @ space.b + qp.g)
-    scale = max(float(np.max(np.abs(H))), 1e-300)
-    y, _, flag, info = daqp.solve(
-        H / scale,
-        g / scale,
-        np.ascontiguousarray(qp.G @ space.A),
-        qp.h - qp.G @ space.b,
-        np.full(len(qp.h), -1e30),
-        np.zeros(len(qp.h), dtype=np.int32),
-        primal_tol=FEASIBILITY_TOLERANCE,
-        eps_prox=-1.0,
+
+def unbounded(qp: QP) -> SolverError:
+    """The error for a problem whose objective falls for ever."""
+    return SolverError(
+        f"the objective of {qp!r} has no minimum: it falls for ever along a direction without curvature or row. "
+        "Add a task of small weight that wants something of every variable (force or torque regularisation), or bounds."
     )
-    if flag == -1:
-        return None
-    if flag not in (1, 2):
-        raise SolverError(f"DAQP gave up with flag {flag} on {qp!r}; check weights (too far apart?) and curvature.")
-    mu = np.maximum(np.asarray(info["lam"], dtype=np.float64)[-len(qp.h) :] * scale, 0.0) if len(qp.h) else np.zeros(0)
-    return space(y), mu, int(info["iterations"])
 
 
-def _single_point(qp: QP, x: Array) -> _Found:
-    """The equalities leave one point: it is the answer if it satisfies the inequalities."""
-    if np.max(qp.G @ x - qp.h, initial=0.0) > 1e-7:
-        return None
-    return x, np.zeros(len(qp.h)), 0
+def not_convex(qp: QP) -> SolverError:
+    """The error for an objective that curves downwards."""
+    return SolverError(
+        f"{qp!r} is not convex: along one direction its curvature is {np.linalg.eigvalsh(qp.reduced.H)[0]:.3g}. "
+        "H must be positive semidefinite where the equalities hold; weights must be ≥ 0."
+    )
 
 
-def _cvxpy(qp: QP) -> _Found:
-    """The whole problem, equalities included, by cvxpy and Clarabel at tight tolerances."""
-    import cvxpy as cp
-
-    # written around the optimum without inequalities: Clarabel's gap is relative to an objective that is then small, which
-    # is what lets it see weights of 1e-6 beside weights of 10
-    origin = _without_inequalities(qp)
-    slope = qp.H @ origin + qp.g
-    step = cp.Variable(qp.n)
-    constraints = []
-    if len(qp.A):
-        constraints.append(qp.A @ step == qp.b - qp.A @ origin)
-    if len(qp.G):
-        constraints.append(qp.G @ step <= qp.h - qp.G @ origin)
-    problem = cp.Problem(cp.Minimize(0.5 * cp.quad_form(step, cp.psd_wrap(qp.H)) + slope @ step), constraints)
-    try:
-        with warnings.catch_warnings():
-            # at its last digits Clarabel calls itself inaccurate; how accurate it was, Solution.residuals says
-            warnings.filterwarnings("ignore", message="Solution may be inaccurate")
-            problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=200)
-    except cp.error.SolverError as error:
-        raise SolverError(f"Clarabel gave up on {qp!r}: {error}") from None
-    if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
-        return None
-    if step.value is None:
-        raise SolverError(f"Clarabel ended with status {problem.status!r} on {qp!r}.")
-    mu = np.maximum(np.asarray(constraints[-1].dual_value), 0.0) if len(qp.G) else np.zeros(0)
-    return origin + np.asarray(step.value), np.atleast_1d(mu), int(problem.solver_stats.num_iters or 0)
+def _sizes(rows: Array) -> Array:
+    """Length of each row, 1 for a row of zeros."""
+    size = np.linalg.norm(rows, axis=1)
+    return np.where(size > 0.0, size, 1.0)
 
 
-def _without_inequalities(qp: QP) -> Array:
-    """A stationary point of the problem without its inequalities, shape (n,), from its KKT system."""
-    m = len(qp.A)
-    kkt = np.block([[qp.H, qp.A.T], [qp.A, np.zeros((m, m))]])
-    return np.linalg.lstsq(kkt, np.concatenate([-qp.g, qp.b]), rcond=None)[0][: qp.n]
+def _without_rounding(value: Array, terms: float) -> Array:
+    """`value`, or zeros when all of it is no more than the rounding of sums of terms of that size."""
+    return value if np.max(np.abs(value), initial=0.0) > _ROUNDING * terms else np.zeros_like(value)
 
 
-_SOLVERS: dict[str, Callable[[QP], _Found]] = {"daqp": _daqp, "cvxpy": _cvxpy}
+def _installed() -> Mapping[str, BackEnd]:
+    from floatbase.control.backends import installed  # the back ends import this module for what they take and give
+
+    return installed()
 
 
-def _infeasible(qp: QP) -> InfeasibleError:
-    """The error for a problem without a feasible point, naming the rows in conflict."""
-    space = qp.equality_space
-    rows = [qp.inequality_names[i] for i in conflicting_rows(qp.G @ space.A, qp.h - qp.G @ space.b)]
-    if not rows:
-        raise SolverError(f"the solver found {qp!r} infeasible, but a linear program finds a feasible point: borderline.")
-    return InfeasibleError(
-        "no point satisfies all rows. Given the equalities, these contradict each other: "
-        + ", ".join(rows)
-        + ". Loosen or drop any one of them.",
-        rows,
+def _infeasible(qp: QP) -> InfeasibleError | SolverError:
+    """The error for a problem in which a solver found no feasible point, naming the rows in conflict."""
+    size = qp.row_sizes
+    rows = conflicting_rows(qp.reduced.G / size[:, None], qp.reduced.h / size)
+    if rows:
+        return contradiction(qp.inequality_names[i] for i in rows)
+    return SolverError(
+        f"the solver found no point that satisfies all rows of {qp!r}, but a linear program found one: the rows only "
+        f"just meet. Loosen them by more than {FEASIBILITY_TOLERANCE:g}."
     )
