@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
+import scipy.linalg
 
 import floatbase as fb
-from floatbase.dynamics import EquationsOfMotion, subspace
+from floatbase.dynamics import EquationsOfMotion, FlatFootContact, subspace
 from floatbase.dynamics.constraints import fixed_frame
 
 Array = npt.NDArray[np.float64]
@@ -409,6 +410,54 @@ def test_mujocos_forces_at_rest_differ_from_zeta_by_less_than_three_millionths_o
 def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth_of_the_weight(name: str) -> None:
     """Measured while swaying at 1 rad/s and 2 cm: 2e-5 of the weight: a rigid contact is a good model of MuJoCo's stiffest."""
     assert 1e-7 < softness(name, moving=True) < 1e-4
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> None:
+    """(10)(12) against (7) itself at points that solve nothing: what is left over is the residual, b's part by MuJoCo's M."""
+    rng = np.random.default_rng(4)
+    for case, eom in cases(name):
+        if case.split()[1] != "random":
+            continue
+        qdd, tau, forces = rng.normal(size=eom.nv), rng.normal(size=eom.d), rng.normal(size=eom.k)
+        B, right = subspace.motion_matrix(eom)
+        left = B @ np.concatenate([qdd, tau, forces]) - right
+        judge = judges.mujoco_of(name).at(eom.state)
+        dynamics = judge.M @ qdd + judge.h - eom.S @ tau - eom.J.T @ forces
+        assert np.allclose(left, np.concatenate([dynamics, eom.A @ qdd - eom.b]), atol=1e-7), case
+        C, a = subspace.torque_force_matrix(eom)
+        wanted = eom.A @ judges.aba(eom, tau, forces) - eom.b
+        assert np.allclose(C @ np.concatenate([tau, forces]) - a, wanted, atol=1e-7 * max(1.0, np.abs(wanted).max(initial=0.0)))
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_as_13_has_them(name: str) -> None:
+    for case, eom in cases(name):
+        if case.split()[1] not in ("standing", "random"):
+            continue
+        eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
+        B, right = subspace.motion_matrix(eom)
+        space = subspace.feasible_space(eom)
+        v = np.linalg.lstsq(B, right, rcond=1e-10)[0]
+        N = scipy.linalg.null_space(B, rcond=1e-10)
+        assert judges.relative(space.map.b, v) < 1e-6, case
+        assert np.allclose(space.map.A @ space.map.A.T, N @ N.T, atol=1e-7), case
+        C, a = subspace.torque_force_matrix(eom)
+        pairs = subspace.torque_force_space(eom)
+        if subspace.forces_are_unique(eom):  # C squares what J has small
+            N = scipy.linalg.null_space(C, rcond=1e-10)
+            assert np.allclose(pairs.A @ pairs.A.T, N @ N.T, atol=1e-6), case
+            assert judges.relative(pairs.b, np.linalg.lstsq(C, a, rcond=1e-10)[0]) < 1e-5, case
+
+
+def test_corners_on_a_line_cannot_hold_six_rows_and_are_refused() -> None:
+    """No corner force turns the foot about the line of the corners: six rows for it have no forces that could keep them."""
+    robot = judges.load("talos")
+    line = [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    with pytest.raises(fb.FloatbaseError):
+        subspace.feasible_space(
+            fb.equations_of_motion(robot.standing(), fb.Contacts([FlatFootContact("left_sole_link", line)]))
+        )
 
 
 # the whole space ---------------------------------------------------------------------------------------------------------
