@@ -108,7 +108,7 @@ def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple
     for i, point in enumerate(contacts.point_names):
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
         rows = slice(per_point * i, per_point * (i + 1))
-        G[rows, 3 * i : 3 * i + 3] = np.vstack([cone.rows, -cone.normal])
+        G[rows, contacts.point_entries[3 * i : 3 * i + 3]] = np.vstack([cone.rows, -cone.normal])
         h[rows.stop - 1] = -limits.min_normal_force
         names += [f"{point} {name}" for name in cone.names] + [f"{point} normal force"]
     return G, h, tuple(names)

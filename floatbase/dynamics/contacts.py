@@ -291,6 +291,13 @@ class Contacts:
         """Coefficient of friction of each point, shape (n,)."""
         return read_only([contact.mu for contact in self._contacts for _ in contact.point_names])
 
+    @property
+    def point_entries(self) -> npt.NDArray[np.intp]:
+        """Which entries of λ are forces at points, shape (3 n,): all but those of a `LinearConstraint`."""
+        ends = np.cumsum([0] + [contact.k for contact in self._contacts])
+        entries = [np.arange(e, e + 3 * len(c.point_names)) for c, e in zip(self._contacts, ends[:-1], strict=True)]
+        return np.concatenate([np.zeros(0, dtype=np.intp), *entries])
+
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n, 3), m."""
         return read_only(np.vstack([np.zeros((0, 3))] + [contact.positions(state) for contact in self._contacts]))

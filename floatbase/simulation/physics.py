@@ -146,6 +146,10 @@ class Simulation:
                 self._apply(push)
         mujoco.mj_step(self.model, self.data)
 
+    def torques(self) -> Array:
+        """Torques that the motors gave during the last step, within their limits, shape (d,), N·m."""
+        return self.data.actuator_force[self._motors]
+
     def contact_forces(self) -> Array:
         """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world, ordered as `point_names`."""
         forces = np.zeros((len(self._points), 3))

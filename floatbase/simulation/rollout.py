@@ -40,10 +40,10 @@ class Actuators(Protocol):
 class Rollout:
     """What happened, one row for each control tick, taken before the tick's torques act.
 
-    time: (n,) s, the simulation's clock. q: (n, nq). v: (n, nv). tau: (n, d) N·m, the torques applied, their mean over
-    the tick. tau_desired: (n, d) N·m, what the controller asked for, the same without actuators. planned: (n, k) N,
-    world, the controller's contact forces (NaN where it gave none). measured: (n, k) N, world, those of the physics
-    during the tick. foot_positions: (n, k/3, 3) m, world.
+    time: (n,) s, the simulation's clock. q: (n, nq). v: (n, nv). tau: (n, d) N·m, the torques applied, within the motors'
+    limits, their mean over the tick. tau_desired: (n, d) N·m, what the controller asked for. planned: (n, k) N, world,
+    the controller's contact forces (NaN where it gave none). measured: (n, k) N, world, those of the physics during the
+    tick (NaN for a constraint that the physics does not know). foot_positions: (n, points, 3) m, world.
     outcome: "completed", "fell", "diverged" or "controller failed" (then `error` holds its exception): the record ends there.
     """
 
@@ -138,10 +138,10 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
         raise InputError(f"rollout needs a Simulation first, as fb.Simulation(robot), not {sim!r}.")
     if not callable(controller):
         raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
-    if getattr(controller, "robot", sim.robot) is not sim.robot:
+    robot = getattr(controller, "robot", sim.robot)
+    if robot is not sim.robot:
         raise InputError(
-            f"the controller is one for {controller.robot.name}, the simulation holds {sim.robot.name}: "
-            "make both from one fb.load."
+            f"the controller is one for {robot!r}, the simulation holds {sim.robot!r}: make both from one fb.load."
         )
     if not isinstance(pushes, Sequence):
         raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {pushes!r}.")
@@ -174,12 +174,12 @@ class _Run:
             tau = self._actuated(desired)
             sim.step(tau, self.pushes)
             forces += sim.contact_forces() / substeps
-            applied += tau / substeps
+            applied += sim.torques() / substeps
         planned = getattr(command, "forces", None)
         planned = np.full(self.contacts.k, np.nan) if planned is None else np.asarray(planned, dtype=np.float64)
         count = np.maximum(self._columns.sum(axis=1, keepdims=True), 1.0)
-        applied = desired if self.actuators is None else applied
-        measured = (self._columns @ forces).ravel()
+        measured = np.full(self.contacts.k, np.nan)
+        measured[self.contacts.point_entries] = (self._columns @ forces).ravel()
         self.rows.append((time, q, v, applied, desired, planned, measured, feet / count))
 
     def _actuated(self, desired: Array) -> Array:
@@ -202,7 +202,7 @@ class _Run:
             "tau_desired": (robot.d,),
             "planned": (k,),
             "measured": (k,),
-            "foot_positions": (k // 3, 3),
+            "foot_positions": (self.contacts.n_points, 3),
         }
         columns: dict[str, Any] = {
             name: read_only(np.array([row[i] for row in self.rows]).reshape((len(self.rows), *shape)))

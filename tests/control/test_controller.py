@@ -352,3 +352,16 @@ def test_commands_can_not_be_written_to() -> None:
     for array in (command.tau, command.qdd, command.forces, command.solution.x):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0.0
+
+
+def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_stands() -> None:
+    from floatbase.dynamics.constraints import fixed_frame
+
+    robot = judges.load("go2")
+    feet, bolts = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"]), fb.Contacts([fixed_frame("base")])
+    tasks = fb.standing_tasks(robot.standing())
+    state = robot.random_state(3, 0.05)
+    first = fb.WholeBodyController(robot, bolts + feet, tasks)(state.q, state.v)
+    last = fb.WholeBodyController(robot, feet + bolts, tasks)(state.q, state.v)
+    assert np.allclose(first.tau, last.tau, atol=1e-6)
+    assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)

@@ -244,3 +244,28 @@ def test_records_can_not_be_written_to(sim: fb.Simulation) -> None:
     for array in (record.time, record.q, record.v, record.tau, record.planned, record.measured, record.foot_positions):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
+
+
+def test_a_record_says_which_torques_the_motors_gave_and_which_were_asked_for() -> None:
+    robot = judges.load("solo12")
+    sim = fb.Simulation(robot)
+
+    class Shout:
+        tau = np.full(12, 100.0)
+
+    record = fb.rollout(sim, lambda q, v, t: Shout(), 0.005)
+    assert np.all(record.tau_desired == 100.0)
+    assert np.allclose(record.tau, robot.torque_limits)
+
+
+def test_a_constraint_that_the_physics_does_not_know_is_not_measured() -> None:
+    from floatbase.dynamics.constraints import fixed_frame
+
+    robot = judges.load("go2")
+    contacts = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"]) + fb.Contacts([fixed_frame("base")])
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
+    record = fb.rollout(fb.Simulation(robot), controller, 0.005)
+    assert np.all(np.isnan(record.measured[:, 6:]))
+    assert np.all(np.isfinite(record.measured[:, :6]))
+    assert record.foot_positions.shape == (5, 2, 3)
+    assert np.all(np.isfinite(record.planned))
