@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -100,6 +100,14 @@ class Painter:
             picture |= self._scale_bar
         return picture | dict(extra or {})
 
+    def with_facets(self, facets: int | None) -> Painter:
+        """The same with other friction polyhedra; what was computed for the robot is kept."""
+        other = replace(self, facets=facets)
+        for name in ("home", "box", "size", "scale", "_meshes", "_shapes", "_ghosts", "_scale_bar"):
+            if name in self.__dict__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
+
     def stage(self) -> Picture:
         """The ground alone."""
         return {"ground": self._ground}
@@ -131,10 +139,9 @@ class Painter:
             return self.asked_scale
         return nice(2.0 * max(float(self.home.com[2] - self.box[0][2]), 0.6 * self.size) / self.robot.weight)
 
-    @cached_property
-    def cone_height(self) -> float:
-        """m: for half as much again as a foot carries at rest, but not so high as to hide the robot."""
-        return min(self.scale * 1.5 * self.robot.weight / max(len(self.robot.feet), 2), 0.55 * self.size)
+    def cone_height(self, points: int) -> float:
+        """m: for half as much again as each of so many points carries at rest, but not so high as to hide the robot."""
+        return min(self.scale * 1.5 * self.robot.weight / max(points, 2), 0.55 * self.size)
 
     @cached_property
     def _meshes(self) -> list[JointMesh]:
@@ -160,29 +167,30 @@ class Painter:
     def _contacts(self, state: State, contacts: Contacts, forces: Forces, cones: bool) -> Picture:
         """Patches, cones and forces at every point."""
         picture: Picture = {}
+        height = self.cone_height(contacts.n_points)
         rows = zip(contacts.point_names, contacts.positions(state), contacts.normals, contacts.mus, strict=True)
         for i, (name, position, normal, mu) in enumerate(rows):
             at = plain(name)
             picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
             if cones:
                 force = None if forces.judged is None else forces.judged[i]
-                picture |= below(f"cone/{at}", self._cone(position, normal, float(mu), force))
+                picture |= below(f"cone/{at}", self._cone(position, normal, float(mu), height, force))
             for kind, vectors, colour in forces.kinds:
                 if vectors is not None and not self._is_quiet(vectors[i]):
                     vector = self.scale * vectors[i]
                     picture[f"{kind}/{at}"] = shapes.arrow(position, vector, colour, self.size, halo=kind == "planned")
         return picture
 
-    def _cone(self, position: Array, normal: Array, mu: float, force: Array | None) -> Picture:
+    def _cone(self, position: Array, normal: Array, mu: float, height: float, force: Array | None) -> Picture:
         """A cone or polyhedron in the colour that the force gives it."""
         judged = None if force is None or self._is_quiet(force) else force
         if self.facets is None:
             status = "inside" if judged is None else cone_status(judged, normal, mu)
-            return {"/surface": shapes.friction_cone(position, normal, mu, self.cone_height, status)}
+            return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
         polyhedron = FrictionPolyhedron(normal, mu, self.facets, self.inside)
         status, active = ("inside", []) if judged is None else polyhedron_status(judged, polyhedron)
         status = "inside" if status == "active" else status  # the facets that are reached light up instead
-        return shapes.friction_polyhedron(position, polyhedron, self.cone_height, status, active)
+        return shapes.friction_polyhedron(position, polyhedron, height, status, active)
 
     def _is_quiet(self, force: Array) -> bool:
         """Whether a force is too small to be seen or judged: below a thousandth of the weight."""
@@ -219,7 +227,7 @@ class Painter:
         force = nice(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
-        at = [0.5 * (low[0] + high[0]) - length / 2, high[1] + 0.5 * self.size, 0.01 * self.size]
+        at = [low[0], high[1] + 0.3 * self.size, 0.01 * self.size]
         return below("scale", shapes.scale_bar(at, force, length, self.size, self.text))
 
     @cached_property

@@ -234,6 +234,10 @@ class Viewer:
         """A button in the page's own panel; `pressed()` is called, in the window's thread."""
         self._control(name, lambda _: pressed())
 
+    def checkbox(self, name: str, changed: Callable[[bool], None], value: bool) -> None:
+        """A box to tick in the page's own panel; `changed(value)` is called, in the window's thread."""
+        self._control(name, changed, value=bool(value))
+
     def close(self) -> None:
         """Close the window: its thread ends and its port is free."""
         self.window.close()

@@ -10,6 +10,7 @@ import asyncio
 import base64
 import io
 import json
+import logging
 import socket
 import threading
 import time
@@ -291,7 +292,10 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
         elif answer.get("type") == "image" and answer.get("id") in self._pictures:
             self._pictures.pop(answer["id"]).set_result(answer["data"])
         elif answer.get("type") == "control" and self.server.on_control is not None:
-            self.server.on_control(answer["name"], answer["value"])
+            try:
+                self.server.on_control(answer["name"], answer["value"])
+            except Exception:  # an error in the user's callback must not end the connection; it is told like any other
+                logging.getLogger("floatbase.viewer").exception("the control %r failed", answer["name"])
 
     def ask_picture(self, answer: Future[str]) -> None:
         """Ask for a picture of the scene as it is now."""
@@ -318,7 +322,7 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
     def _write(self, message: bytes | str, binary: bool) -> None:
         """Hand a message to the connection; when the page has gone, `on_close` tidies up."""
         with suppress(tornado.websocket.WebSocketClosedError):
-            self.write_message(message, binary=binary).add_done_callback(lambda done: done.exception())
+            self.write_message(message, binary=binary).add_done_callback(lambda done: done.cancelled() or done.exception())
 
 
 def _application(server: _Server) -> tornado.web.Application:

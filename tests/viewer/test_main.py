@@ -1,0 +1,98 @@
+"""The bare page: a live robot without a notebook."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from floatbase.__main__ import Playground, main
+from floatbase.robots import Robot, load, robots
+
+from .looks import picture
+
+
+def test_the_robots_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["robots"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(robots())
+
+
+def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["view", "go3", "--no-browser"]) == 2
+    assert "floatbase: unknown robot 'go3'; near names: go2" in capsys.readouterr().err
+    assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
+    assert "port is 99999" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
+    command = [sys.executable, "-m", "floatbase", "view", "ur5", "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert "ur5 at http://127.0.0.1" in process.stdout.readline()
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (0, "")
+
+
+@pytest.fixture
+def playground(go2: Robot) -> Iterator[Playground]:
+    started = Playground(go2)
+    started.start()
+    yield started
+    started.close()
+
+
+def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) -> None:
+    page.goto(playground.view.url)
+    page.wait_for_function("window.viewer && viewer.gui_controllers['push left']")
+
+    def moved(axis: int, target: float) -> bool:
+        """Whether the centre of mass comes within 1 cm of where it should."""
+        wanted = go2.standing().com[axis] + target
+        for _ in range(200):
+            page.wait_for_timeout(100)
+            if abs(playground.sim.state.com[axis] - wanted) < 0.01:
+                return True
+        return False
+
+    page.evaluate("viewer.gui_controllers['CoM x [m]'].setValue(0.04)")
+    assert moved(0, 0.04)
+    page.evaluate("viewer.gui_controllers['facets'].setValue(6)")
+    page.evaluate("viewer.gui_controllers['friction believed'].setValue(0.3)")
+    page.wait_for_timeout(500)
+    assert (playground.facets, playground.view.painter.facets) == (6, 6)
+    assert playground.mu == pytest.approx(0.3)
+    picture(page, "bare_page")
+    page.evaluate("viewer.gui_controllers['pause'].fire()")
+    for _ in range(50):
+        page.wait_for_timeout(20)
+        if playground.run.status == "paused":
+            break
+    stopped = playground.sim.time
+    page.wait_for_timeout(300)
+    assert playground.sim.time - stopped < 0.1
+    page.evaluate("viewer.gui_controllers['on FL_foot'].setValue(false)")
+    page.evaluate("viewer.gui_controllers['run'].fire()")
+    for _ in range(100):
+        page.wait_for_timeout(20)
+        if "measured/FL_foot" not in playground.view.canvas.picture:
+            break
+    assert "measured/FR_foot" in playground.view.canvas.picture
+    assert "measured/FL_foot" not in playground.view.canvas.picture
+
+
+@pytest.mark.parametrize("name", ["ur5", "talos"])
+def test_robots_without_point_feet_run_too(name: str) -> None:
+    playground = Playground(load(name))
+    playground.start()
+    deadline = time.monotonic() + 30
+    while playground.sim.time < 0.05 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert playground.run.status == "running"
+    assert playground.sim.time >= 0.05
+    playground.close()
