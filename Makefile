@@ -2,7 +2,7 @@
 #
 #   PYTHON=…       the Python to use, such as python3.12 or a path; without it the first of python3, python3.13, … that fits
 #   LAB_ARGS=…     more options for JupyterLab, such as --no-browser or --port=9000
-#   PYTEST_ARGS=…  more options for pytest, such as "-k friction"
+#   PYTEST_ARGS=…  more options for pytest, such as "-k friction" or tests/control
 #   LOCK_ARGS=…    more options for `uv pip compile`, such as --upgrade
 
 .DEFAULT_GOAL := help
@@ -24,7 +24,7 @@ BASE := $(wordlist 2,99,$(FOUND))
 
 # the part of JupyterLab that asks the network for news and updates, off in .venv
 NEWS := @jupyterlab/apputils-extension:announcements
-FIRST := /lab/tree/00_start_here.ipynb
+FIRST := /lab/tree/my/00_start_here.ipynb
 
 help:
 	@echo "make lab     open the course in JupyterLab"
@@ -36,6 +36,7 @@ help:
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
 
 lab: setup
+	@$(BIN)/python -m floatbase.lessons.workspace
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
 		--LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
