@@ -1,0 +1,51 @@
+"""A panel of sliders under a live picture. A slider calls a quick function; nothing waits, so the kernel stays free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import ipywidgets as widgets
+
+from floatbase.errors import FloatbaseError
+from floatbase.viewer.scene import Viewer
+
+
+def slider_panel(
+    view: Viewer, draw: Callable[..., str | None], wait: bool = False, **ranges: tuple[float, float, float]
+) -> widgets.VBox:
+    """The live picture with a slider for each of `ranges`: name=(lowest, first, highest); "_" in a name shows as a blank.
+
+    draw: called at once and at every move as draw(name=value, …), in the kernel's thread, so it should take a few
+    milliseconds. What it returns, HTML or plain text, stands between the picture and the sliders. wait: call it only when
+    a slider is let go, for functions that take a little longer. Should it raise an error of the package, that stands there
+    instead.
+    """
+    note = widgets.HTML()
+    sliders = {name: _slider(name, *bounds, wait) for name, bounds in ranges.items()}
+
+    def moved(_: Any = None) -> None:
+        try:
+            note.value = draw(**{name: slider.value for name, slider in sliders.items()}) or ""
+        except FloatbaseError as error:
+            note.value = str(error)
+
+    for slider in sliders.values():
+        slider.observe(moved, names="value")
+    moved()
+    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="100%"))
+    return widgets.VBox([picture, note, *sliders.values()])
+
+
+def _slider(name: str, low: float, first: float, high: float, wait: bool) -> widgets.FloatSlider:
+    return widgets.FloatSlider(
+        value=first,
+        min=low,
+        max=high,
+        step=(high - low) / 100,
+        description=name.replace("_", " "),
+        readout_format=".2f" if high - low < 20 else ".0f",
+        continuous_update=not wait,
+        style={"description_width": "12em"},
+        layout=widgets.Layout(width="80%"),
+    )
