@@ -227,7 +227,7 @@ class Painter:
         force = nice(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
-        at = [low[0], high[1] + 0.3 * self.size, 0.01 * self.size]
+        at = [low[0], 0.5 * (low[1] + high[1]) + 0.65 * self.size, 0.01 * self.size]
         return below("scale", shapes.scale_bar(at, force, length, self.size, self.text))
 
     @cached_property
