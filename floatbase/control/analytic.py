@@ -30,13 +30,14 @@ class AnalyticCommand:
 
 
 class AnalyticController:
-    """(22) + (23) + a little posture and torque, minimised in closed form over β (17).
+    """(22) + (23) + terms for posture and torque, minimised in closed form over β (17).
 
     Wants the centre of mass at `com` and the base upright as in `state`: f̃_c = m (a - g) with a = -kp e - kd ė, and
     τ̃_c from the base's rotation and the robot's inertia about its centre of mass. alpha, a: the bias of (23), a in N
     (the weight's even share by default). posture, torque: weights of the joints' return to `state` [per (rad/s²)²] and
-    of ‖τ‖² [per (N·m)²], which settle what (22)(23) leave open (d > k). Nothing here keeps forces in their cones or
-    torques within limits: lesson 05 shows what comes of that. Source: the document, §3.1.
+    of ‖τ‖² [per (N·m)²]. They settle what (22)(23) leave open (d > k); where nothing is left open they compete with the
+    wanted wrench, a light robot feeling the posture's weight more. Nothing here keeps forces in their cones or torques
+    within limits. Source: the document, §3.1.
     """
 
     def __init__(

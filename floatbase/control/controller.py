@@ -11,13 +11,16 @@ import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
 from floatbase.control.friction import FrictionPolyhedron
-from floatbase.control.qp import QP, RANK_TOLERANCE, Solution, solve, solvers
+from floatbase.control.qp import QP, Solution, solve, solvers
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
 from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
+
+
+MOTION_TOLERANCE = 1e-4  # part of the largest singular value of A below which b is measurement noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +68,9 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     the friction polyhedron (28) and normal force of every contact point, and the torque limits. Source: the document,
     §4.1.
 
-    Where A of (5) loses rank (solo8 on four feet, straight knees) and the measured velocity is not quite one the
-    contacts allow, its rows contradict each other; then they are met as nearly as possible (least squares). Otherwise b
-    stays as it is.
+    Where A of (5) loses rank, or nearly (solo8 on four feet), its rows repeat each other, and a measured velocity that is not
+    quite one the contacts allow makes them contradict each other: met to the letter they would ask for any acceleration.
+    So b counts only along the directions that A resolves better than `MOTION_TOLERANCE`; along the others it is zero.
     """
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
@@ -78,7 +81,7 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
         H[part, part] += task.weight * residual.A.T @ residual.A
         g[part] += task.weight * residual.A.T @ residual.b
     A = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), d + k))]])
-    b = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=RANK_TOLERANCE)[0]
+    b = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=MOTION_TOLERANCE)[0]
     G_force, h_force, force_names = _force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = _torque_rows(eom.robot, limits)
     G = np.zeros((len(G_force) + len(G_torque), n))

@@ -70,9 +70,12 @@ class LinearConstraint:
 class RollingWheel:
     """(6) A wheel or disc that rolls on a plane without slipping: the nonholonomic case.
 
-    g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest, where c is the wheel's
-    centre and u the unit vector in the wheel's plane that points up from the contact. No g(q) = 0 says the same: where
-    the wheel can go is not limited, only how. Differentiated once, A = ∂g/∂q̇ and b = -(∂g/∂q) q̇. frame: the wheel's;
+    g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest, where c is the wheel's centre
+    and u the unit vector in the wheel's plane that points up from the contact. Along the normal this is the derivative of a
+    position constraint, the height of the centre. In the ground it is not: where the wheel can go is not limited, only how.
+    Differentiated once, A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
+
+    frame: the wheel's;
     its origin is the centre. axis: (3,), the axle in that frame. radius: m. normal: (3,), world, out of the ground. mu:
     coefficient of friction. Raises `InputError` for a wheel that lies flat: it has no lowest point.
     """

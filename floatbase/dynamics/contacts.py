@@ -19,7 +19,7 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
 from floatbase.errors import InputError, unknown_name
-from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.robot import Foot, Robot, spread_corners
 from floatbase.robots.state import State
 
 UP = read_only([0.0, 0.0, 1.0])
@@ -143,7 +143,8 @@ class FlatFootContact:
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
         object.__setattr__(self, "mu", positive(f"friction coefficient mu of {self.frame}", self.mu))
-        object.__setattr__(self, "corners", checked(f"corners of {self.frame}", self.corners, (None, 3), "m"))
+        corners = checked(f"corners of {self.frame}", self.corners, (None, 3), "m")
+        object.__setattr__(self, "corners", spread_corners(self.frame, corners))
 
     @property
     def name(self) -> str:

@@ -12,6 +12,7 @@ import scipy.linalg
 from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.errors import InputError
 
 RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
 
@@ -59,6 +60,8 @@ class ContactSpace:
 def contact_space(eom: EquationsOfMotion) -> ContactSpace:
     """The independent part of the contacts of (7), by singular values (tolerance `RANK_TOLERANCE`)."""
     r = rank(eom.A)
+    if rank(eom.J) != r:
+        raise InputError(f"forces reach {rank(eom.J)} directions of motion, but the contacts keep {r}: A and J do not fit.")
     U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
     U_J, s_J, Vt_J = np.linalg.svd(eom.J, full_matrices=True)
     return ContactSpace(
@@ -78,8 +81,8 @@ def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     """(9) ζ: τ -> λ, from (8) A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ).
 
-    Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet, straight
-    knees, corners of a flat foot) this is the smallest λ, as the pseudo-inverse has it. Source: the document, §2.2.1.
+    Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet, corners of
+    a flat foot) this is the smallest λ, as the pseudo-inverse has it. Source: the document, §2.2.1.
     """
     space = contact_space(eom)
     y = _independent_forces(eom, space)

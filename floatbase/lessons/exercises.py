@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from floatbase.errors import unknown_name
+from floatbase.lessons import progress
 
+TRIES = 2  # before `reveal` shows a solution
 
 
 @dataclass(frozen=True)
@@ -95,16 +97,40 @@ def exercises() -> dict[str, Exercise]:
 
 
 def check(name: str, answer: Any) -> Verdict:
-    """Check an answer to the exercise of that name. Raises `UnknownNameError` for a name that does not exist."""
-    return _exercise(name).judge(answer)
+    """Check an answer to the exercise of that name and count the try.
+
+    Raises `UnknownNameError` for a name that does not exist.
+    """
+    verdict = _exercise(name).judge(answer)
+    if answer is not None and answer is not Ellipsis:
+        progress.record(name, verdict.right)
+    return verdict
 
 
 def reveal(name: str) -> None:
-    """Print the solution of an exercise, and why."""
-    exercise = _exercise(name)
+    """Print the solution of an exercise and why, once it has been tried twice or solved."""
+    exercise, kept = _exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
+    if kept["tries"] < TRIES and not kept["right"]:
+        left = TRIES - kept["tries"]
+        print(f'Try {"once" if left == 1 else "twice"} more first: run check("{name}", …) on an answer of your own.')
+        return
     print(exercise.solution)
     if exercise.explanation:
         print(f"\n{exercise.explanation}")
+
+
+def show_progress() -> None:
+    """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried."""
+    kept, known = progress.load(), exercises()
+    marks = {name: _mark(kept.get(name)) for name in known}
+    for lesson in sorted({name.split(".")[0] for name in known}):
+        here = [name for name in known if name.startswith(f"{lesson}.")]
+        print(f"lesson {lesson}  " + "  ".join(f"{name} {marks[name]}" for name in here))
+    print(f"solved: {sum(mark == '✓' for mark in marks.values())} of {len(known)}")
+
+
+def _mark(kept: dict[str, int] | None) -> str:
+    return "·" if kept is None else "✓" if kept["right"] else "✗"
 
 
 def _exercise(name: str) -> Exercise:

@@ -38,9 +38,7 @@ class Foot:
         object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
             corners = checked(f"corners of foot {self.frame}", self.corners, (None, 3), "m")
-            if len(corners) < 3:
-                raise InputError(f"foot {self.frame} has {len(corners)} corners; a flat foot needs at least 3.")
-            object.__setattr__(self, "corners", corners)
+            object.__setattr__(self, "corners", spread_corners(self.frame, corners))
 
     @property
     def is_flat(self) -> bool:
@@ -189,6 +187,13 @@ class Robot:
     def __repr__(self) -> str:
         base = "floating" if self.is_floating else "fixed"
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
+
+
+def spread_corners(frame: str, corners: Array) -> Array:
+    """The corners, after checking that they span an area: on a line they cannot hold all six motions of a foot."""
+    if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=1e-6) < 2:
+        raise InputError(f"the corners of {frame} span no area; a flat foot needs at least 3 that are not on one line.")
+    return corners
 
 
 def torque_limits_of(d: int, asked: npt.ArrayLike) -> Array:

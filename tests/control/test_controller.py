@@ -365,3 +365,16 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     last = fb.WholeBodyController(robot, feet + bolts, tasks)(state.q, state.v)
     assert np.allclose(first.tau, last.tau, atol=1e-6)
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
+
+
+def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_noise_asks_for() -> None:
+    robot = judges.load("solo8")
+    state = robot.standing()
+
+    def target(t: float) -> np.ndarray:
+        return state.com + min(1.0, 4.0 * t) * np.array([0.0, 0.02 * np.sin(6.0 * t), 0.01 * np.sin(9.0 * t)])
+
+    tasks = [fb.CoMTask(target), *fb.standing_tasks(state)[1:]]
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
+    record = fb.rollout(fb.Simulation(robot), controller, 1.0, control_period=2e-3)
+    assert record.outcome == "completed", record.error
