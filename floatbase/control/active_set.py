@@ -9,7 +9,7 @@ what the guess gives, and correct it by one row at a time. Every point on the wa
 Symbols
     β  coordinates in which the equalities always hold, x = x0 + Z β (13); a problem without equalities has β = x
     W  working set: rows of G held with equality for now, linearly independent
-    p  direction from the point to the minimiser on the rows of W; α length of the step along it, 0 ≤ α ≤ 1
+    p  direction from the point to the minimiser on the rows of W; α length of the step along it, 1 to arrive there
     μ  multipliers of the rows of W, from H x + g + Gᵀ μ = 0
 
 Algorithm
@@ -45,7 +45,7 @@ from floatbase.errors import SolverError, unknown_name
 
 _ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding
 _INDEPENDENT = 1e-9  # part of a row's size that must be left once the rows before it are taken out
-_VIOLATION = "violation"  # name of the row s ≥ 0 of phase 1
+_VIOLATION = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,8 +259,8 @@ def multipliers(qp: QP, x: Array, rows: list[int]) -> Array:
 
 def row_to_drop(problem: _Problem, x: Array, rows: list[int], mu: Array, stuck: bool) -> int | None:
     """The row of W that pulls hardest (μ < 0, rows at equal size), or when stuck the first that pulls; or None."""
-    push = mu * problem.size[rows[: len(mu)]]
-    pulling = [row for row, force in zip(rows, push, strict=False) if force < -_rounding(problem.qp, x)]
+    push = mu * problem.size[rows]
+    pulling = [row for row, force in zip(rows, push, strict=True) if force < -_rounding(problem.qp, x)]
     if not pulling:
         return None
     return min(pulling) if stuck else rows[int(np.argmin(push))]

@@ -102,6 +102,8 @@ def proxsuite(qp: QP) -> Solution | None:
     scale = _objective_size(inner)
     problem = proxqp.dense.QP(inner.n, 0, len(qp.G))
     problem.settings.eps_abs, problem.settings.eps_rel = FEASIBILITY_TOLERANCE, 0.0
+    problem.settings.check_duality_gap = True  # without it ProxQP stops beside the rows that push
+    problem.settings.eps_duality_gap_abs, problem.settings.eps_duality_gap_rel = FEASIBILITY_TOLERANCE, 0.0
     problem.settings.eps_primal_inf = 1e-8  # at its own 1e-4 it calls standing robots infeasible
     below = np.full(len(qp.G), -1e20)
     problem.init(inner.H / scale, inner.g / scale, None, None, inner.G, below, inner.h)
