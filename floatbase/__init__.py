@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from floatbase.affine import Affine, Quadratic
 from floatbase.control.controller import Command, WholeBodyController
 from floatbase.dynamics import Contacts, equations_of_motion
+from floatbase.dynamics.subspace import accelerations_from_torques, feasible_space, forces_from_torques
 from floatbase.errors import FloatbaseError, InfeasibleError
 from floatbase.objectives.tasks import (
     CoMTask,
@@ -24,7 +25,7 @@ from floatbase.objectives.tasks import (
 from floatbase.robots import Foot, State, load, load_urdf, robots
 
 if TYPE_CHECKING:
-    from floatbase.simulation.physics import Push, Simulation
+    from floatbase.simulation.physics import Ground, Push, Simulation
     from floatbase.simulation.rollout import Rollout, rollout
     from floatbase.viewer.scene import Viewer
 
@@ -32,6 +33,7 @@ __version__ = "0.1.0"
 
 # heavy rooms, imported at first use: mujoco behind Simulation, meshcat behind Viewer
 _LAZY = {
+    "Ground": "floatbase.simulation.physics",
     "Push": "floatbase.simulation.physics",
     "Simulation": "floatbase.simulation.physics",
     "Rollout": "floatbase.simulation.rollout",
@@ -48,6 +50,7 @@ __all__ = [
     "Foot",
     "ForceTask",
     "FrameTask",
+    "Ground",
     "InfeasibleError",
     "OrientationTask",
     "PostureTask",
@@ -59,7 +62,10 @@ __all__ = [
     "TorqueTask",
     "Viewer",
     "WholeBodyController",
+    "accelerations_from_torques",
     "equations_of_motion",
+    "feasible_space",
+    "forces_from_torques",
     "load",
     "load_urdf",
     "robots",
