@@ -46,6 +46,7 @@ NAMES = """() => {
   walk(viewer.scene, "");
   return found;
 }"""
+KERNEL_IDLE = "() => jupyterapp.shell.currentWidget?.sessionContext?.session?.kernel?.status === 'idle'"
 CELLS = "jupyterapp.shell.currentWidget.content.widgets.map(w => w.model).filter(m => m.type === 'code')"
 ALL_RAN = f"() => {CELLS}.every(m => m.executionCount !== null && m.executionState !== 'running')"
 ERRORS = f"() => {CELLS}.flatMap(m => m.outputs.toJSON()).filter(o => o.output_type === 'error').map(o => o.evalue)"
@@ -100,11 +101,12 @@ def test_lesson_00_shows_a_robot_that_answers_to_a_slider(lab: str) -> None:
         page.goto(lab)
         page.wait_for_selector(".jp-Notebook .jp-CodeCell", timeout=90_000)
         page.wait_for_function("() => window.jupyterapp !== undefined", timeout=30_000)
-        page.wait_for_function(
-            "() => document.querySelector('.jp-Notebook-ExecutionIndicator')?.dataset.status === 'idle'", timeout=90_000
-        )
+        page.wait_for_function(KERNEL_IDLE, timeout=90_000)
         page.evaluate("() => { window.jupyterapp.commands.execute('notebook:run-all-cells'); }")
-        page.wait_for_function(ALL_RAN, timeout=120_000)
+        try:
+            page.wait_for_function(ALL_RAN, timeout=120_000)
+        finally:
+            page.screenshot(path=str(SCREENSHOTS / "lesson_00_end.png"))
         assert page.evaluate(ERRORS) == []
 
         page.locator(".jp-Notebook iframe").first.scroll_into_view_if_needed()

@@ -89,7 +89,7 @@ class ActiveSetRun:
 
 
 def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str] = ()) -> ActiveSetRun:
-    """Solve a convex QP by the method of this module, keeping a record of every iteration.
+    """App. C: solve a convex QP by the active-set method of this module, keeping a record of every iteration.
 
     start: (n,) a guess of x, such as the last problem's; it need not satisfy any row. Without one, the method starts
     from the minimiser of the objective on the rows of `working`, as if there were no other rows. working: names of

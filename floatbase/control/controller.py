@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
 from floatbase.control.friction import FrictionPolyhedron
-from floatbase.control.qp import QP, Solution, solve, solvers
+from floatbase.control.qp import QP, Solution, check_solver, solve
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
-from floatbase.errors import InputError, unknown_name
+from floatbase.errors import InputError
 from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
 from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
@@ -159,8 +159,7 @@ class WholeBodyController:
         torque_limits: npt.ArrayLike | None = None,
         solver: str = "daqp",
     ):
-        if solver not in solvers():
-            raise unknown_name("solver", solver, solvers())
+        check_solver(solver)
         if not isinstance(robot, Robot):
             raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
         if not isinstance(contacts, Contacts):

@@ -39,7 +39,7 @@ _ROUNDING = 1e-14  # part of a sum's terms that may be rounding
 
 @dataclass(frozen=True, eq=False)
 class QP:
-    """min ½ xᵀ H x + gᵀ x  subject to  A x = b,  G x ≤ h (Appendix C, with the ≤ that it means).
+    """App. C: min ½ xᵀ H x + gᵀ x  subject to  A x = b,  G x ≤ h, with the ≤ that the document means.
 
     H: (n, n) symmetric, positive semidefinite where A x = b. g: (n,). A: (m, n), b: (m,). G: (l, n), h: (l,). `blocks`
     names slices of x; `equality_names` and `inequality_names` name the rows. Raises `InputError` when shapes or names
