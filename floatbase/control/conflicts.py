@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.optimize import linprog
 
 from floatbase._arrays import Array
 from floatbase.errors import InfeasibleError, SolverError
@@ -60,6 +59,8 @@ def contradicting_equalities(A: Array, b: Array, tolerance: float) -> tuple[int,
 
 def _least_violation(G: Array, h: Array) -> tuple[float, list[int]]:
     """The least s ≥ 0 with G y ≤ h + s, and the rows that hold it there."""
+    from scipy.optimize import linprog  # slow to load, and only needed when something has gone wrong
+
     n = G.shape[1]
     found = linprog(
         np.append(np.zeros(n), 1.0),

@@ -19,7 +19,6 @@ from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
 from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
 
-
 MOTION_TOLERANCE = 1e-4  # part of the largest singular value of A below which b is measurement noise
 
 

@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import nnls
 
 from floatbase._arrays import Array, checked, positive, read_only, unit_vector
 from floatbase.errors import InputError
@@ -183,8 +182,9 @@ class FrictionPolyhedron:
         return tuple(name for name, at in zip(self.names, reached, strict=True) if at)
 
     def project(self, force: npt.ArrayLike) -> Array:
-        """The force of the polyhedron nearest to the one given, shape (3,), N: min ‖raysᵀ w - f‖ over weights w ≥
-        0."""
+        """The force of the polyhedron nearest to the one given, shape (3,), N: min ‖raysᵀ w - f‖ over weights w ≥ 0."""
+        from scipy.optimize import nnls  # slow to load, and seldom needed
+
         f = checked("force", force, (3,), "N")
         size = float(np.linalg.norm(f))
         if size == 0.0 or self.margin(f) >= 0.0:

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
@@ -262,5 +261,5 @@ def _base_columns(eom: EquationsOfMotion) -> Array:
 
 
 def _inverse_inertia(eom: EquationsOfMotion, right: Array) -> Array:
-    """M⁻¹ right, by Cholesky."""
-    return np.asarray(scipy.linalg.cho_solve(scipy.linalg.cho_factor(eom.M), right))
+    """M⁻¹ right."""
+    return np.linalg.solve(eom.M, right)
