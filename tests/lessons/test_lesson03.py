@@ -1,0 +1,174 @@
+"""Lesson 03: its helpers do what they say, and wrong answers of each kind get the hint that fits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.dynamics.subspace import dimensions, internal_forces
+from floatbase.lessons.exercises import exercises
+from floatbase.lessons.lesson03 import (
+    ConstantTorques,
+    bars,
+    direction,
+    matrix_picture,
+    show_beta,
+    show_knee,
+    space_of,
+    standing_go2,
+    standing_still,
+    tilted_squeeze,
+    upright,
+)
+
+GO2 = fb.load("go2")
+
+
+def verdict(name: str, answer: Any) -> Any:
+    return exercises()[name].judge(answer)
+
+
+def torques() -> Any:
+    eom, squeeze = tilted_squeeze()
+    return -eom.J[:, 6:].T @ squeeze
+
+
+def turned(forces: Any, R: Any) -> Any:
+    return (forces.reshape(4, 3) @ R.T).ravel()
+
+
+def test_03_1_knows_each_wrong_count() -> None:
+    assert verdict("03.1", 11).right
+    for wrong, hint in {
+        12: "moves nothing",
+        1: "do not move",
+        6: "components",
+        9: "three feet",
+        5: "J_b",
+        10: "more than",
+    }.items():
+        answer = verdict("03.1", wrong)
+        assert not answer.right and hint in answer.text, (wrong, answer)
+    assert "shape" in verdict("03.1", [11, 11]).text
+
+
+def test_03_2_takes_the_torques_that_change_forces_and_nothing_else() -> None:
+    assert verdict("03.2", torques()).right
+    eom, squeeze = tilted_squeeze()
+    zeta, eta = fb.forces_from_torques(eom), fb.accelerations_from_torques(eom)
+    assert np.allclose(zeta.A @ torques(), squeeze, atol=1e-9)
+    assert np.allclose(eta.A @ torques(), 0.0, atol=1e-9)
+
+
+def test_03_2_knows_sign_transpose_frame_and_what_does_not_belong() -> None:
+    eom, squeeze = tilted_squeeze()
+    R, J = eom.state.frame_pose("base").rotation, eom.J[:, 6:]
+    wrong = {
+        "sign": -torques(),
+        "transpose": -J @ squeeze,
+        "The frame: J and": -J.T @ turned(squeeze, R.T),
+        "The frame: the forces": -J.T @ turned(squeeze, R),
+        "h is in it": torques() + eom.h[6:],
+        "no torques at all": np.zeros(12),
+        "18 numbers": -eom.J.T @ squeeze,
+        "6 numbers": eom.J[:, :6].T @ squeeze,
+        "one column": torques()[:, None],
+        "shape": np.zeros(5),
+        "not finite": np.full(12, np.nan),
+        "should be numbers": "torques",
+        "no answer yet": None,
+        "Neither right": np.ones(12),
+    }
+    for hint, answer in wrong.items():
+        said = verdict("03.2", answer)
+        assert not said.right and hint in said.text, (hint, said)
+
+
+def test_03_3_takes_any_forces_that_balance() -> None:
+    eom = standing_go2()
+    forces = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0]
+    wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
+    less = forces + (20 - forces[2]) * wobble
+    sideways = internal_forces(eom) @ internal_forces(eom).T @ np.eye(12)[1]
+    assert verdict("03.3", less).right
+    assert verdict("03.3", less + 5 * sideways).right
+
+
+def test_03_3_knows_what_is_wrong() -> None:
+    eom = standing_go2()
+    forces = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0]
+    wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
+    vertical = np.array([0, 0, 1.0])
+    short = forces.copy()
+    short[2] = 20.0
+    moved = short + np.concatenate([np.zeros(9), (forces[2] - 20) * vertical])
+    wrong = {
+        "Nothing has changed": forces,
+        "add up to the weight": short,
+        "moments": moved,
+        "mind the sign": forces - (20 - forces[2]) * wobble,
+        "carries 30.0 N": forces + (30 - forces[2]) * wobble,
+        "shape": forces.reshape(4, 3),
+        "no answer yet": None,
+    }
+    for hint, answer in wrong.items():
+        said = verdict("03.3", answer)
+        assert not said.right and hint in said.text, (hint, said)
+
+
+@pytest.mark.parametrize("frames", [(), ("FL_foot", "FR_foot", "RL_foot"), ("FL_foot",)], ids=len)
+def test_a_direction_gives_the_base_what_was_asked_for_with_least_change_of_forces(frames: tuple[str, ...]) -> None:
+    space = space_of(GO2, *frames)
+    wanted = [0.3, -0.2, 1.0, 0.1, 0.5, -0.4] if len(frames) != 1 else [0, 0, 1.0, 0, 0, 0]
+    step = direction(space, base=wanted)
+    np.testing.assert_allclose((space.qdd.A @ step)[:6], wanted, atol=1e-9)
+    free = np.linalg.svd(space.qdd.A[:6])[2][6:].T
+    np.testing.assert_allclose((space.forces.A @ free).T @ (space.forces.A @ step), 0.0, atol=1e-7)
+
+
+def test_a_squeeze_is_a_direction_that_moves_nothing() -> None:
+    space = space_of(GO2)
+    apart = np.zeros(12)
+    apart[1], apart[4] = 1, -1
+    step = direction(space, squeeze=apart)
+    np.testing.assert_allclose(space.qdd.A @ step, 0.0, atol=1e-9)
+    np.testing.assert_allclose(space.forces.A @ step, apart, atol=1e-9)
+
+
+def test_standing_still_is_in_the_space_and_still() -> None:
+    space = space_of(GO2)
+    qdd, tau, forces = space(standing_still(space))
+    assert abs(qdd).max() < 1e-9
+    motion, feet = space.eom.residual(qdd, tau, forces)
+    assert max(abs(motion).max(), abs(feet).max()) < 1e-9
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.5, 1.5])
+def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend: float) -> None:
+    solo12 = fb.load("solo12")
+    state = upright(solo12, bend)
+    assert [round(foot, 9) for foot in fb.Contacts.points(solo12).positions(state)[:, 2]] == [0.0] * 4
+    straight = dimensions(fb.equations_of_motion(state, fb.Contacts.points(solo12)))
+    assert straight.rank_J == (11 if bend == 0 else 12)
+
+
+def test_the_pictures_are_drawn() -> None:
+    space = space_of(GO2)
+    view = fb.Viewer(GO2)
+    try:
+        assert "svg" in show_beta(view, space, standing_still(space))
+    finally:
+        view.close()
+    solo12 = fb.load("solo12")
+    view = fb.Viewer(solo12)
+    try:
+        text = show_knee(view, solo12, 0.0, np.zeros(12))
+    finally:
+        view.close()
+    assert "rank J = <b>11</b>" in text
+    assert "#222" in bars([100.0], [0.0], [-200.0])
+    assert len(matrix_picture(np.eye(4), {"a": 1, "b": 3}, {"c": 2, "d": 2}).axes) == 2
+    assert ConstantTorques([1.0])(np.zeros(1), np.zeros(1), 0.0).tau == [1.0]
