@@ -14,12 +14,13 @@ from floatbase.control.friction import FrictionPolyhedron
 from floatbase.control.qp import QP, Solution, check_solver, solve
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
-from floatbase.errors import InputError
+from floatbase.errors import InfeasibleError, InputError
 from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
 from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
 
 MOTION_TOLERANCE = 1e-4  # part of the largest singular value of A below which b is measurement noise
+MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,12 @@ class Limits:
     facets: int = 4
     inside: bool = True
     min_normal_force: float = 0.0
+
+    def __post_init__(self) -> None:
+        limits = np.ravel(self.torque_limits)
+        object.__setattr__(self, "torque_limits", torque_limits_of(limits.size, limits))
+        positive("min_normal_force", self.min_normal_force, "N", allow_zero=True)
+        FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets)  # says what is wrong with the number
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +84,15 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     H, g = np.zeros((n, n)), np.zeros(n)
     for task in tasks:
         part, residual = blocks[task.block], task.residual(eom, t)
+        if residual.n_in != part.stop - part.start:
+            raise InputError(
+                f"the residual of {task.name!r} takes {residual.n_in} numbers; its block {task.block!r} has "
+                f"{part.stop - part.start}."
+            )
         H[part, part] += task.weight * residual.A.T @ residual.A
         g[part] += task.weight * residual.A.T @ residual.b
     A = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), d + k))]])
-    b = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=MOTION_TOLERANCE)[0]
+    b = _reachable_rows(eom)
     G_force, h_force, force_names = _force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = _torque_rows(eom.robot, limits)
     G = np.zeros((len(G_force) + len(G_torque), n))
@@ -97,6 +109,23 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
         inequality_names=force_names + torque_names,
         blocks=blocks,
     )
+
+
+def _reachable_rows(eom: EquationsOfMotion) -> Array:
+    """b of (5) without what is measurement noise along directions that A does not resolve, shape (m,).
+
+    Raises `InfeasibleError` with the rows where they contradict each other by more than the contacts' own motion explains.
+    """
+    b = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=MOTION_TOLERANCE)[0]
+    gap = np.abs(eom.b - b)
+    motion = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
+    if np.max(gap, initial=0.0) > 1e-6 + MOTION_NOISE * motion:
+        names = _equality_names(eom.robot, eom.contacts)[eom.nv :]
+        rows = [names[i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
+        raise InfeasibleError(
+            f"these motions cannot be kept together: {', '.join(rows)}. At least one of their constraints has to go.", rows
+        )
+    return read_only(b)
 
 
 # what does not depend on the state is built once for each contacts, robot and limits (all immutable)
@@ -168,7 +197,7 @@ class WholeBodyController:
         self.tasks = _with_regularisation(tasks)
         self.limits = Limits(
             torque_limits=robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits),
-            facets=FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets).facets,
+            facets=facets,
             inside=inside,
             min_normal_force=positive("min_normal_force", min_normal_force, "N", allow_zero=True),
         )
@@ -211,7 +240,10 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {type(tasks).__name__}.")
     tasks = tuple(tasks)
     for task in tasks:
-        if not isinstance(task, Task):
+        if isinstance(task, type) or not isinstance(task, Task):
             raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {task!r} is none.")
+        if task.block not in ("qdd", "tau", "forces"):
+            raise InputError(f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".')
+        positive(f"weight of {task.name}", task.weight, allow_zero=True)
     missing = [kind() for kind in (ForceTask, TorqueTask) if not any(task.block == kind.block for task in tasks)]
     return tasks + tuple(missing)

@@ -27,12 +27,20 @@ class LinearConstraint:
     name: str
     m: int
     rows: Rows
-    mu: float = np.inf
-    normal: Array = field(default_factory=lambda: UP)
 
     def __post_init__(self) -> None:
         if int(self.m) != self.m or self.m < 1:
             raise InputError(f"constraint {self.name!r} has m = {self.m} rows; it must have at least 1.")
+
+    @property
+    def mu(self) -> float:
+        """+inf: there is no friction to run out of."""
+        return np.inf
+
+    @property
+    def normal(self) -> Array:
+        """Straight up; it plays no part."""
+        return UP
 
     @property
     def point_names(self) -> tuple[str, ...]:

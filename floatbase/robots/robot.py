@@ -34,7 +34,7 @@ class Foot:
     corners: Array | None = None
 
     def __post_init__(self) -> None:
-        positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True)
+        object.__setattr__(self, "radius", positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
         object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
             corners = checked(f"corners of foot {self.frame}", self.corners, (None, 3), "m")

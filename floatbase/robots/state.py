@@ -24,12 +24,16 @@ class State:
     Raises `InputError` for wrong shapes, entries that are not finite and quaternions that are not of unit length.
     """
 
+    robot: Robot
+    q: Array
+    v: Array
+
     def __init__(self, robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike | None = None):
         if not isinstance(robot, Robot):
             raise InputError(f"State needs a Robot first, as in State(robot, q, v), not {type(robot).__name__}.")
-        self.robot = robot
-        self.q = checked("q", q, (robot.nq,))
-        self.v = checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,))
+        vars(self)["robot"] = robot
+        vars(self)["q"] = checked("q", q, (robot.nq,))
+        vars(self)["v"] = checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,))
         if robot.is_floating:
             length = float(np.linalg.norm(self.q[3:7]))
             if abs(length - 1.0) > 1e-6:
@@ -37,6 +41,9 @@ class State:
                     f"the base quaternion q[3:7] (x y z w) has length {length:.6g}; it must be 1. "
                     "Divide it by its length, or use robot.standing()."
                 )
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise InputError(f"a State does not change; state.at({name}=…) makes a new one." if name in "qv" else f"no {name}.")
 
     @cached_property
     def _data(self) -> pin.Data:

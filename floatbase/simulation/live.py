@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy.typing as npt
 
 from floatbase._arrays import positive
-from floatbase.errors import FloatbaseError
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.rollout import Controller, Rollout, rollout
 
@@ -49,6 +48,7 @@ class Live:
         self._closing = False
         self._speed = 1.0
         self._status = "paused"
+        self.error: Exception | None = None
         self._touched = time.monotonic()
         self._thread: threading.Thread | None = None
 
@@ -135,7 +135,7 @@ class Live:
             self._asked, self._reset = [], False
         if reset:
             self._sim.reset()
-            self._pushes = ()
+            self._pushes, asked = (), []
         now = self._sim.time
         self._pushes = tuple(p for p in self._pushes if now < p.start + p.duration) + tuple(
             Push(p.force, now, p.duration, p.frame) for p in asked
@@ -145,8 +145,8 @@ class Live:
             if len(record):
                 self._show(record)
             outcome = record.outcome if record.error is None else f"{record.outcome}: {record.error}"
-        except FloatbaseError as error:
-            outcome = f"stopped: {error}"
+        except Exception as error:  # whatever a learner's controller raises must show, or the picture just stands still
+            outcome, self.error = f"stopped: {type(error).__name__}: {error}", error
         with self._lock:
             if outcome != "completed" and self._running:
                 self._running, self._status = False, outcome

@@ -37,8 +37,8 @@ class Push:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "force", checked("force of the push", self.force, (3,), "N"))
-        positive("start of the push", self.start, "s", allow_zero=True)
-        positive("duration of the push", self.duration, "s")
+        object.__setattr__(self, "start", positive("start of the push", self.start, "s", allow_zero=True))
+        object.__setattr__(self, "duration", positive("duration of the push", self.duration, "s"))
 
     def acts_at(self, t: float) -> bool:
         """Whether the push acts in the step that begins at t, s."""
@@ -53,7 +53,7 @@ class Ground:
     normal: Array = field(default_factory=lambda: UP)
 
     def __post_init__(self) -> None:
-        positive("friction coefficient mu of the ground", self.mu)
+        object.__setattr__(self, "mu", positive("friction coefficient mu of the ground", self.mu))
         object.__setattr__(self, "normal", unit_vector("normal of the ground", self.normal))
 
 
@@ -125,8 +125,8 @@ class Simulation:
         return height < FALLEN_HEIGHT * self._upright[0] or float(up @ self._upright[1]) < np.cos(FALLEN_TILT)
 
     def reset(self, state: State | None = None) -> None:
-        """Put the robot into a state, standing by default, at time 0."""
-        state = self.robot.standing() if state is None else state
+        """Put the robot into a state, standing upright on the ground's plane by default, at time 0."""
+        state = self._standing() if state is None else state
         if not isinstance(state, State):
             raise InputError(f"reset needs a State, as robot.standing(), not {state!r}.")
         if state.robot is not self.robot:
@@ -168,6 +168,15 @@ class Simulation:
         ids = [self.model.geom(name).id for name in self._points]
         radii = self.model.geom_size[ids, 0][:, None]
         return self.data.geom_xpos[ids] - radii * self.ground.normal
+
+    def _standing(self) -> State:
+        """The robot standing on the ground; on a slope turned with it, so that every foot touches."""
+        state = self.robot.standing()
+        if not self.robot.is_floating:
+            return state
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(self.ground.normal))
+        attitude = (turn * pin.Quaternion(*state.q[[6, 3, 4, 5]])).normalized()
+        return state.at(q=np.concatenate([turn.matrix() @ state.q[:3], attitude.coeffs(), state.q[7:]]))
 
     def _base_pose(self) -> tuple[float, Array]:
         """Height of the base's origin over the ground, m, and its vertical in the world, shape (3,)."""

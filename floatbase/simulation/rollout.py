@@ -71,15 +71,21 @@ class Rollout:
     @property
     def final(self) -> State:
         """The last state on record."""
+        self._check_not_empty()
         return self.state(-1)
 
     @property
     def com(self) -> Array:
         """Centre of mass at each row, shape (n, 3), m, world."""
-        return read_only([self.state(i).com for i in range(len(self))])
+        return read_only(np.reshape([self.state(i).com for i in range(len(self))], (-1, 3)))
+
+    def _check_not_empty(self) -> None:
+        if not len(self):
+            raise InputError(f"this record is empty: {self.outcome}{'' if self.error is None else f', {self.error}'}")
 
     def slip(self) -> Array:
-        """How far each contact point strayed from where it was first, shape (k/3,), m."""
+        """How far each contact point strayed from where it was first, shape (points,), m."""
+        self._check_not_empty()
         return read_only(np.linalg.norm(self.foot_positions - self.foot_positions[0], axis=2).max(axis=0))
 
     def __repr__(self) -> str:
@@ -178,8 +184,15 @@ class _Run:
         planned = getattr(command, "forces", None)
         planned = np.full(self.contacts.k, np.nan) if planned is None else np.asarray(planned, dtype=np.float64)
         count = np.maximum(self._columns.sum(axis=1, keepdims=True), 1.0)
+        if planned.shape != (self.contacts.k,):
+            raise InputError(
+                f"the controller planned forces of shape {planned.shape}; its contacts ({', '.join(self.contacts.names)}) "
+                f"have {self.contacts.k} numbers. A controller that changes its stance runs one rollout for each."
+            )
+        known = self._columns.any(axis=1)  # points that the physics has; the others are not measured
         measured = np.full(self.contacts.k, np.nan)
-        measured[self.contacts.point_entries] = (self._columns @ forces).ravel()
+        measured[self.contacts.point_entries] = np.where(known[:, None], self._columns @ forces, np.nan).ravel()
+        feet = np.where(known[:, None], feet, np.nan)
         self.rows.append((time, q, v, applied, desired, planned, measured, feet / count))
 
     def _actuated(self, desired: Array) -> Array:

@@ -378,3 +378,59 @@ def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_noise
     controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
     record = fb.rollout(fb.Simulation(robot), controller, 1.0, control_period=2e-3)
     assert record.outcome == "completed", record.error
+
+
+def test_motions_that_contradict_each_other_are_named_and_not_averaged() -> None:
+    from floatbase.dynamics.constraints import moving_frame
+
+    robot = judges.load("go2")
+    drive = moving_frame("FL_foot", lambda t: np.array([0.0, 0.0, 5.0 * t]))
+    controller = fb.WholeBodyController(
+        robot, fb.Contacts.points(robot) + fb.Contacts([drive]), fb.standing_tasks(robot.standing())
+    )
+    state = robot.standing()
+    with pytest.raises(
+        fb.InfeasibleError, match="these motions cannot be kept together: motion FL_foot z, motion drive of"
+    ) as e:
+        controller(state.q, state.v, 1.0)
+    assert e.value.rows == ("motion FL_foot z", "motion drive of FL_foot row 2")
+
+
+def test_limits_keep_their_own_copy_and_check_what_they_are_given() -> None:
+    from floatbase.control.controller import Limits
+
+    mine = np.full(12, 20.0)
+    limits = Limits(mine)
+    mine[:] = 1.0
+    assert np.all(limits.torque_limits == 20.0)
+    for bad in ({"min_normal_force": -50.0}, {"facets": 2}):
+        with pytest.raises(fb.FloatbaseError):
+            Limits(np.ones(12), **bad)
+
+
+class _Odd:
+    """A task of a user's own that is wrong in one way."""
+
+    name, weight, block = "odd", 1.0, "qdd"
+
+    def __init__(self, **wrong: object):
+        for key, value in wrong.items():
+            setattr(self, key, value)
+
+    def residual(self, eom: object, t: float = 0.0) -> fb.Affine:
+        return fb.Affine.identity(3)
+
+
+@pytest.mark.parametrize(
+    ("task", "text"),
+    [
+        (_Odd(block="foo"), "task 'odd' has block 'foo'; it must be"),
+        (_Odd(weight=-1.0), "weight of odd is -1; it must be ≥ 0"),
+        (_Odd(), "the residual of 'odd' takes 3 numbers; its block 'qdd' has 18"),
+        (fb.CoMTask, "tasks must hold tasks"),
+    ],
+)
+def test_a_task_of_ones_own_is_checked(task: object, text: str) -> None:
+    robot = judges.load("go2")
+    with pytest.raises(fb.FloatbaseError, match=text):
+        fb.WholeBodyController(robot, fb.Contacts.points(robot), [task])

@@ -129,3 +129,11 @@ def test_joint_transforms_are_where_mujoco_has_the_joints(name: str) -> None:
         body = int(judge.model.joint(joint).bodyid[0])
         assert np.allclose(T[:3, 3], judge.data.xpos[body], atol=1e-9)
         assert np.allclose(T[:3, :3], judge.data.xmat[body].reshape(3, 3), atol=1e-9)
+
+
+def test_a_state_does_not_change() -> None:
+    state = judges.load("go2").standing()
+    with pytest.raises(fb.FloatbaseError, match=r"a State does not change; state\.at\(q=…\) makes a new one"):
+        state.q = state.q
+    with pytest.raises(ValueError, match="read-only"):
+        state.q[0] = 1.0

@@ -269,3 +269,41 @@ def test_a_constraint_that_the_physics_does_not_know_is_not_measured() -> None:
     assert np.all(np.isfinite(record.measured[:, :6]))
     assert record.foot_positions.shape == (5, 2, 3)
     assert np.all(np.isfinite(record.planned))
+
+
+def test_a_contact_that_the_physics_lacks_is_not_measured_as_zero() -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.points(robot) + fb.Contacts.points(robot, frames=["FL_calf"])
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
+    record = fb.rollout(fb.Simulation(robot), controller, 0.003)
+    assert np.all(np.isnan(record.measured[:, 12:]))
+    assert np.all(np.isnan(record.foot_positions[:, 4]))
+    assert np.all(np.isfinite(record.measured[:, :12]))
+
+
+def test_forces_that_do_not_fit_the_contacts_are_refused_with_both_numbers() -> None:
+    class Wrong:
+        tau, forces = np.zeros(12), np.zeros(9)
+
+    sim = fb.Simulation(judges.load("go2"))
+    with pytest.raises(fb.FloatbaseError, match=r"forces of shape \(9,\); its contacts .* have 12 numbers"):
+        fb.rollout(sim, lambda q, v, t: Wrong(), 0.01)
+
+
+def test_an_empty_record_says_why_it_is_empty() -> None:
+    robot = judges.load("solo12")
+    contacts = fb.Contacts.points(robot)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=500.0)
+    record = fb.rollout(fb.Simulation(robot), controller, 0.01)
+    assert len(record) == 0
+    assert record.com.shape == (0, 3)
+    for look in (record.slip, lambda: record.final):
+        with pytest.raises(fb.FloatbaseError, match="this record is empty: controller failed, no point satisfies all rows"):
+            look()
+
+
+@pytest.mark.parametrize("normal", [(0.2, 0.0, 1.0), (-0.1, 0.15, 1.0)])
+def test_a_robot_starts_with_every_foot_on_a_slope(normal: tuple[float, float, float]) -> None:
+    sim = fb.Simulation(judges.load("go2"), ground=fb.Ground(normal=np.array(normal)))
+    heights = sim.contact_positions() @ sim.ground.normal
+    assert np.max(np.abs(heights)) < 1e-9
