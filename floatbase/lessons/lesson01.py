@@ -20,6 +20,7 @@ from floatbase._arrays import Array, read_only
 from floatbase.dynamics.constraints import fixed_frame
 from floatbase.lessons.controls import slider_panel
 from floatbase.lessons.exercises import Exercise, Numeric, Verdict
+from floatbase.objectives.tasks import Task
 from floatbase.robots.robot import Robot
 from floatbase.simulation.rollout import Rollout
 from floatbase.viewer import marks, props, recording, shapes
@@ -201,7 +202,7 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> widget
     """Figure 1, right: sliders for what the body should do; the feet answer with f_i, whose sum is f_c and τ_c."""
 
     def draw(forwards: float, up: float, turn: float) -> str:
-        tasks = [
+        tasks: list[Task] = [
             fb.CoMTask(state.com, acceleration=[forwards, 0.0, up], weight=1e3),
             fb.OrientationTask("base", angular_acceleration=[0.0, 0.0, turn], weight=1e3),
             fb.PostureTask(state.q),
@@ -244,7 +245,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> widg
 
 def _row(vector: npt.ArrayLike) -> str:
     """Three numbers, without a minus before a zero."""
-    return "(" + ", ".join(f"{x + 0.0:.0f}" for x in np.round(vector)) + ")"
+    return "(" + ", ".join(f"{x + 0.0:.0f}" for x in np.round(np.asarray(vector, dtype=np.float64))) + ")"
 
 
 def _wall(tool: Array) -> Picture:

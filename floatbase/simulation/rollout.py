@@ -189,7 +189,7 @@ class _Run:
                 f"the controller planned forces of shape {planned.shape}; its contacts ({', '.join(self.contacts.names)}) "
                 f"have {self.contacts.k} numbers. A controller that changes its stance runs one rollout for each."
             )
-        known = self._columns.any(axis=1)  # points that the physics has; the others are not measured
+        known = self._columns.sum(axis=1) > 0  # points that the physics has; the others are not measured
         measured = np.full(self.contacts.k, np.nan)
         measured[self.contacts.point_entries] = np.where(known[:, None], self._columns @ forces, np.nan).ravel()
         feet = np.where(known[:, None], feet, np.nan)
