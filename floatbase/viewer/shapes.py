@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, read_only
 from floatbase.control.friction import FrictionPolyhedron, tangents
 from floatbase.viewer import geometry, three
 from floatbase.viewer.colours import COM, CONE, PATCH, RGB, RGBA, WARNING, with_alpha
@@ -137,8 +137,15 @@ def ground(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
 
 def _surface_frame(normal: npt.ArrayLike) -> Array:
     """Axes of a contact: the tangents that the friction rows use, and the normal."""
-    t1, t2 = tangents(normal)
-    return np.stack([t1, t2, np.cross(t1, t2)], axis=1)
+    x, y, z = np.asarray(normal, dtype=np.float64).tolist()
+    return _surface_frame_of(x, y, z)
+
+
+@lru_cache(maxsize=256)
+def _surface_frame_of(x: float, y: float, z: float) -> Array:
+    """`_surface_frame`, once for every normal: a ground has few."""
+    t1, t2 = tangents([x, y, z])
+    return read_only(np.stack([t1, t2, np.cross(t1, t2)], axis=1))
 
 
 @lru_cache(maxsize=64)

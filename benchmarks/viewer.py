@@ -1,0 +1,149 @@
+"""How long the viewer keeps its caller waiting: `python benchmarks/viewer.py`.
+
+`set_transform`, through meshcat's own `Visualizer` and as `Viewer` sends it, and a full `show` of go2 with a new state, new
+measured and planned forces and four cones every time. Once with no page, and once with one page of a real browser that
+draws all the while on the same machine (left out without Chromium and playwright). The loop does not pause between calls,
+so window and page are as busy as they can be; the last row draws 30 times a second, as a course does. "work" is the median
+of the processor time that the caller's thread itself used: what is left of it when the machine is busy with other things.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from importlib.metadata import version
+from pathlib import Path
+
+import meshcat
+import numpy as np
+
+import floatbase as fb
+from floatbase.viewer import wire
+from floatbase.viewer.window import Window
+
+TARGETS = {"set_transform": 25.0, "show": 1500.0}  # µs, median
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
+
+
+Row = tuple[str, str, np.ndarray]  # what was called, how, and of every call the time and the caller's own work, µs
+
+
+def timed(call: Callable[[int], object], calls: int, pause: float = 0.0) -> np.ndarray:
+    """Time of every call and the work of this thread in it, (2, calls), µs; `call` gets its number. pause: s between calls."""
+    times = np.empty((2, calls))
+    for i in range(calls):
+        time.sleep(pause)
+        work, start = time.thread_time_ns(), time.perf_counter_ns()
+        call(i)
+        times[:, i] = time.perf_counter_ns() - start, time.thread_time_ns() - work
+    return times / 1e3
+
+
+def transforms(window: Window, calls: int) -> Iterator[Row]:
+    """The two ways to move an object."""
+    matrices = np.tile(np.eye(4), (100, 1, 1))
+    matrices[:, 0, 3] = np.arange(100)
+    box = meshcat.Visualizer(window=window)["box"]
+    box.set_object(meshcat.geometry.Box([0.1, 0.1, 0.1]))
+    yield "set_transform", "meshcat's Visualizer", timed(lambda i: box.set_transform(matrices[i % 100]), calls)
+
+    def put(i: int) -> None:
+        window.put([wire.set_transform("/meshcat/box", matrices[i % 100])])
+
+    yield "set_transform", "Window.put", timed(put, calls)
+
+
+def shows(view: fb.Viewer, calls: int, pause: float = 0.0) -> Iterator[Row]:
+    """A full picture, everything in it new. States are made beforehand, but know nothing yet: their kinematics count."""
+    robot, random = view.robot, np.random.default_rng(0)
+    contacts = fb.Contacts.points(robot, 0.6)
+    home = robot.standing().q
+    for facets in (None, 4) if not pause else (None,):
+        view.painter = view.painter.with_facets(facets)
+        states = [fb.State(robot, home + np.r_[np.zeros(7), random.normal(0, 0.03, robot.nq - 7)]) for _ in range(calls)]
+        lean = random.normal(0, 0.25, (calls, 2, 4, 3)) * [1, 1, 0.3]
+        forces = 0.25 * robot.weight * (lean + [0.0, 0.0, 1.0])
+
+        def show(i: int, states: list[fb.State] = states, forces: np.ndarray = forces) -> None:
+            view.show(states[i], contacts, forces[i, 0], forces[i, 1], title=f"{i}")
+
+        what = "cones" if facets is None else f"{facets} facets each"
+        yield "show", f"forces, planned, {what}" + (", 30 a second" if pause else ""), timed(show, calls, pause)
+
+
+@contextmanager
+def a_page(url: str) -> Iterator[bool]:
+    """A page of a real browser, if there is one."""
+    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        found = None
+    if found is None:
+        yield False
+        return
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=FLAGS)
+        browser.new_page(viewport={"width": 900, "height": 600}).goto(url)
+        yield True
+        browser.close()
+
+
+def machine() -> str:
+    """Processor, Python and packages."""
+    cpu = platform.processor() or platform.machine()
+    if Path("/proc/cpuinfo").exists():
+        names = [line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
+        cpu = names[0] if names else cpu
+    packages = ", ".join(f"{name} {version(name)}" for name in ("meshcat", "tornado", "numpy", "pin"))
+    return f"{cpu}, {os.cpu_count()} cores, {platform.system()}; Python {platform.python_version()}, {packages}"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print the table; 1 when a median misses its target."""
+    parser = argparse.ArgumentParser(description="Times of the viewer on the Python side.")
+    parser.add_argument("--calls", type=int, default=20_000, help="of set_transform; a tenth of it of show (20000)")
+    parser.add_argument("--no-page", action="store_true", help="leave the browser out")
+    asked = parser.parse_args(arguments)
+    print(machine())
+    print(f"{'':9}{'call':14}{'':43}{'median':>10}{'p99':>10}{'work':>10}{'target':>10}   (µs)")
+    missed = False
+
+    def report(page: str, rows: Iterator[Row]) -> None:
+        nonlocal missed
+        for call, how, times in rows:
+            (median, slow), work = np.percentile(times[0], [50, 99]), np.median(times[1])
+            missed = missed or median > TARGETS[call]
+            verdict = "missed" if median > TARGETS[call] else ""
+            print(
+                f"{page:9}{call:14}{how:43}{median:10.1f}{slow:10.1f}{work:10.1f}{TARGETS[call]:10.0f}  {verdict}", flush=True
+            )
+
+    def both(page: str) -> None:
+        report(page, transforms(view.window, asked.calls))
+        report(page, shows(view, max(asked.calls // 10, 1)))
+
+    view = fb.Viewer(fb.load("go2"))
+    view.show(view.robot.standing())
+    try:
+        both("no page")
+        with nullcontext(False) if asked.no_page else a_page(view.url) as there:
+            if there:
+                view.window.wait()
+                both("one page")
+                report("one page", shows(view, max(asked.calls // 100, 1), 1 / 30))
+            elif not asked.no_page:
+                print("one page: left out, no Chromium or no playwright here")
+    finally:
+        view.close()
+    return int(missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
