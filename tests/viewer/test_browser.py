@@ -7,6 +7,7 @@ import pytest
 
 from floatbase.dynamics.contacts import Contacts
 from floatbase.robots import Robot, State
+from floatbase.viewer import wire
 from floatbase.viewer.colours import ALARM, CALM, COM, MEASURED, WARNING
 from floatbase.viewer.scene import Viewer
 from floatbase.viewer.window import Window
@@ -56,8 +57,11 @@ def test_the_page_comes_back_when_the_window_does(page, go2: Robot) -> None:
     first.close()
     page.wait_for_function("getComputedStyle(document.getElementById('notice')).display == 'block'")
     with Window(port=first.port) as second:
+        second.put([wire.page_command("set_title", text="back again")])
         second.wait(timeout=10)
         assert second.browsers == 1
+        page.wait_for_function("document.getElementById('title').textContent == 'back again'")
+        assert page.evaluate("getComputedStyle(document.getElementById('notice')).display") == "none"
 
 
 def test_get_image_is_the_picture_in_the_page(page, viewer: Viewer, standing: State) -> None:

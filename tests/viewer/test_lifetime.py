@@ -1,0 +1,208 @@
+"""What a window goes through: killed browsers, pages that never read, interrupts, restarts; nothing hangs, grows or stays."""
+
+from __future__ import annotations
+
+import os
+import queue
+import re
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+from jupyter_client.manager import start_new_kernel
+
+from floatbase.dynamics.contacts import Contacts
+from floatbase.robots import Robot, State, load
+from floatbase.viewer import window as window_module
+from floatbase.viewer import wire
+from floatbase.viewer.scene import Viewer
+from floatbase.viewer.window import Window
+
+from .conftest import CHROMIUM, FLAGS
+
+MB = 1 << 20
+
+
+def until(true: Callable[[], bool], seconds: float) -> bool:
+    """Whether it comes true in time."""
+    deadline = time.monotonic() + seconds
+    while not true() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return true()
+
+
+def memory() -> int:
+    """Bytes of this process in memory."""
+    return int(psutil.Process().memory_info().rss)
+
+
+def answers(port: int) -> bool:
+    """Whether anything listens there."""
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=2).close()
+    except OSError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found on the path")
+def test_a_killed_browser_leaves_nothing_behind(
+    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, tmp_path: Path
+) -> None:
+    viewer.show(standing, contacts, forces)
+    threads, files, entries = threading.active_count(), len(os.listdir("/proc/self/fd")), len(viewer.window.scene)
+    browser = subprocess.Popen(
+        [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path}", "--remote-debugging-port=0", viewer.url],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    try:
+        viewer.window.wait(30)
+        slowest = 0.0
+        for i in range(300):
+            start = time.monotonic()
+            viewer.show(standing, contacts, (1 + 0.001 * i) * forces)
+            slowest = max(slowest, time.monotonic() - start)
+            if i == 100:
+                os.killpg(browser.pid, signal.SIGKILL)
+    finally:
+        if browser.poll() is None:
+            os.killpg(browser.pid, signal.SIGKILL)
+        browser.wait(10)
+    assert slowest < 1.0
+    assert until(lambda: viewer.window.browsers == 0, 5)
+    assert until(lambda: len(os.listdir("/proc/self/fd")) <= files, 5)
+    assert threading.active_count() == threads
+    assert len(viewer.window.scene) <= entries + 2  # title and legend
+    viewer.show(standing)
+
+
+@pytest.fixture
+def sleeper(window: Window) -> Iterator[socket.socket]:
+    """A page that connects and never reads."""
+    with socket.create_connection(("127.0.0.1", window.port)) as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.sendall(
+            f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{window.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+        )
+        assert until(lambda: window.browsers == 1, 5)
+        yield client
+
+
+def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(window: Window, sleeper: socket.socket) -> None:
+    (_, command) = wire.set_object("/meshcat/a", {"data": "x" * 20_000})
+
+    def draw(n: int) -> None:
+        for i in range(n):
+            path = f"/meshcat/{i % 5}"
+            window.put([((path, "set_object", ""), command), wire.set_transform(path, np.eye(4))])
+
+    draw(5_000)
+    before = memory()
+    draw(45_000)  # 0.9 GB, had it been kept
+    assert memory() - before < 20 * MB
+    assert len(window.scene) == 10
+    assert window.browsers == 1
+    start = time.monotonic()
+    window.close()
+    assert time.monotonic() - start < 2
+    assert not answers(window.port)
+
+
+def test_a_page_that_never_reads_is_dropped(window: Window, sleeper: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(window_module, "PATIENCE", 0.2)
+    files = len(os.listdir("/proc/self/fd"))
+
+    def drawn_and_gone() -> bool:
+        window.put([wire.set_transform("/meshcat/a", np.eye(4))])
+        return window.browsers == 0
+
+    assert until(drawn_and_gone, 8)
+    assert until(lambda: len(os.listdir("/proc/self/fd")) < files, 8)
+
+
+def test_several_viewers_in_one_process_do_not_know_each_other(viewer: Viewer, standing: State) -> None:
+    with Window() as other:
+        arm = load("ur5")
+        second = Viewer(arm)
+        viewer.show(standing)
+        second.show(arm.standing())
+        assert len({viewer.window.port, second.window.port, other.port}) == 3
+        second.close()
+        assert not answers(second.window.port) and answers(viewer.window.port)
+        viewer.show(standing, com=False)
+        assert len(other.scene) == 0
+
+
+class Kernel:
+    """A Jupyter kernel of its own."""
+
+    def __init__(self) -> None:
+        self.manager, self.client = start_new_kernel(kernel_name="python3")
+
+    def run(self, code: str) -> str:
+        """What the code prints, or the name of its error."""
+        self.client.execute(code)
+        return self.output()
+
+    def output(self, patience: float = 60) -> str:
+        """What was printed until the kernel is idle."""
+        said: list[str] = []
+        while True:
+            message: dict[str, Any] = self.client.get_iopub_msg(timeout=patience)
+            content = message["content"]
+            if message["msg_type"] == "stream":
+                said.append(content["text"])
+            elif message["msg_type"] == "error":
+                said.append(content["ename"])
+            elif message["msg_type"] == "status" and content["execution_state"] == "idle" and message["parent_header"]:
+                return "".join(said)
+
+    def drop_old_messages(self) -> None:
+        """Forget what was said until now."""
+        try:
+            while True:
+                self.client.get_iopub_msg(timeout=0.2)
+        except queue.Empty:
+            return
+
+    def close(self) -> None:
+        self.client.stop_channels()
+        self.manager.shutdown_kernel(now=True)
+
+
+def test_a_kernel_is_interrupted_and_restarted_under_a_viewer() -> None:
+    kernel = Kernel()
+    try:
+        make = "import floatbase as fb; view = fb.Viewer(fb.load('ur5'), port={}); s = view.robot.standing(); view.show(s)"
+        port = int(kernel.run(make.format(0) + "\nprint(view.window.port)"))
+        assert answers(port)
+
+        kernel.client.execute("print('drawing', flush=True)\nwhile True: view.show(s, com=False); view.show(s)")
+        assert kernel.client.get_iopub_msg(timeout=10) is not None
+        time.sleep(0.3)
+        kernel.manager.interrupt_kernel()
+        assert kernel.output(10).endswith("KeyboardInterrupt")
+        assert re.fullmatch(r"True \d+\n", kernel.run("view.show(s); print(view.window.is_open, len(view.canvas.picture))"))
+
+        kernel.manager.restart_kernel(now=False)
+        assert until(lambda: not answers(port), 5)
+        kernel.client.wait_for_ready(timeout=30)
+        kernel.drop_old_messages()
+        assert kernel.run(make.format(port) + "\nprint(view.window.port)") == f"{port}\n"
+        assert answers(port)
+
+        process = psutil.Process(kernel.manager.provisioner.process.pid)  # type: ignore[union-attr]
+        assert process.children() == []
+        process.kill()
+        assert until(lambda: not answers(port), 5)
+    finally:
+        kernel.close()
