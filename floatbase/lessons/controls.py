@@ -12,14 +12,18 @@ from floatbase.viewer.scene import Viewer
 
 
 def slider_panel(
-    view: Viewer, draw: Callable[..., str | None], wait: bool = False, **ranges: tuple[float, float, float]
+    view: Viewer,
+    draw: Callable[..., str | None],
+    wait: bool = False,
+    beside: bool = False,
+    **ranges: tuple[float, float, float],
 ) -> widgets.VBox:
     """The live picture with a slider for each of `ranges`: name=(lowest, first, highest); "_" in a name shows as a blank.
 
     draw: called at once and at every move as draw(name=value, …), in the kernel's thread, so it should take a few
-    milliseconds. What it returns, HTML or plain text, stands between the picture and the sliders. wait: call it only when
-    a slider is let go, for functions that take a little longer. Should it raise an error of the package, that stands there
-    instead.
+    milliseconds. What it returns, HTML or plain text, stands between the picture and the sliders, or to the right of the
+    picture with `beside`. wait: call it only when a slider is let go, for functions that take a little longer. Should it
+    raise an error of the package, that stands there instead.
     """
     note = widgets.HTML()
     sliders = {name: _slider(name, *bounds, wait) for name, bounds in ranges.items()}
@@ -33,8 +37,9 @@ def slider_panel(
     for slider in sliders.values():
         slider.observe(moved, names="value")
     moved()
-    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="100%"))
-    return widgets.VBox([picture, note, *sliders.values()])
+    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="62%" if beside else "100%"))
+    top = [widgets.HBox([picture, note])] if beside else [picture, note]
+    return widgets.VBox([*top, *sliders.values()])
 
 
 def _slider(name: str, low: float, first: float, high: float, wait: bool) -> widgets.FloatSlider:

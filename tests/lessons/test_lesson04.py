@@ -1,0 +1,161 @@
+"""Lesson 04: its helpers do what they say, and wrong answers of each kind get the hint that fits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.lessons.exercises import exercises
+from floatbase.lessons.lesson03 import ConstantTorques, space_of, standing_go2, standing_still
+from floatbase.lessons.lesson04 import (
+    WANTED,
+    LeastCost,
+    counted_in,
+    effort_picture,
+    level_curves,
+    measured_acceleration,
+    show_torques,
+    slices,
+    tilted,
+)
+from floatbase.objectives.centroidal import tangential_bias
+from floatbase.objectives.pullback import seen_from_best, seen_from_smallest
+
+GO2 = fb.load("go2")
+EFFORT = fb.Quadratic.from_residual(np.eye(12), np.zeros(12))
+
+
+def verdict(name: str, answer: Any) -> Any:
+    return exercises()[name].judge(answer)
+
+
+def com_cost(eom: Any, wanted: Any = WANTED) -> fb.Quadratic:
+    return fb.Quadratic.from_residual(eom.state.com_jacobian, np.asarray(wanted) - eom.state.com_drift)
+
+
+def turn_cost(eom: Any) -> fb.Quadratic:
+    return fb.Quadratic.from_residual(eom.state.frame_jacobian("base")[3:], -eom.state.frame_drift("base")[3:])
+
+
+def test_04_1_takes_the_gradient_of_the_pullback() -> None:
+    assert verdict("04.1", com_cost(tilted()).pullback(fb.accelerations_from_torques(tilted())).g).right
+
+
+def test_04_1_knows_sign_frame_transpose_drift_offset_and_shape() -> None:
+    eom = tilted()
+    A, b = fb.accelerations_from_torques(eom)
+    J, drift, R = eom.state.com_jacobian, eom.state.com_drift, eom.state.frame_pose("base").rotation
+    slope = A.T @ J.T
+    right = slope @ (J @ b + drift - WANTED)
+    wrong = {
+        "The sign: residual": -right,
+        "drift is forgotten": slope @ (J @ b - WANTED),
+        "drift has the wrong sign": slope @ (J @ b - drift - WANTED),
+        "offset: with the motors off": slope @ (drift - WANTED),
+        "both forgotten": slope @ (-WANTED),
+        "The frame: `wanted` is in world axes, as": slope @ (J @ b + drift - R @ WANTED),
+        "The frame: `wanted` is in world axes already": slope @ (J @ b + drift - R.T @ WANTED),
+        "transpose of A": np.linalg.pinv(A) @ J.T @ (J @ b + drift - WANTED),
+        "½": 2 * right,
+        "nothing there yet": np.zeros(12),
+        "18 numbers": J.T @ (J @ b + drift - WANTED),
+        "3 numbers": J @ b + drift - WANTED,
+        "curvature": slope @ slope.T,
+        "one column": right[:, None],
+        "shape": np.zeros(7),
+        "no answer yet": None,
+        "Neither right": np.ones(12),
+    }
+    for hint, answer in wrong.items():
+        said = verdict("04.1", answer)
+        assert not said.right and hint in said.text, (hint, said)
+
+
+def test_04_2_knows_each_wrong_count() -> None:
+    assert verdict("04.2", 6).right
+    for wrong, hint in {9: "alone", 3: "free leg", 12: "q̈", 0: "one cost"}.items():
+        said = verdict("04.2", wrong)
+        assert not said.right and hint in said.text, (wrong, said)
+
+
+def test_04_3_takes_any_cost_whose_least_point_does_it() -> None:
+    eom = standing_go2()
+    eta, zeta = fb.accelerations_from_torques(eom), fb.forces_from_torques(eom)
+    wish = (com_cost(eom) + turn_cost(eom)).pullback(eta)
+    for weight in (3e-5, 1e-4):
+        assert verdict("04.3", wish + 1e-4 * EFFORT + weight * tangential_bias(eom.contacts).pullback(zeta)).right
+    even = fb.Quadratic.from_residual(np.eye(12), np.tile([0, 2.0, GO2.weight / 4], 4), 1e-6)
+    assert verdict("04.3", wish + even.pullback(zeta)).right
+
+
+def test_04_3_knows_what_is_wrong() -> None:
+    eom = standing_go2()
+    eta = fb.accelerations_from_torques(eom)
+    com, turn = com_cost(eom), turn_cost(eom)
+    wrong = {
+        "leans on friction": (com + turn).pullback(eta) + 1e-4 * EFFORT,
+        "Which cost is missing": com.pullback(eta) + 1e-4 * EFFORT,
+        "weigh that more": (com + turn).pullback(eta) + EFFORT,
+        "to the right": (com_cost(eom, -WANTED) + turn).pullback(eta) + 1e-4 * EFFORT,
+        "on 18 numbers": com,
+        "Give the cost": EFFORT.minimiser(),
+        "no least point": -1.0 * EFFORT,
+        "no answer yet": None,
+    }
+    for hint, answer in wrong.items():
+        said = verdict("04.3", answer)
+        assert not said.right and hint in said.text, (hint, said)
+
+
+def test_other_units_give_the_same_motions_and_the_same_least_effort() -> None:
+    space = space_of(GO2)
+    least, with_shortest = [], []
+    for newtons in (1e-3, 1.0, 1e3):
+        same = counted_in(space, newtons)
+        beta = np.random.default_rng(0).standard_normal(same.dimension)
+        motion, feet = same.eom.residual(*same(beta))
+        assert max(abs(motion).max(), abs(feet).max()) < 1e-6
+        cost = EFFORT.pullback(same.tau)
+        least.append(seen_from_best(cost, same, "qdd")(np.zeros(18)))
+        with_shortest.append(seen_from_smallest(cost, same, "qdd")(np.zeros(18)))
+    np.testing.assert_allclose(least, least[1], rtol=1e-6)
+    assert max(with_shortest) > 1.3 * min(with_shortest)
+
+
+@pytest.mark.parametrize("wanted", [[0, 0.5, 0], [0.5, 0, 0], [0, 0, 1.0]])
+def test_the_engine_measures_what_was_wished(wanted: list[float]) -> None:
+    contacts = fb.Contacts.points(GO2)
+
+    def cost(eom: Any) -> fb.Quadratic:
+        return (com_cost(eom, wanted) + turn_cost(eom)).pullback(fb.accelerations_from_torques(eom)) + 1e-4 * EFFORT
+
+    record = fb.rollout(fb.Simulation(GO2), LeastCost(GO2, contacts, cost), 0.1, control_period=0.005)
+    np.testing.assert_allclose(measured_acceleration(record), wanted, atol=0.01)
+
+
+def test_a_falling_robot_is_measured_to_fall() -> None:
+    sim = fb.Simulation(GO2)
+    q = GO2.standing().q.copy()
+    q[2] += 1.0
+    sim.reset(fb.State(GO2, q))
+    record = fb.rollout(sim, ConstantTorques(np.zeros(12)), 0.1)
+    np.testing.assert_allclose(measured_acceleration(record), [0, 0, -9.81], atol=0.01)
+
+
+def test_the_pictures_are_drawn() -> None:
+    bowl = fb.Quadratic.from_residual([[2.0, 0.0], [0.0, 1.0]], [2.0, 1.0])
+    valley = fb.Quadratic.from_residual([[1.0, 1.0]], [1.0])
+    assert len(slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes) == 2
+    drawn = level_curves(bowl, [1.0, 1.0], 2.0, "x", "y")
+    assert "translate(195.0 65.0)" in drawn and 'cx="195.0" cy="65.0"' in drawn  # both at (1, 1): right of and above the middle
+    assert "nan" not in level_curves(valley, [0.0, 0.0], 2.0, "x", "y")
+    assert len(effort_picture({"a": ([0, 1], [0, 1])}).axes) == 1
+    space = space_of(GO2)
+    view = fb.Viewer(GO2)
+    try:
+        np.testing.assert_allclose(show_torques(view, space.eom, space(standing_still(space))[1]), 0.0, atol=1e-9)
+    finally:
+        view.close()
