@@ -316,10 +316,23 @@ def parametrised(B, pivots, n):
 
 
 @_compiled
+def product(left, right, n):
+    """left (m, n) times the first n rows of right (·, p), shape (m, p); zeros on the left, of which there are many, are skipped."""
+    out = np.zeros((left.shape[0], right.shape[1]))
+    for i in range(left.shape[0]):
+        for j in range(n):
+            factor = left[i, j]
+            if factor != 0.0:
+                for c in range(right.shape[1]):
+                    out[i, c] += factor * right[j, c]
+    return out
+
+
+@_compiled
 def torques(V, M, h, Jp, base):
     """(16) β -> τ = M_j q̈ + h_j - J_jᵀ λ as T (d, nb + 1), V as from `motions`."""
     nv, k, width = M.shape[0], Jp.shape[0], V.shape[1]
-    T = np.dot(M[base:], V[:nv])
+    T = product(M[base:], V, nv)
     for c in range(k):
         for j in range(nv - base):
             factor = Jp[c, base + j]
@@ -448,7 +461,7 @@ def objective(q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velo
                 kind, tasks[i, 1], frames[i], targets[at:], tree, oMi, J, Ag, links, velocity, drift, rows, e, e_dot, bias
             ):
                 return R, weight, wanted, False
-            root, part = np.sqrt(w), np.dot(rows, V[:nv])
+            root, part = np.sqrt(w), product(rows, V, nv)
             for r in range(3):
                 for c in range(nb + 1):
                     R[used + r, c] = root * part[r, c]
@@ -557,17 +570,17 @@ def minimum(L, slope):
 
 
 @_compiled
-def inverse_transpose(L):
-    """L⁻ᵀ (nb, nb): upper triangular."""
+def inverse(L):
+    """L⁻¹ (nb, nb), lower triangular."""
     n = L.shape[0]
     W = np.zeros((n, n))
-    for c in range(n):
-        W[c, c] = 1.0 / L[c, c]
-        for i in range(c + 1, n):
-            total = 0.0
-            for j in range(c, i):
-                total -= L[i, j] * W[c, j]
-            W[c, i] = total / L[i, i]
+    for i in range(n):
+        for j in range(i):
+            for c in range(j + 1):
+                W[i, c] -= L[i, j] * W[j, c]
+        W[i, i] = 1.0
+        for c in range(i + 1):
+            W[i, c] /= L[i, i]
     return W
 
 
@@ -630,70 +643,75 @@ def row_in_beta(row, V, T, cones, least_normal, limits, out):
 
 
 @_compiled
-def add_row(W, R, d, q):
-    """Goldfarb-Idnani: turn columns q: of W (nb, nb) so that d (nb,) = Wᵀ row ends at q, and make d column q of R."""
-    n = d.size
-    for j in range(n - 1, q, -1):
-        if d[j] == 0.0:
-            continue
-        length = np.hypot(d[j - 1], d[j])
-        c, s = d[j - 1] / length, d[j] / length
-        d[j - 1], d[j] = length, 0.0
-        for i in range(n):
-            a, b = W[i, j - 1], W[i, j]
-            W[i, j - 1], W[i, j] = c * a + s * b, c * b - s * a
+def add_row(W, U, d, z, q):
+    """Goldfarb-Idnani: mirror rows q: of W (nb, nb) so that d (nb,) = W row ends at q, and make d column q of U.
+
+    z: (nb,) = -Σ d_j W_j over those rows.
+    """
+    n, length = d.size, 0.0
+    for j in range(q, n):
+        length += d[j] * d[j]
+    length = np.sqrt(length) if d[q] >= 0.0 else -np.sqrt(length)
+    scale = 1.0 / (length * (length + d[q]))
+    for c in range(n):
+        z[c] = length * W[q, c] - z[c]
+    for j in range(q, n):
+        factor = scale * (d[j] + length if j == q else d[j])
+        for c in range(n):
+            W[j, c] -= factor * z[c]
+    d[q] = -length
     for i in range(q + 1):
-        R[i, q] = d[i]
+        U[i, q] = d[i]
 
 
 @_compiled
-def drop_row(W, R, active, mu, at, q):
-    """Goldfarb-Idnani: take row `at` of q active ones out of R (upper triangular), active and mu; W follows."""
+def drop_row(W, U, active, mu, at, q):
+    """Goldfarb-Idnani: take row `at` of q active ones out of U (upper triangular), active and mu; W follows."""
     for j in range(at, q - 1):
         active[j], mu[j] = active[j + 1], mu[j + 1]
         for i in range(j + 2):
-            R[i, j] = R[i, j + 1]
+            U[i, j] = U[i, j + 1]
     for j in range(at, q - 1):
-        length = np.hypot(R[j, j], R[j + 1, j])
+        length = np.sqrt(U[j, j] * U[j, j] + U[j + 1, j] * U[j + 1, j])
         if length == 0.0:
             continue
-        c, s = R[j, j] / length, R[j + 1, j] / length
+        c, s = U[j, j] / length, U[j + 1, j] / length
         for i in range(j, q - 1):
-            a, b = R[j, i], R[j + 1, i]
-            R[j, i], R[j + 1, i] = c * a + s * b, c * b - s * a
-        for i in range(W.shape[0]):
-            a, b = W[i, j], W[i, j + 1]
-            W[i, j], W[i, j + 1] = c * a + s * b, c * b - s * a
+            a, b = U[j, i], U[j + 1, i]
+            U[j, i], U[j + 1, i] = c * a + s * b, c * b - s * a
+        for i in range(W.shape[1]):
+            a, b = W[j, i], W[j + 1, i]
+            W[j, i], W[j + 1, i] = c * a + s * b, c * b - s * a
 
 
 @_compiled
-def directions(W, R, row, q, d, z, r):
-    """Goldfarb-Idnani: d = Wᵀ row, the step z in β and r in the q multipliers, as the new row's multiplier grows by 1."""
+def directions(W, U, row, q, d, z, r):
+    """Goldfarb-Idnani: d = W row, the step z in β and r in the q multipliers, as the new row's multiplier grows by 1."""
     n = row.size
+    for i in range(n):
+        z[i] = 0.0
     for j in range(n):
-        d[j] = 0.0
-        z[j] = 0.0
-    for i in range(n):
-        if row[i] != 0.0:
-            for j in range(n):
-                d[j] += W[i, j] * row[i]
-    for i in range(n):
-        for j in range(q, n):
-            z[i] -= W[i, j] * d[j]
+        total = 0.0
+        for i in range(n):
+            total += W[j, i] * row[i]
+        d[j] = total
+        if j >= q:
+            for i in range(n):
+                z[i] -= total * W[j, i]
     for i in range(q - 1, -1, -1):
         total = d[i]
         for j in range(i + 1, q):
-            total -= R[i, j] * r[j]
-        r[i] = total / R[i, i]
+            total -= U[i, j] * r[j]
+        r[i] = total / U[i, i]
 
 
 @_compiled
-def enforce(row, bound, beta, W, R, active, mu, q, number):
+def enforce(row, bound, beta, W, U, active, mu, q, number):
     """Bring one violated row (nb,) of G β ≤ h to its bound, dropping active rows that pull; returns q and a status."""
     n = beta.size
     d, z, r, push = np.empty(n), np.empty(n), np.empty(n), 0.0
     for _ in range(2 * n + 2):
-        directions(W, R, row, q, d, z, r)
+        directions(W, U, row, q, d, z, r)
         curve, size, over = 0.0, 0.0, -bound
         for j in range(n):
             size += d[j] * d[j]
@@ -715,10 +733,10 @@ def enforce(row, bound, beta, W, R, active, mu, q, number):
             for j in range(n):
                 beta[j] += step * z[j]
         if full <= longest:
-            add_row(W, R, d, q)
+            add_row(W, U, d, z, q)
             active[q], mu[q] = number, push
             return q + 1, SOLVED
-        drop_row(W, R, active, mu, drop, q)
+        drop_row(W, U, active, mu, drop, q)
         q -= 1
     return q, DOUBTFUL
 
@@ -727,7 +745,7 @@ def enforce(row, bound, beta, W, R, active, mu, q, number):
 def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
     """One step of Newton's method from (β, mu) that are right but for rounding; slope: the gradient there, shape (nb,).
 
-    rows: (q, nb), bounds: (q,) of the active rows. W, U: the factors of Goldfarb and Idnani.
+    rows: (q, nb), bounds: (q,) of the active rows. W, U: the factors of Goldfarb and Idnani: rows @ Wᵀ = [Uᵀ 0] and W H Wᵀ = 1.
     """
     nb = beta.size
     if q == 0:
@@ -737,9 +755,9 @@ def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
         for c in range(nb):
             slope[c] += mu[a] * rows[a, c]
     d, y = np.zeros(nb), np.empty(q)
-    for i in range(nb):
-        for j in range(nb):
-            d[j] -= W[i, j] * slope[i]
+    for j in range(nb):
+        for i in range(nb):
+            d[j] -= W[j, i] * slope[i]
     for a in range(q):  # back to the bounds: Uᵀ y = h - G β
         y[a] = bounds[a]
         for c in range(nb):
@@ -747,9 +765,10 @@ def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
         for j in range(a):
             y[a] -= U[j, a] * y[j]
         y[a] /= U[a, a]
-    for i in range(nb):
-        for j in range(nb):
-            beta[i] += W[i, j] * (y[j] if j < q else d[j])
+    for j in range(nb):
+        step = y[j] if j < q else d[j]
+        for i in range(nb):
+            beta[i] += step * W[j, i]
     for a in range(q - 1, -1, -1):
         for j in range(a + 1, q):
             d[a] -= U[a, j] * d[j]
@@ -781,7 +800,7 @@ def dual_search(R, diagonal, aim, V, T, cones, lengths, least_normal, limits):
         if number < 0:
             break
         if count == 0:
-            W, U = inverse_transpose(L), np.zeros((nb, nb))
+            W, U = inverse(L), np.zeros((nb, nb))
         bound = row_in_beta(number, V, T, cones, least_normal, limits, rows[nb - 1])
         q, status = enforce(rows[nb - 1].copy(), bound, beta, W, U, active, mu, q, number)
         if status != SOLVED:
