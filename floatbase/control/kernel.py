@@ -596,8 +596,26 @@ def image(V, beta, out):
 
 
 @_compiled
+def worst_facet(cone, f):
+    """(28) The facet that a force f (3,) is furthest beyond, or -1 where it is beyond none; cone: (F + 1, 3), last -normal.
+
+    Facets look along evenly turned tangents, the first along t1, so the tangential force itself points at the worst one.
+    """
+    facets = cone.shape[0] - 1
+    nx, ny, nz = -cone[facets, 0], -cone[facets, 1], -cone[facets, 2]
+    mu = -(cone[0, 0] * nx + cone[0, 1] * ny + cone[0, 2] * nz)
+    x, y, z = cone[0, 0] + mu * nx, cone[0, 1] + mu * ny, cone[0, 2] + mu * nz
+    along = x * f[0] + y * f[1] + z * f[2]
+    across = (ny * z - nz * y) * f[0] + (nz * x - nx * z) * f[1] + (nx * y - ny * x) * f[2]
+    room = mu * (nx * f[0] + ny * f[1] + nz * f[2])
+    if room >= 0.0 and along * along + across * across <= room * room:
+        return -1
+    return int(np.rint(np.arctan2(across, along) * facets / (2.0 * np.pi))) % facets
+
+
+@_compiled
 def most_violated(forces, tau, cones, lengths, least_normal, limits):
-    """The row of (27)(28) that is furthest beyond its bound, in unit length, and by how much; -1 where none is.
+    """The row of (27)(28) that is furthest beyond its bound, in unit length; -1 where none is.
 
     cones: (P, F + 1, 3) rows of G for one point's force, the last -normal. lengths: (P, F + 1) of those rows.
     Rows are counted as P (F + 1) force rows, then d upper and d lower torque limits.
@@ -605,9 +623,11 @@ def most_violated(forces, tau, cones, lengths, least_normal, limits):
     worst, found = _VIOLATED, -1
     per_point = cones.shape[1]
     for i in range(cones.shape[0]):
-        x, y, z = forces[3 * i], forces[3 * i + 1], forces[3 * i + 2]
-        for j in range(per_point):
-            excess = cones[i, j, 0] * x + cones[i, j, 1] * y + cones[i, j, 2] * z
+        f = forces[3 * i : 3 * i + 3]
+        for j in (worst_facet(cones[i], f), per_point - 1):
+            if j < 0:
+                continue
+            excess = cones[i, j, 0] * f[0] + cones[i, j, 1] * f[1] + cones[i, j, 2] * f[2]
             if j == per_point - 1:
                 excess += least_normal
             if excess > worst * lengths[i, j]:
