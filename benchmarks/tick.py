@@ -57,7 +57,9 @@ def clock(call: Callable[..., object], arguments: Sequence[tuple[object, ...]]) 
     return times
 
 
-def interleaved(calls: Sequence[Callable[..., object]], arguments: Sequence[tuple[object, ...]], rounds: int) -> list[np.ndarray]:
+def interleaved(
+    calls: Sequence[Callable[..., object]], arguments: Sequence[tuple[object, ...]], rounds: int
+) -> list[np.ndarray]:
     """Times of several ways to do the same thing, in turns, so that a busy moment of the machine meets all of them."""
     blocks = [[clock(call, arguments) for call in calls] for _ in range(rounds)]
     return [np.concatenate([block[i] for block in blocks]) for i in range(len(calls))]
@@ -253,11 +255,19 @@ def main() -> None:
     curves = growth(options.states // 4)
     plot(curves)
     lines = ["# The tick, measured", "", f"`python benchmarks/tick.py` on {machine()}.", "", *tick_times(options.states), ""]
-    lines += ["Compiled, part by part (each part called alone, best of 5, median over states):", "", *parts(options.states // 4), ""]
+    lines += [
+        "Compiled, part by part (each alone, best of 5, median over states):",
+        "",
+        *parts(options.states // 4),
+        "",
+    ]
     lines += ["Growth, median tick (tick.png):", "", "| what | number | easy | saturated |", "|---|---|---|---|"]
     lines += [f"| {what} | {x} | {a:.1f} µs | {b:.1f} µs |" for what, rows in curves.items() for x, a, b in rows]
     lines += ["", "Closed loop with MuJoCo, times real time:", ""]
-    lines += ["| robot | path | rate of both | loop alone | `fb.rollout` with its record | outcome |", "|---|---|---|---|---|---|"]
+    lines += [
+        "| robot | path | rate of both | loop alone | `fb.rollout` | outcome |",
+        "|---|---|---|---|---|---|",
+    ]
     lines += [*closed_loop(), ""]
     (HERE / "tick.md").write_text("\n".join(lines), encoding="utf-8")
     print("\n".join(lines))

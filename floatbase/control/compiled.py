@@ -53,7 +53,7 @@ def _robot_obstacle(robot: Robot) -> str:
         return f"{robot.name} has no joints to drive"
     for i, joint in enumerate(robot.model.joints):
         kind = joint.shortname()
-        if i and (not kind.startswith(_JOINTS) or kind == "JointModelFreeFlyer" and i != 1):
+        if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
             return f"joint {robot.model.names[i]!r} is a {kind}; compiled are revolute and prismatic joints"
     return dynamics_of(robot).check()
 

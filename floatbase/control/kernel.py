@@ -31,8 +31,9 @@ SOLVED, REFUSED, DOUBTFUL, INFEASIBLE = 0, 1, 2, 3
 POINT, FLAT = 0, 1  # kinds of contact
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = 0, 1, 2, 3, 4, 5  # kinds of task
 
-_DEPENDENT = 1e-6  # a row of which elimination leaves less than this part may depend on the others
+_DEPENDENT = 1e-2  # a row of which elimination leaves less than this part may nearly depend on the others
 _RANK = 1e-10  # as RANK_TOLERANCE of the readable path
+_MOTION = 1e-4  # as MOTION_TOLERANCE of the readable path
 _CURVED = 1e-13  # least pivot of the objective's Cholesky factor, squared, relative to its diagonal
 _VIOLATED = 1e-9  # as FEASIBILITY_TOLERANCE of the readable path, on rows of unit length
 _PARALLEL = 1e-12  # a row's part outside the active rows, squared, below which it depends on them
@@ -109,7 +110,7 @@ def material(motion, acceleration, at, v_out, a_out):
 
 @_compiled
 def place(oMi, joint, frame, R, p):
-    """R (3, 3) and p (3,) of a frame in the world; oMi: (n, 12) joint poses, column by column; frame: (12,) pose in its joint."""
+    """R (3, 3) and p (3,) of a frame in the world; oMi: (n, 12), frame: (12,) pose in its joint, by columns."""
     for i in range(3):
         p[i] = oMi[joint, 9 + i]
         for j in range(3):
@@ -249,16 +250,19 @@ def equalities(A, b, M, h, Jp, base):
 
 @_compiled
 def independent_rows(A, b):
-    """Orthonormal rows (r, nv) and right-hand sides (r,) that say what A q̈ = b says, in the least-squares sense (5)."""
+    """(5) Orthonormal rows (r, nv) and right-hand sides (r,) that say what A q̈ = b says along the directions A resolves.
+
+    Along those that it hardly resolves b is measurement noise, and zero stands in its place, as in `build_qp`.
+    """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
     while r < s.size and s[r] > _RANK * s[0]:
         r += 1
     right = np.zeros(r)
     for i in range(r):
-        for j in range(b.size):
-            right[i] += U[j, i] * b[j]
-        right[i] /= s[i]
+        if s[i] > _MOTION * s[0]:
+            for j in range(b.size):
+                right[i] += U[j, i] * b[j] / s[i]
     return np.ascontiguousarray(Vt[:r]), right
 
 
@@ -317,7 +321,7 @@ def parametrised(B, pivots, n):
 
 @_compiled
 def product(left, right, n):
-    """left (m, n) times the first n rows of right (·, p), shape (m, p); zeros on the left, of which there are many, are skipped."""
+    """left (m, n) times the first n rows of right (·, p), shape (m, p); the left's many zeros are skipped."""
     out = np.zeros((left.shape[0], right.shape[1]))
     for i in range(left.shape[0]):
         for j in range(n):
