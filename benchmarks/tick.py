@@ -37,7 +37,7 @@ def stance(robot: fb.robots.Robot, points: bool = False) -> fb.Contacts:
 
 def controller(robot: fb.robots.Robot, path: str = "compiled", **options: object) -> fb.WholeBodyController:
     """Keep standing on all feet."""
-    contacts = options.pop("contacts", None) or stance(robot)
+    contacts = options.pop("contacts") if "contacts" in options else stance(robot)
     return fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), path=path, **options)
 
 
@@ -190,11 +190,11 @@ def closed_loop(seconds: float = 4.0) -> Iterator[str]:
             yield f"| {name} | {path} | {1 / sim.timestep:.0f} Hz | {bare:.1f} × | {kept:.1f} × | {record.outcome} |"
 
 
-def agreement(n: int) -> Iterator[str]:
+def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
     """Largest torque difference of the two paths on n random states of every robot and stance."""
     yield "| robot | feet | states | infeasible | left to the readable path | largest difference |"
     yield "|---|---|---|---|---|---|"
-    for name in fb.robots():
+    for name in names or fb.robots():
         robot = fb.load(name)
         whole = stance(robot) if robot.feet else fb.Contacts.none()
         for count in range(min(1, len(whole)), len(whole) + 1):

@@ -31,7 +31,7 @@ SOLVED, REFUSED, DOUBTFUL, INFEASIBLE = 0, 1, 2, 3
 POINT, FLAT = 0, 1  # kinds of contact
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = 0, 1, 2, 3, 4, 5  # kinds of task
 
-_DEPENDENT = 1e-2  # a row of which elimination leaves less than this part may nearly depend on the others
+_DEPENDENT = 2e-2  # a row of which elimination leaves less than this part may nearly depend on the others
 _RANK = 1e-10  # as RANK_TOLERANCE of the readable path
 _MOTION = 1e-4  # as MOTION_TOLERANCE of the readable path
 _CURVED = 1e-13  # least pivot of the objective's Cholesky factor, squared, relative to its diagonal
@@ -194,7 +194,7 @@ def contact_rows(tree, oMi, J, velocity, drift, contacts, frames, points):
 def gauss_jordan(B, first, last, weights, pivots, sizes):
     """Reduce rows first:last of B (m, n + 1) in place, columns chosen by weight (n,) × size, all other rows cleared.
 
-    pivots: (m,) receives the column that each row is solved for. sizes: (m,) largest weighted entry of each row before.
+    pivots: (m,) receives the column that each row is solved for. sizes: (m,) largest entry of each row before.
     Returns the least part of a row that was left when its turn came.
     """
     n, least = B.shape[1] - 1, 1.0
@@ -204,9 +204,9 @@ def gauss_jordan(B, first, last, weights, pivots, sizes):
             size = weights[c] * abs(B[row, c])
             if size > best:
                 best, column = size, c
-        if best <= 1e-14 * sizes[row] or column < 0:
+        if column < 0 or abs(B[row, column]) <= 1e-14 * sizes[row]:
             return 0.0
-        least = min(least, best / sizes[row])
+        least = min(least, abs(B[row, column]) / sizes[row])
         pivots[row] = column
         scale = 1.0 / B[row, column]
         for c in range(n + 1):
@@ -221,12 +221,12 @@ def gauss_jordan(B, first, last, weights, pivots, sizes):
 
 
 @_compiled
-def row_sizes(B, weights):
-    """Largest weighted entry of each row of B (m, n + 1), the last column left out."""
+def row_sizes(B):
+    """Largest entry of each row of B (m, n + 1), the last column left out."""
     sizes = np.zeros(B.shape[0])
     for row in range(B.shape[0]):
         for c in range(B.shape[1] - 1):
-            sizes[row] = max(sizes[row], weights[c] * abs(B[row, c]))
+            sizes[row] = max(sizes[row], abs(B[row, c]))
     return sizes
 
 
@@ -284,8 +284,7 @@ def motions(A, b, M, h, Jp, base):
         m = A.shape[0]
         B = equalities(A, b, M, h, Jp, base)
         pivots = np.empty(m + base, np.int64)
-        sizes = row_sizes(B, by_motion)
-        sizes[m:] = row_sizes(B, by_base)[m:]
+        sizes = row_sizes(B)
         least = gauss_jordan(B, 0, m, by_motion, pivots, sizes) if m else 1.0
         if least > _DEPENDENT or attempt == 1:
             break

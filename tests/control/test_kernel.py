@@ -95,6 +95,17 @@ def test_on_dependent_contact_rows_the_compiled_tick_is_the_nearer_to_the_optimu
         assert np.max(np.abs(found.tau - judge)) < 2e-9
 
 
+@pytest.mark.parametrize("seed", [33, 45, 46, 135, 195, 1819, 1932])
+def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(seed: int) -> None:
+    """solo8 on three feet, singular values about MOTION_TOLERANCE: b counts along the same directions on both paths."""
+    robot = judges.load("solo8")
+    both = pair(robot, fb.Contacts.points(robot).without(robot.feet[3].frame))
+    state = robot.random_state(seed, (0.02, 0.1, 0.3)[seed % 3])
+    assert difference(both, state) < 1e-6
+    found, judge = both[0](state.q, state.v), refined(both[1](state.q, state.v).solution)
+    assert np.max(np.abs(found.tau - judge)) < 1e-8
+
+
 @pytest.mark.parametrize("feet", [1, 2, 3, 4])
 @pytest.mark.parametrize("name", ["go2", "solo12", "anymal_kinova"])
 def test_one_to_four_feet(name: str, feet: int) -> None:
