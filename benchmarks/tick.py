@@ -103,7 +103,7 @@ def parts(n: int) -> Iterator[str]:
                 velocity, drift = K.sweep(tree, J, v)
                 contact = (tree, oMi, J, velocity, drift, table, frames, points)
                 A, b, Jp = K.contact_rows(*contact)
-                V, free, _ = K.motions(A, b, M.T, h, Jp, base)
+                V, free, _ = K.motions(A, b, v, M.T, h, Jp, base)
                 T = K.torques(V, M.T, h, Jp, base)
                 cost = (q, v, oMi, J, Ag, tree, links, tasks, gains, poses, program.targets, velocity, drift, V, free, T, base)
                 R, diagonal, aim, _ = K.objective(*cost)
@@ -113,7 +113,7 @@ def parts(n: int) -> Iterator[str]:
                     (program.dynamics.update, (q, v)),
                     (K.sweep, (tree, J, v)),
                     (K.contact_rows, contact),
-                    (K.motions, (A, b, M.T, h, Jp, base)),
+                    (K.motions, (A, b, v, M.T, h, Jp, base)),
                     (K.torques, (V, M.T, h, Jp, base)),
                     (K.objective, cost),
                     (K.dual_search, search),

@@ -34,6 +34,7 @@ COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = 0, 1, 2, 3, 4, 5  # kinds of t
 _DEPENDENT = 2e-2  # a row of which elimination leaves less than this part may nearly depend on the others
 _RANK = 1e-10  # as RANK_TOLERANCE of the readable path
 _MOTION = 1e-4  # as MOTION_TOLERANCE of the readable path
+_NOISE = 100.0  # as MOTION_NOISE of the readable path
 _CURVED = 1e-13  # least pivot of the objective's Cholesky factor, squared, relative to its diagonal
 _VIOLATED = 1e-9  # as FEASIBILITY_TOLERANCE of the readable path, on rows of unit length
 _PARALLEL = 1e-12  # a row's part outside the active rows, squared, below which it depends on them
@@ -249,10 +250,30 @@ def equalities(A, b, M, h, Jp, base):
 
 
 @_compiled
-def independent_rows(A, b):
+def contradict(A, v, U, s, b):
+    """Whether rows of A q̈ = b contradict each other by more than the contacts' own motion A v explains; U, s: of A's SVD."""
+    gap, motion = b.copy(), 0.0
+    for i in range(s.size):
+        if s[i] > _MOTION * s[0]:
+            along = 0.0
+            for j in range(b.size):
+                along += U[j, i] * b[j]
+            for j in range(b.size):
+                gap[j] -= along * U[j, i]
+    for j in range(b.size):
+        moved = 0.0
+        for c in range(v.size):
+            moved += A[j, c] * v[c]
+        motion = max(motion, abs(moved))
+    return np.max(np.abs(gap)) > 1e-6 + _NOISE * motion
+
+
+@_compiled
+def independent_rows(A, b, v):
     """(5) Orthonormal rows (r, nv) and right-hand sides (r,) that say what A q̈ = b says along the directions A resolves.
 
-    Along those that it hardly resolves b is measurement noise, and zero stands in its place, as in `build_qp`.
+    Along those that it hardly resolves b is measurement noise, and zero stands in its place, as in `build_qp`. The last
+    answer is False where it is more than that, v (nv,) being the velocity.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
@@ -263,11 +284,11 @@ def independent_rows(A, b):
         if s[i] > _MOTION * s[0]:
             for j in range(b.size):
                 right[i] += U[j, i] * b[j] / s[i]
-    return np.ascontiguousarray(Vt[:r]), right
+    return np.ascontiguousarray(Vt[:r]), right, not contradict(A, v, U, s, b)
 
 
 @_compiled
-def motions(A, b, M, h, Jp, base):
+def motions(A, b, v, M, h, Jp, base):
     """(13)(17) β -> (q̈, λ) as V (nv + k, nb + 1), the free column of each β (nb,), and how well it went.
 
     Motion rows are solved for joints where that is possible, so that straight knees fall back to the base; the base rows
@@ -288,7 +309,9 @@ def motions(A, b, M, h, Jp, base):
         least = gauss_jordan(B, 0, m, by_motion, pivots, sizes) if m else 1.0
         if least > _DEPENDENT or attempt == 1:
             break
-        A, b = independent_rows(A, b)
+        A, b, agree = independent_rows(A, b, v)
+        if not agree:
+            return np.zeros((n, 1)), np.zeros(0, np.int64), False
     if least > 1e-11:
         least = min(least, gauss_jordan(B, m, m + base, by_base, pivots, sizes)) if base else least
     if least <= 1e-11:
@@ -857,7 +880,7 @@ def tick(
     velocity, drift = sweep(tree, J, v)
     A, b, Jp = contact_rows(tree, oMi, J, velocity, drift, contacts, contact_frames, points)
     Mc = np.ascontiguousarray(M.T)  # symmetric; Pinocchio's is stored by columns
-    V, free, regular = motions(A, b, Mc, h, Jp, base)
+    V, free, regular = motions(A, b, v, Mc, h, Jp, base)
     if not regular:
         return x, none, x[:0], DOUBTFUL
     T = torques(V, Mc, h, Jp, base)

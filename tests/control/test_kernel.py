@@ -349,6 +349,7 @@ def test_both_paths_keep_the_same_tolerances() -> None:
     from floatbase.control import controller, kernel, qp
 
     assert controller.MOTION_TOLERANCE == kernel._MOTION
+    assert controller.MOTION_NOISE == kernel._NOISE
     assert qp.RANK_TOLERANCE == kernel._RANK
     assert qp.FEASIBILITY_TOLERANCE == kernel._VIOLATED
 
