@@ -187,8 +187,9 @@ class WholeBodyController:
 
     path: "readable" assembles and solves the QP as it is written; "compiled" solves the same problem in `kernel.py`, many
     times faster, where numba is installed and the problem is one of the package's own tasks and contacts; "auto" takes
-    compiled where it can. The attribute `path` says which it is, `path_reason` why. A tick that the kernel cannot answer to
-    its last digits, or that has no answer, is answered by the readable path, and its `Command.path` says so.
+    compiled where it can. The first controller ever compiles for some twenty seconds, later ones load what was compiled.
+    The attribute `path` says which it is, `path_reason` why. A tick that the kernel cannot answer to its last digits, or
+    that has no answer, is answered by the readable path, and its `Command.path` says so.
 
     Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError` with the rows in conflict.
     """
@@ -204,7 +205,7 @@ class WholeBodyController:
         min_normal_force: float = 0.0,
         torque_limits: npt.ArrayLike | None = None,
         solver: str = "daqp",
-        path: Path = "auto",
+        path: Path = "readable",
     ):
         check_solver(solver)
         if path not in get_args(Path):

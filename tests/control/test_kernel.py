@@ -318,13 +318,13 @@ def test_what_does_not_fit_takes_the_readable_path_and_says_why(monkeypatch: pyt
         ({"tasks": [*tasks, OwnTask()]}, "keep still"),
         ({"tasks": tasks, "solver": "cvxpy"}, "solver 'cvxpy'"),
     ):
-        controller = fb.WholeBodyController(robot, contacts, **options)
+        controller = fb.WholeBodyController(robot, contacts, path="auto", **options)
         assert controller.path == "readable"
         assert reason in controller.path_reason
         with pytest.raises(InputError, match=f'path="compiled" is not possible: .*{reason}'):
             fb.WholeBodyController(robot, contacts, path="compiled", **options)
     monkeypatch.setattr(compiled, "find_spec", lambda name: None)
-    without = fb.WholeBodyController(robot, contacts, tasks)
+    without = fb.WholeBodyController(robot, contacts, tasks, path="auto")
     assert without.path == "readable"
     assert "pip install" in without.path_reason
 
