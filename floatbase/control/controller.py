@@ -1,26 +1,30 @@
-"""`WholeBodyController`: (26)(27) assembled by `build_qp`, solved each tick."""
+"""`WholeBodyController`: (26)(27) assembled by `build_qp`, solved each tick; where it can, by the compiled kernel."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
+from floatbase.control.compiled import Program, obstacle
 from floatbase.control.friction import FrictionPolyhedron
-from floatbase.control.qp import QP, Solution, check_solver, solve
+from floatbase.control.qp import QP, Solution, check_solver, finished, solve
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
-from floatbase.errors import InfeasibleError, InputError
+from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
 from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
 
 MOTION_TOLERANCE = 1e-4  # part of the largest singular value of A below which b is measurement noise
 MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
+Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +52,21 @@ class Command:
     """One answer of the controller.
 
     tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the
-    contact forces planned with them. active: names of the inequality rows that push; multipliers: theirs, by name.
+    contact forces planned with them. active: names of the inequality rows that push; multipliers: theirs, by name. path:
+    which of the controller's two paths answered, "compiled" or "readable". evidence: makes `solution`, the readable problem
+    with this answer to it; it is put together when first asked for, which the tick need not wait for.
     """
 
     tau: Array
     qdd: Array
     forces: Array
-    solution: Solution
+    evidence: Callable[[], Solution]
+    path: str = "readable"
+
+    @cached_property
+    def solution(self) -> Solution:
+        """The QP of this tick with its optimum, multipliers and residuals."""
+        return self.evidence()
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -171,8 +183,15 @@ class WholeBodyController:
     torques, a `ForceTask()` and a `TorqueTask()` with their small default weights are added, so that the answer is
     unique; `tasks` shows all. facets, inside: the friction polyhedron. min_normal_force: N, at every contact point.
     torque_limits: N·m, one number or (d,), the robot's by default; np.inf switches them off. solver: one of
-    `floatbase.control.qp.solvers()`. Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError`
-    with the rows in conflict.
+    `floatbase.control.qp.solvers()`.
+
+    path: "readable" assembles and solves the QP as it is written; "compiled" solves the same problem in `kernel.py`, many
+    times faster, where numba is installed and the problem is one of the package's own tasks and contacts; "auto" takes
+    compiled where it can. The first controller ever compiles for some twenty seconds, later ones load what was compiled.
+    The attribute `path` says which it is, `path_reason` why. A tick that the kernel cannot answer to its last digits, or
+    that has no answer, is answered by the readable path, and its `Command.path` says so.
+
+    Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError` with the rows in conflict.
     """
 
     def __init__(
@@ -186,14 +205,15 @@ class WholeBodyController:
         min_normal_force: float = 0.0,
         torque_limits: npt.ArrayLike | None = None,
         solver: str = "daqp",
+        path: Path = "readable",
     ):
         check_solver(solver)
+        if path not in get_args(Path):
+            raise unknown_name("path", path, get_args(Path))
         if not isinstance(robot, Robot):
             raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
-        if not isinstance(contacts, Contacts):
-            raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(contacts).__name__}.")
         self.robot = robot
-        self.contacts = contacts
+        self.contacts = _checked_contacts(contacts)
         self.tasks = _with_regularisation(tasks)
         self.limits = Limits(
             torque_limits=robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits),
@@ -202,7 +222,12 @@ class WholeBodyController:
             min_normal_force=positive("min_normal_force", min_normal_force, "N", allow_zero=True),
         )
         self.solver = solver
-        self.qp(robot.standing(), 0.0)  # names that do not exist and shapes that do not fit show now, not in the loop
+        self.asked_path: Path = path
+        standing = robot.standing()
+        self.qp(standing, 0.0)  # names that do not exist and shapes that do not fit show now, not in the loop
+        self._choose_path()
+        if self._program is not None:
+            self._program(np.array(standing.q), np.array(standing.v), 0.0)  # compiles, or loads what was compiled
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The problem of one tick, to look at."""
@@ -210,29 +235,77 @@ class WholeBodyController:
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
+        if self._program is not None:
+            command = self._compiled_tick(self._program, q, v, t)
+            if command is not None:
+                return command
         solution = solve(self.qp(State(self.robot, q, v), t), self.solver)
         return Command(
             tau=read_only(solution["tau"]),
             qdd=read_only(solution["qdd"]),
             forces=read_only(solution["forces"]),
-            solution=solution,
+            evidence=lambda: solution,
         )
+
+    def _compiled_tick(self, program: Program, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
+        """The kernel's answer, or None where the readable path must give it, or say what is wrong."""
+        try:
+            q, v = np.array(q, dtype=np.float64), np.array(v, dtype=np.float64)
+        except (TypeError, ValueError):
+            return None
+        answer = program(q, v, t)
+        if answer is None:
+            return None
+        x, active, mu = answer
+        x.flags.writeable = False
+        nv, tail = self.robot.nv, self.robot.nv + program.d
+
+        def evidence() -> Solution:
+            qp = self.qp(State(self.robot, q, v), t)
+            return finished(qp, x, program.multipliers(active, mu, len(qp.G)), "compiled", len(active))
+
+        return Command(x[nv:tail], x[:nv], x[tail:], evidence, "compiled")
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
-        """A new controller with other contacts or tasks and everything else as here."""
-        return WholeBodyController(
-            self.robot,
-            self.contacts if contacts is None else contacts,
-            self.tasks if tasks is None else tasks,
-            facets=self.limits.facets,
-            inside=self.limits.inside,
-            min_normal_force=self.limits.min_normal_force,
-            torque_limits=self.limits.torque_limits,
-            solver=self.solver,
-        )
+        """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""
+        other = copy(self)
+        if contacts is not None:
+            other.contacts = _checked_contacts(contacts)
+        if tasks is not None:
+            other.tasks = _with_regularisation(tasks)
+        other._choose_path()
+        if tasks is not None or other._program is None:
+            other.qp(self.robot.standing(), 0.0)  # as when it is made: what does not fit shows now
+        return other
+
+    def _choose_path(self) -> None:
+        """Set `path`, `path_reason` and the tables of the kernel, or raise when compiled was asked for and cannot be."""
+        self._program: Program | None = None
+        self.path: Literal["compiled", "readable"] = "readable"
+        self.path_reason = "it was asked for"
+        if self.asked_path == "readable":
+            return
+        reason = obstacle(self.robot, self.contacts, self.tasks, self.solver)
+        if reason and self.asked_path == "compiled":
+            raise InputError(f'path="compiled" is not possible: {reason}. path="auto" would take the readable path.')
+        if reason:
+            self.path_reason = reason
+            return
+        program = Program(self.robot, self.contacts, self.tasks, self.limits)
+        if not program.fits:
+            self.path_reason = "a target has the wrong shape"
+            return
+        self._program, self.path = program, "compiled"
+        self.path_reason = "numba is installed, and the tasks and contacts are the package's own"
 
     def __repr__(self) -> str:
-        return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks)"
+        return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"
+
+
+def _checked_contacts(contacts: Contacts) -> Contacts:
+    if not isinstance(contacts, Contacts):
+        raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(contacts).__name__}.")
+    return contacts
 
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:

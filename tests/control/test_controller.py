@@ -341,7 +341,7 @@ def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
 @pytest.mark.parametrize("solver", ["daqp", "cvxpy"])
 def test_either_solver_can_drive_a_controller(solver: str) -> None:
     state = judges.load("go2").random_state(1)
-    command = controller_of("go2", solver=solver)(state.q, state.v)
+    command = controller_of("go2", solver=solver, path="readable")(state.q, state.v)
     assert command.solution.solver == solver
     assert np.allclose(command.tau, controller_of("go2")(state.q, state.v).tau, atol=1e-4)
 

@@ -1,0 +1,277 @@
+"""How fast the controller's tick is, and that its two paths agree: one command, a table and a plot.
+
+    python benchmarks/tick.py                      times, growth, closed loop -> benchmarks/tick.md, benchmarks/tick.png
+    python benchmarks/tick.py --agreement 2000     compares the paths on that many random states for each robot and stance
+
+Both paths take turns within one run, on the same states. Times are ratios to be trusted, microseconds to be taken with salt.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import platform
+import time
+from collections.abc import Callable, Iterator, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+import floatbase as fb
+from floatbase.errors import InfeasibleError
+
+HERE = Path(__file__).parent
+ROBOTS = ("go2", "solo12", "talos")
+SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
+
+
+def stance(robot: fb.robots.Robot, points: bool = False) -> fb.Contacts:
+    """All feet: flat where they are."""
+    flat = all(foot.is_flat for foot in robot.feet) and not points
+    return fb.Contacts.flat_feet(robot) if flat else fb.Contacts.points(robot)
+
+
+def controller(robot: fb.robots.Robot, path: str = "compiled", **options: object) -> fb.WholeBodyController:
+    """Keep standing on all feet."""
+    contacts = options.pop("contacts") if "contacts" in options else stance(robot)
+    return fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), path=path, **options)
+
+
+def states(robot: fb.robots.Robot, n: int, spread: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Configurations and velocities, the same ones every time."""
+    found = [robot.random_state(seed, spread) for seed in range(n)]
+    return [(np.array(s.q), np.array(s.v)) for s in found]
+
+
+def clock(call: Callable[..., object], arguments: Sequence[tuple[object, ...]]) -> np.ndarray:
+    """Time of each call, µs."""
+    times = np.empty(len(arguments))
+    for i, args in enumerate(arguments):
+        start = time.perf_counter_ns()
+        call(*args)
+        times[i] = 1e-3 * (time.perf_counter_ns() - start)
+    return times
+
+
+def interleaved(
+    calls: Sequence[Callable[..., object]], arguments: Sequence[tuple[object, ...]], rounds: int
+) -> list[np.ndarray]:
+    """Times of several ways to do the same thing, in turns, so that a busy moment of the machine meets all of them."""
+    blocks = [[clock(call, arguments) for call in calls] for _ in range(rounds)]
+    return [np.concatenate([block[i] for block in blocks]) for i in range(len(calls))]
+
+
+# tick time -----------------------------------------------------------------------------------------------------------------
+
+
+def tick_times(n: int) -> Iterator[str]:
+    """Both paths, by robot and difficulty."""
+    yield "| robot | states | rows that push | compiled median | compiled p99 | readable median | readable p99 | ratio |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for name in ROBOTS:
+        robot = fb.load(name)
+        fast, slow = controller(robot), controller(robot, "readable")
+        for label, spread in SPREADS.items():
+            at = states(robot, n, spread)
+            pushing = np.mean([len(fast._program(q, v, 0.0)[1]) for q, v in at])
+            (quick,), (plain,) = interleaved([fast], at, 10), interleaved([slow], at[: n // 4], 2)
+            numbers = (*np.percentile(quick, [50, 99]), *np.percentile(plain, [50, 99]))
+            text = " | ".join(f"{number:.1f} µs" for number in numbers)
+            yield f"| {name} | {label} | {pushing:.1f} | {text} | {numbers[2] / numbers[0]:.0f} × |"
+
+
+def parts(n: int) -> Iterator[str]:
+    """The compiled tick taken apart: each part called alone on the same states, so that they add up to a little more."""
+    from floatbase.control import kernel as K
+
+    yield "| robot | states | dynamics | rows | elimination | objective | optimum | Python around them |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for name in ROBOTS:
+        robot = fb.load(name)
+        fast = controller(robot)
+        program, base = fast._program, 6
+        M, h, J, Ag, oMi = program.dynamics.views
+        tree, links, table, frames, points, cones, lengths, tasks, gains, poses, limits, least = program._tables
+        for label, spread in SPREADS.items():
+            spent = []
+            for q, v in states(robot, n, spread):
+                program.dynamics.update(q, v)
+                velocity, drift = K.sweep(tree, J, v)
+                contact = (tree, oMi, J, velocity, drift, table, frames, points)
+                A, b, Jp = K.contact_rows(*contact)
+                V, free, _ = K.motions(A, b, v, M.T, h, Jp, base)
+                T = K.torques(V, M.T, h, Jp, base)
+                cost = (q, v, oMi, J, Ag, tree, links, tasks, gains, poses, program.targets, velocity, drift, V, free, T, base)
+                R, diagonal, aim, _ = K.objective(*cost)
+                search = (R, diagonal, aim, V, T, cones, lengths, least, limits)
+                every = (q, v, program.targets, *program.dynamics.views, *program._tables)
+                calls = (
+                    (program.dynamics.update, (q, v)),
+                    (K.sweep, (tree, J, v)),
+                    (K.contact_rows, contact),
+                    (K.motions, (A, b, v, M.T, h, Jp, base)),
+                    (K.torques, (V, M.T, h, Jp, base)),
+                    (K.objective, cost),
+                    (K.dual_search, search),
+                    (K.tick, every),
+                    (fast, (q, v)),
+                )
+                spent.append([np.min(clock(call, [args] * 5)) for call, args in calls])
+            update, sweep, rows, motions, torques, objective, optimum, tick, whole = np.median(spent, axis=0)
+            row = (update, sweep + rows, motions + torques, objective, optimum, whole - update - tick)
+            yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in row) + " |"
+
+
+# growth --------------------------------------------------------------------------------------------------------------------
+
+
+def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
+    """Medians in µs, by facets, by contacts and by degrees of freedom; easy and saturated."""
+    go2, talos = fb.load("go2"), fb.load("talos")
+    frames = [foot.frame for foot in go2.feet]
+    families = {
+        "facets (go2)": [(n_facets, controller(go2, facets=n_facets)) for n_facets in (4, 8, 16, 32, 64)],
+        "contacts (go2)": [(i, controller(go2, contacts=fb.Contacts.points(go2, frames=frames[:i]))) for i in (1, 2, 3, 4)],
+        "joints": [(r.d, controller(r, contacts=stance(r, points=True))) for r in (go2, fb.load("anymal_kinova"), talos)],
+    }
+    found: dict[str, list[tuple[float, ...]]] = {}
+    for family, members in families.items():
+        times = {}
+        for spread in (0.02, 0.3):
+            at = [states(member.robot, n, spread) for _, member in members]
+            for _ in range(8):
+                for i, (_, member) in enumerate(members):
+                    times.setdefault((i, spread), []).append(clock(member, at[i]))
+        found[family] = [
+            (x, *(float(np.median(np.concatenate(times[i, spread]))) for spread in (0.02, 0.3)))
+            for i, (x, _) in enumerate(members)
+        ]
+    return found
+
+
+def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(curves), figsize=(11, 3.2), constrained_layout=True)
+    for ax, (family, rows) in zip(axes, curves.items(), strict=True):
+        x, easy, saturated = np.array(rows).T
+        ax.plot(x, easy, "o-", label="easy")
+        ax.plot(x, saturated, "s-", label="saturated")
+        ax.set(xlabel=family, ylabel="median tick, µs", ylim=(0, None))
+        ax.grid(alpha=0.3)
+    axes[0].legend()
+    figure.savefig(HERE / "tick.png", dpi=120)
+
+
+# closed loop, agreement, long run --------------------------------------------------------------------------------------------
+
+
+def closed_loop(seconds: float = 4.0) -> Iterator[str]:
+    """MuJoCo and the controller at 1 kHz, in the loop written out and in `rollout`, which keeps a record."""
+    for name in ("go2", "solo12"):
+        robot = fb.load(name)
+        for path in ("compiled", "readable"):
+            command, sim = controller(robot, path), fb.Simulation(robot)
+            ticks = round((seconds if path == "compiled" else seconds / 8) / sim.timestep)
+            start = time.perf_counter()
+            for _ in range(ticks):
+                sim.step(command(sim.q, sim.v, sim.time).tau)
+            bare = ticks * sim.timestep / (time.perf_counter() - start)
+            start = time.perf_counter()
+            record = fb.rollout(fb.Simulation(robot), command, duration=ticks * sim.timestep)
+            kept = ticks * sim.timestep / (time.perf_counter() - start)
+            yield f"| {name} | {path} | {1 / sim.timestep:.0f} Hz | {bare:.1f} × | {kept:.1f} × | {record.outcome} |"
+
+
+def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
+    """Largest torque difference of the two paths on n random states of every robot and stance."""
+    yield "| robot | feet | states | infeasible | left to the readable path | largest difference |"
+    yield "|---|---|---|---|---|---|"
+    for name in names or fb.robots():
+        robot = fb.load(name)
+        whole = stance(robot) if robot.feet else fb.Contacts.none()
+        for count in range(min(1, len(whole)), len(whole) + 1):
+            contacts = whole.only(*whole.names[:count]) if count else whole
+            fast, slow = (controller(robot, path, contacts=contacts) for path in ("compiled", "readable"))
+            worst, infeasible, left = 0.0, 0, 0
+            for seed in range(n):
+                state = robot.random_state(seed, tuple(SPREADS.values())[seed % 3])
+                try:
+                    wanted = slow(state.q, state.v)
+                except InfeasibleError as error:
+                    infeasible += 1
+                    try:
+                        fast(state.q, state.v)
+                        raise SystemExit(f"{name}: only one path calls state {seed} infeasible")
+                    except InfeasibleError as other:
+                        if other.rows != error.rows:
+                            raise SystemExit(f"{name}: other rows on state {seed}") from None
+                    continue
+                found = fast(state.q, state.v)
+                left += found.path == "readable"
+                worst = max(worst, float(np.max(np.abs(found.tau - wanted.tau))))
+            yield f"| {name} | {count} | {n} | {infeasible} | {left} | {worst:.1e} N·m |"
+
+
+def long_run(ticks: int) -> Iterator[str]:
+    """Memory and time per tick over a long run."""
+    import resource
+
+    robot = fb.load("go2")
+    fast, at = controller(robot), states(robot, 1000, 0.1)
+    for share in range(5):
+        spent = np.concatenate([clock(fast, at) for _ in range(max(1, ticks // 5000))])
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        yield f"| {(share + 1) * len(spent)} | {np.median(spent):.2f} µs | {memory:.1f} MB |"
+
+
+def machine() -> str:
+    """What it was measured on."""
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        cpu = next(line.split(":")[1].strip() for line in info.read_text().splitlines() if line.startswith("model name"))
+    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "pin", "numba", "daqp", "mujoco"))
+    return f"{cpu}, {os.cpu_count()} cores, one used; Python {platform.python_version()}, {packages}"
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("--states", type=int, default=400, help="random states for each row of the table")
+    ask.add_argument("--agreement", type=int, default=0, help="compare the paths on so many states, and measure no times")
+    ask.add_argument("--long", type=int, default=0, help="run so many ticks, and measure nothing else")
+    options = ask.parse_args()
+    if options.agreement or options.long:
+        for line in agreement(options.agreement) if options.agreement else long_run(options.long):
+            print(line, flush=True)
+        return
+    curves = growth(options.states // 4)
+    plot(curves)
+    lines = ["# The tick, measured", "", f"`python benchmarks/tick.py` on {machine()}.", "", *tick_times(options.states), ""]
+    lines += [
+        "Compiled, part by part (each alone, best of 5, median over states):",
+        "",
+        *parts(options.states // 4),
+        "",
+    ]
+    lines += ["Growth, median tick (tick.png):", "", "| what | number | easy | saturated |", "|---|---|---|---|"]
+    lines += [f"| {what} | {x} | {a:.1f} µs | {b:.1f} µs |" for what, rows in curves.items() for x, a, b in rows]
+    lines += ["", "Closed loop with MuJoCo, times real time:", ""]
+    lines += [
+        "| robot | path | rate of both | loop alone | `fb.rollout` | outcome |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [*closed_loop(), ""]
+    (HERE / "tick.md").write_text("\n".join(lines), encoding="utf-8")
+    print("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()

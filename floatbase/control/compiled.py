@@ -1,0 +1,243 @@
+"""What stands between `WholeBodyController` and its compiled kernel: does the problem fit, and its tables of numbers.
+
+`obstacle` says in words why a problem does not fit. `Program` holds the tables of one controller and runs one tick. Rows of
+tables that belong to one robot or one contact are made once and kept, so that a controller with other contacts is cheap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._arrays import Array
+from floatbase.control.friction import FrictionPolyhedron
+from floatbase.dynamics.contacts import Contact, Contacts, FlatFootContact, PointContact
+from floatbase.objectives.tasks import CoMTask, ForceTask, FrameTask, OrientationTask, PostureTask, Task, TorqueTask
+from floatbase.robots.robot import Robot
+
+if TYPE_CHECKING:
+    from floatbase.control.controller import Limits
+
+_MOTION = {CoMTask: 0, OrientationTask: 1, FrameTask: 2}
+_KINDS: dict[type, int] = {**_MOTION, PostureTask: 3, ForceTask: 4, TorqueTask: 5}
+_JOINTS = ("JointModelR", "JointModelP", "JointModelFreeFlyer")  # their axes stand still in the joint's own frame
+_POSE = 12  # numbers of a pose: rotation column by column, then the place
+
+
+def obstacle(robot: Robot, contacts: Contacts, tasks: Sequence[Task], solver: str) -> str:
+    """Why the compiled path cannot serve this problem, or "" when it can."""
+    if find_spec("numba") is None:
+        return 'numba is not installed: pip install "floatbase[fast]"'
+    if solver != "daqp":
+        return f"solver {solver!r} was asked for, and the compiled path has its own"
+    for contact in contacts:
+        if type(contact) not in (PointContact, FlatFootContact):
+            return f"contact {contact.name!r} is a {type(contact).__name__}; compiled are point contacts and flat feet"
+    for task in tasks:
+        if type(task) not in _KINDS:
+            return f"task {task.name!r} is a {type(task).__name__}; compiled are the tasks of the package"
+    return _robot_obstacle(robot)
+
+
+@lru_cache(maxsize=16)
+def _robot_obstacle(robot: Robot) -> str:
+    if robot.d == 0:
+        return f"{robot.name} has no joints to drive"
+    for i, joint in enumerate(robot.model.joints):
+        kind = joint.shortname()
+        if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
+            return f"joint {robot.model.names[i]!r} is a {kind}; compiled are revolute and prismatic joints"
+    return dynamics_of(robot).check()
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamics:
+    """Pinocchio's results of one robot as live views, and the tables that say how its joints hang together.
+
+    M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), oMi (n, 12): overwritten by every `update`. tree: (n, 5), links: (n, 4) as in
+    the kernel. lock: held from `update` until the views have been read.
+    """
+
+    robot: Robot
+    data: pin.Data
+    views: tuple[Array, ...]
+    tree: npt.NDArray[np.int64]
+    links: Array
+    lock: Any
+
+    def update(self, q: Array, v: Array) -> None:
+        """Fill the views for a configuration and a velocity: all that a tick needs from Pinocchio."""
+        pin.nonLinearEffects(self.robot.model, self.data, q, v)
+        pin.crba(self.robot.model, self.data, q, pin.Convention.WORLD)
+
+    def check(self) -> str:
+        """What is wrong with the views here, or ""."""
+        q = self.robot.posture
+        with self.lock:
+            self.update(q, np.zeros(self.robot.nv))
+            poses = np.array([_pose(placement) for placement in self.data.oMi])
+            fits = np.array_equal(poses, self.views[-1]) and np.array_equal(self.views[0], self.views[0].T)
+        return "" if fits else "this Pinocchio lays its results out in another way in memory"
+
+
+@lru_cache(maxsize=16)
+def dynamics_of(robot: Robot) -> Dynamics:
+    """One set of views for each robot, shared by its controllers."""
+    model, data = robot.model, robot.model.createData()
+    first = data.oMi[0].rotation.T
+    oMi = np.lib.stride_tricks.as_strided(first, (model.njoints, _POSE), (8 * _POSE, 8))
+    tree = [(model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i]) for i in range(model.njoints)]
+    links = [(inertia.mass, *inertia.lever) for inertia in model.inertias]
+    views = (data.M, data.nle, data.J, data.Ag, oMi)
+    return Dynamics(robot, data, views, np.array(tree, dtype=np.int64), np.array(links), Lock())
+
+
+@dataclass(frozen=True, eq=False)
+class _ContactTable:
+    """One contact as the kernel takes it: joint and kind, frame (16,), points (p, 3), cones (p, F + 1, 3)."""
+
+    joint: int
+    kind: int
+    frame: Array
+    points: Array
+    cones: Array
+
+
+@lru_cache(maxsize=256)
+def _contact_table(robot: Robot, contact: PointContact | FlatFootContact, facets: int, inside: bool) -> _ContactTable:
+    joint, pose = _frame(robot, contact.frame)
+    polyhedron = FrictionPolyhedron(contact.normal, contact.mu, facets, inside)
+    cone = np.vstack([polyhedron.rows, -polyhedron.normal])
+    flat = isinstance(contact, FlatFootContact)
+    radius = 0.0 if isinstance(contact, FlatFootContact) else contact.radius
+    points = np.reshape(contact.corners if isinstance(contact, FlatFootContact) else contact.centre, (-1, 3))
+    frame = np.concatenate([pose, contact.normal, [radius]])
+    return _ContactTable(joint, int(flat), frame, np.array(points), np.tile(cone, (len(points), 1, 1)))
+
+
+Target = tuple[int, tuple[int, ...], str, Callable[[float], npt.ArrayLike]]
+
+
+class Program:
+    """The tables of one controller, and its tick.
+
+    Raises `UnknownNameError` for a frame that does not exist; `fits` is False when a target has the wrong length, which the
+    readable path puts into words.
+    """
+
+    def __init__(self, robot: Robot, contacts: Contacts, tasks: Sequence[Task], limits: Limits):
+        from floatbase.control import kernel
+
+        self.dynamics, self.solved, self._kernel = dynamics_of(robot), kernel.SOLVED, kernel.tick
+        self.robot, self.n_q, self.n_v, self.d = robot, (robot.nq,), (robot.nv,), robot.d
+        self.fits = True
+        self._moving: list[Target] = []
+        contact_tables = _stack_contacts(robot, contacts, limits)
+        self.targets, task_tables = self._task_tables(robot, tasks, contacts.k)
+        bounds = (np.array(limits.torque_limits), float(limits.min_normal_force))
+        self._tables = (self.dynamics.tree, self.dynamics.links, *contact_tables, *task_tables, *bounds)
+        self.force_rows = contact_tables[3].shape[0] * contact_tables[3].shape[1]
+
+    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, Array, Array] | None:
+        """(q̈, τ, λ) of shape (nv + d + k,), the active rows and their multipliers; None when the readable path must decide.
+
+        q, v: writable float64 arrays.
+        """
+        if q.shape != self.n_q or v.shape != self.n_v or not self._move(t):
+            return None
+        dynamics = self.dynamics
+        with dynamics.lock:
+            dynamics.update(q, v)
+            x, active, mu, status = self._kernel(q, v, self.targets, *dynamics.views, *self._tables)
+        return (x, active, mu) if status == self.solved else None
+
+    def multipliers(self, active: Array, mu: Array, rows: int) -> Array:
+        """Multipliers of the readable problem's inequality rows, shape (rows,): there only limited joints have torque rows."""
+        found = np.zeros(rows)
+        limited = np.isfinite(self._tables[-2])
+        place = np.concatenate([np.cumsum(limited) - 1, np.cumsum(limited) - 1 + np.sum(limited)])
+        for number, push in zip(active, mu, strict=True):
+            at = number if number < self.force_rows else self.force_rows + place[number - self.force_rows]
+            found[at] = max(push, 0.0)
+        return found
+
+    def _move(self, t: float) -> bool:
+        """Write the moving targets of time t into the table; False when one has the wrong form."""
+        for at, shape, _, target in self._moving:
+            try:
+                value = np.asarray(target(t), dtype=np.float64)
+            except (TypeError, ValueError):
+                return False
+            if value.shape != shape:
+                return False
+            self.targets[at : at + value.size] = value.ravel()
+        return True
+
+    def _task_tables(self, robot: Robot, tasks: Sequence[Task], k: int) -> tuple[Array, tuple[Any, ...]]:
+        """All targets in a row, and the tables tasks (N, 3), gains (N, 3), frames (N, 12)."""
+        parts: list[Array] = []
+        table, gains, frames = np.zeros((len(tasks), 3), np.int64), np.zeros((len(tasks), 3)), np.zeros((len(tasks), _POSE))
+        for i, task in enumerate(tasks):
+            frame = getattr(task, "frame", None)
+            joint, frames[i] = (0, np.zeros(_POSE)) if frame is None else _frame(robot, frame)
+            table[i] = _KINDS[type(task)], joint, sum(part.size for part in parts)
+            gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)
+            for name, shape in _targets(task, robot, k):
+                value = getattr(task, name)
+                at = sum(part.size for part in parts)
+                parts.append(np.zeros(shape).ravel())
+                if callable(value):
+                    self._moving.append((at, shape, name, value))
+                elif value is not None:
+                    self.fits &= np.shape(value) == shape
+                    parts[-1] = np.ravel(value) if np.shape(value) == shape else parts[-1]
+        return np.concatenate([np.zeros(0), *parts]), (table, gains, frames)
+
+
+def _stack_contacts(robot: Robot, contacts: Contacts, limits: Limits) -> tuple[Any, ...]:
+    """Tables contacts (C, 4), frames (C, 16), points (P, 3), cones (P, F + 1, 3), lengths (P, F + 1)."""
+    parts = [_contact_table(robot, _known(contact), limits.facets, limits.inside) for contact in contacts]
+    table, at = np.zeros((len(parts), 4), np.int64), 0
+    for i, part in enumerate(parts):
+        table[i] = part.joint, part.kind, at, len(part.points)
+        at += len(part.points)
+    frames = np.array([part.frame for part in parts]).reshape(-1, 16)
+    points = np.concatenate([np.zeros((0, 3)), *(part.points for part in parts)])
+    cones = np.concatenate([np.zeros((0, limits.facets + 1, 3)), *(part.cones for part in parts)])
+    return table, frames, points, cones, np.linalg.norm(cones, axis=2)
+
+
+def _known(contact: Contact) -> PointContact | FlatFootContact:
+    assert isinstance(contact, PointContact | FlatFootContact)  # `obstacle` has seen to it
+    return contact
+
+
+def _targets(task: Task, robot: Robot, k: int) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    """The targets of a task, in the order the kernel reads them: attribute and shape."""
+    if isinstance(task, OrientationTask):
+        return (("rotation", (3, 3)), ("angular_velocity", (3,)), ("angular_acceleration", (3,)))
+    if isinstance(task, PostureTask):
+        return (("q", (robot.nq,)),)
+    if isinstance(task, ForceTask):
+        return (("target", (k,)),)
+    if isinstance(task, TorqueTask):
+        return (("target", (robot.d,)),)
+    return (("position", (3,)), ("velocity", (3,)), ("acceleration", (3,)))
+
+
+def _frame(robot: Robot, frame: str) -> tuple[int, Array]:
+    """The joint that carries a frame, and the frame's pose in it, shape (12,)."""
+    found = robot.model.frames[robot.frame_id(frame)]
+    return int(found.parentJoint), _pose(found.placement)
+
+
+def _pose(placement: pin.SE3) -> Array:
+    return np.concatenate([placement.rotation.T.ravel(), placement.translation])
