@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
 import subprocess
 import sys
@@ -14,6 +16,7 @@ import pytest
 from floatbase.lessons.exercises import check, exercises
 from floatbase.lessons.notebooks import FOLDER, execute, read, solved
 
+MARK = "FLOATBASE_STARTED_BY_TEST"
 LESSONS = sorted(FOLDER.glob("*.ipynb"))
 
 
@@ -24,30 +27,30 @@ def ids(path: Path) -> str:
 def nbval(path: Path) -> str:
     """Run a lesson by nbval; what it printed."""
     command = [sys.executable, "-m", "pytest", "--nbval", "-q", "-p", "no:cacheprovider", "-c", "/dev/null", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=path.parent, timeout=200)
+    environment = {**os.environ, MARK: str(os.getpid())}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=path.parent, timeout=200, env=environment)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
     return done.stdout
 
 
-def left_behind(before: set[int]) -> list[str]:
-    """Processes that were not there before, were not started by this test run's own machinery, and are kernels or servers."""
+def left_behind() -> list[str]:
+    """Processes that a lesson started and that outlived it, whoever their parent is now: they carry the mark."""
     found = []
-    for process in psutil.process_iter(["pid", "cmdline"]):
-        line = " ".join(process.info["cmdline"] or [])
-        if process.info["pid"] not in before and ("ipykernel" in line or "meshcat" in line):
-            found.append(line)
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error):
+            if process.environ().get(MARK) == str(os.getpid()):
+                found.append(" ".join(process.cmdline()))
     return found
 
 
 @pytest.mark.timeout(200)
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_lesson_prints_what_is_stored_and_leaves_nothing_behind(path: Path) -> None:
-    before = set(psutil.pids())
     start = time.monotonic()
     assert "passed" in nbval(path)
     assert time.monotonic() - start < 60.0  # seconds, with room for a slow machine; the aim is 30
     time.sleep(0.5)
-    assert left_behind(before) == []
+    assert left_behind() == []
 
 
 @pytest.mark.timeout(200)
