@@ -144,7 +144,7 @@ def base_turn(record: Rollout) -> Array:
 def pressing_panel(view: Viewer, state: fb.State) -> widgets.VBox:
     """Figure 1, left: a slider for how hard the arm presses; the wall answers with f_r, and the bolts with a force and τ_b."""
     view.show(state, com=False)
-    view.camera(View(-66.0, 12.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62)))
+    view.camera(View(66.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62)))
     tool = state.point("tool0")
     scene = _wall(tool) | below("bolts", props.bolts(np.zeros(3), 0.11))
 
@@ -157,11 +157,10 @@ def pressing_panel(view: Viewer, state: fb.State) -> widgets.VBox:
             start = np.array([0.0, 0.0, 0.03]) - view.scale * bolts
             extra["f/wall"] = shapes.arrow(tool, view.scale * force, MEASURED, view.painter.size)
             extra["f/bolts"] = shapes.arrow(start, view.scale * bolts, MEASURED, view.painter.size)
-            extra["f/moment"] = marks.curled_arrow([0.0, 0.0, 0.1], 0.0022 * moment, MEASURED)
+            extra["f/moment"] = marks.curled_arrow([0.0, 0.16, 0.1], 0.003 * moment, MEASURED)
             extra["label/wall"] = shapes.label(tip + [0.0, 0.0, 0.06], "f{r}", 0.06, plate=False)
             extra["label/bolts"] = shapes.label(start + [0.0, 0.0, 0.06], "bolts", 0.05, plate=False)
-            above = 0.16 + 0.0022 * float(np.linalg.norm(moment))
-            extra["label/moment"] = shapes.label([-0.12, -0.1, above], "τ{b}", 0.06, plate=False)
+            extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06, plate=False)
         view.show(state, com=False, extra=extra)
         tau = state.h - state.frame_jacobian("tool0")[:3].T @ force
         return (
@@ -184,7 +183,7 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
                 drawn["f/wall"] = shapes.arrow(state.point(push.frame), vector, MEASURED, view.painter.size)
         return drawn
 
-    return _play(view, record, picture, View(-66.0, 12.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
+    return _play(view, record, picture, View(66.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
 
 
 def play_floating(view: Viewer, record: Rollout) -> Viewer:
