@@ -21,7 +21,8 @@ COM = _rgb("#AA3377")
 CALM = _rgb("#009E73")
 WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
-PUSH = _rgb("#222222")
+SUPPORT = CALM  # veiled, on the ground
+PUSH = _rgb("#222222")  # on a dark background, the colour of its text
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
@@ -41,6 +42,7 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("cone", CALM, "friction cone: force inside"),
     ("cone", WARNING, "friction cone: surface reached"),
     ("cone", ALARM, "friction cone: force outside"),
+    ("support", SUPPORT, "support region"),
     ("ghost", GHOST, "wanted posture"),
 )
 

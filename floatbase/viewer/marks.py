@@ -35,9 +35,9 @@ def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = C
     return Item(_unit_curl(colour), placed(position, geometry.frame_along(moment / radius), radius))
 
 
-def push(position: npt.ArrayLike, vector: npt.ArrayLike, size: float) -> Item:
-    """A push: an arrow that ends at `position`, where it acts, as long as `vector`, m, world."""
-    return arrow(np.asarray(position) - np.asarray(vector), vector, PUSH, size)
+def push(position: npt.ArrayLike, vector: npt.ArrayLike, size: float, colour: RGB = PUSH) -> Item:
+    """A push: an arrow that ends at `position`, where it acts, as long as `vector`, m, world; seen through the robot."""
+    return arrow(np.asarray(position) - np.asarray(vector), vector, colour, size, through=True)
 
 
 def support_region(positions: npt.ArrayLike, height: float) -> Picture:

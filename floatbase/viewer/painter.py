@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.distance import pdist
 
 from floatbase._arrays import Array, checked
 from floatbase.control.friction import FrictionPolyhedron, tangents
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics.contacts import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.robots.robot import Robot
 from floatbase.robots.state import State
@@ -21,6 +22,8 @@ from floatbase.viewer.colours import GHOST, MEASURED, PLANNED, RGB
 from floatbase.viewer.cones import cone_status, polyhedron_status
 from floatbase.viewer.meshes import JointMesh, robot_meshes
 from floatbase.viewer.shapes import Item, Picture
+
+CORNER_RADIUS = 0.65  # of a cone at a corner of a flat foot, over the distance to the next corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +142,12 @@ class Painter:
             return self.asked_scale
         return nice(2.0 * max(float(self.home.com[2] - self.box[0][2]), 0.6 * self.size) / self.robot.weight)
 
-    def cone_height(self, points: int) -> float:
-        """m: for half as much again as each of so many points carries at rest, but not so high as to hide the robot."""
-        return min(self.scale * 1.5 * self.robot.weight / max(points, 2), 0.55 * self.size)
+    def cone_height(self, contacts: Contacts) -> float:
+        """m: for half as much again as each point carries at rest, but not so high as to hide the robot, nor as to make the
+        cones of one foot's corners grow into each other by much."""
+        height = min(self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size)
+        feet = (contact for contact in contacts if isinstance(contact, FlatFootContact) and contact.mu > 0)
+        return min([height] + [CORNER_RADIUS * float(pdist(foot.corners).min()) / foot.mu for foot in feet])
 
     @cached_property
     def _meshes(self) -> list[JointMesh]:
@@ -167,7 +173,7 @@ class Painter:
     def _contacts(self, state: State, contacts: Contacts, forces: Forces, cones: bool) -> Picture:
         """Patches, cones and forces at every point."""
         picture: Picture = {}
-        height = self.cone_height(contacts.n_points)
+        height = self.cone_height(contacts)
         rows = zip(contacts.point_names, contacts.positions(state), contacts.normals, contacts.mus, strict=True)
         for i, (name, position, normal, mu) in enumerate(rows):
             at = plain(name)
@@ -215,7 +221,7 @@ class Painter:
         if self._is_quiet(force):
             return {}
         at = state.frame_pose(frame).translation
-        return {"push": marks.push(at, self.scale * force, self.size)}
+        return {"push": marks.push(at, self.scale * force, self.size, self.text)}
 
     @cached_property
     def _patch_radius(self) -> float:
@@ -223,11 +229,13 @@ class Painter:
 
     @cached_property
     def _scale_bar(self) -> Picture:
-        """A bar for a round force of about a quarter of the weight, on the ground to the left of the robot."""
+        """A bar for a round force of about a quarter of the weight, on the ground to the left of the robot, and behind a tall
+        one, whose picture shows less of the ground in front."""
         force = nice(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
-        at = [low[0], 0.5 * (low[1] + high[1]) + 0.65 * self.size, 0.01 * self.size]
+        start = min(low[0], 0.5 * (low[0] + high[0] - length) - 0.5 * self.size)
+        at = [start, 0.5 * (low[1] + high[1]) + 0.65 * self.size, 0.01 * self.size]
         return below("scale", shapes.scale_bar(at, force, length, self.size, self.text))
 
     @cached_property

@@ -271,7 +271,8 @@ class Viewer:
     def _caption(self, picture: Picture, title: str | None) -> None:
         """Title, and what the colours in the picture mean."""
         kinds = {path.split("/")[0] for path in picture}
-        items = [[hexadecimal(colour), text] for kind, colour, text in LEGEND if kind in kinds]
+        own = {"push": self.painter.text}
+        items = [[hexadecimal(own.get(kind, colour)), text] for kind, colour, text in LEGEND if kind in kinds]
         self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
 
 

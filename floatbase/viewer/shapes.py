@@ -44,18 +44,20 @@ def placed(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale
     return matrix
 
 
-def arrow(start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False) -> Item:
+def arrow(
+    start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False, through: bool = False
+) -> Item:
     """An arrow from `start` along `vector`, as long as the vector, both in m, world.
 
     size: of the robot, m; the shaft is wide enough to be seen beside it, and wider the longer the arrow, by the square root.
-    halo: wider and translucent, so that it shows around another arrow at the same place.
+    halo: wider and translucent, so that it shows around another arrow at the same place. through: seen through the robot.
     """
     vector = np.asarray(vector, dtype=np.float64)
     length = float(np.linalg.norm(vector))
     reference = ARROW_LENGTH * size
     width = min(ARROW_SLENDERNESS * float(np.sqrt(length * reference)), 0.35 * length) * (1.8 if halo else 1.0)
     rotation = geometry.frame_along(vector / length)
-    return Item(_unit_arrow(colour, 0.6 if halo else 1.0), placed(start, rotation, (width / 2, width / 2, length)))
+    return Item(_unit_arrow(colour, 0.6 if halo else 1.0, through), placed(start, rotation, (width / 2, width / 2, length)))
 
 
 def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str) -> Item:
@@ -149,10 +151,10 @@ def _surface_frame_of(x: float, y: float, z: float) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _unit_arrow(colour: RGB, opacity: float) -> Shape:
+def _unit_arrow(colour: RGB, opacity: float, through: bool) -> Shape:
     """Along z, 1 long, its shaft of radius 1."""
     profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.78), (2.1, 0.78), (0.0, 1.0)]
-    return three.mesh(*geometry.revolved(profile), colour, opacity=opacity)
+    return three.mesh(*geometry.revolved(profile), colour, opacity=opacity, through=through)
 
 
 @lru_cache(maxsize=64)

@@ -12,7 +12,7 @@ from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, load, robots
 from floatbase.viewer.camera import PRESETS
-from floatbase.viewer.colours import ALARM, CALM, MEASURED, PLANNED, WARNING
+from floatbase.viewer.colours import ALARM, BACKGROUNDS, CALM, MEASURED, PLANNED, WARNING
 from floatbase.viewer.scene import Viewer
 from floatbase.viewer.three import code
 
@@ -186,6 +186,52 @@ def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer: Viewer, stan
     label = viewer.painter.picture(standing, contacts)["scale/label"].shape.name
     force = float(re.fullmatch(r"([\d.]+) N", label)[1])  # type: ignore[index]
     assert np.linalg.norm(matrices(viewer, "/meshcat/scale/bar")[""][:3, 2]) == pytest.approx(viewer.scale * force, rel=1e-5)
+
+
+def legend(viewer: Viewer) -> list[str]:
+    return [text for _, text in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
+
+
+def test_the_legend_names_what_is_in_the_picture_and_nothing_else(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    viewer.show(standing, contacts, forces, planned=forces, support=True, push=("base", [0, 30.0, 0]), ghost=standing)
+    cone = ["friction cone: force inside", "friction cone: surface reached", "friction cone: force outside"]
+    assert legend(viewer) == [
+        "measured force", "planned force", "centre of mass", "push", *cone, "support region", "wanted posture",
+    ]  # fmt: skip
+    viewer.show(standing, contacts, planned=forces)
+    assert legend(viewer) == ["planned force", "centre of mass", *cone]
+    viewer.show(standing, contacts, forces=0 * forces, planned=forces, cones=False, com=False)
+    assert legend(viewer) == ["planned force"]
+    viewer.show(standing, com=False)
+    assert legend(viewer) == []
+
+
+@pytest.mark.parametrize("background", ["light", "dark"])
+def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing: State, background: str) -> None:
+    view = Viewer(go2, background=background)
+    view.show(standing, push=("base", [0.0, 30.0, 0.0]))
+    look = material(view, "/meshcat/push")
+    assert look["depthTest"] is False
+    assert (look["color"] == code(BACKGROUNDS["dark"][3])) == (background == "dark")
+    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [f"#{look['color']:06X}", "push"]
+    view.close()
+
+
+def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
+    robot = load("talos")
+    view, contacts = Viewer(robot), Contacts.flat_feet(robot, mu=0.7)
+    view.show(robot.standing(), contacts)
+    corners = contacts.positions(robot.standing())[:4]
+    nearest = min(np.linalg.norm(a - b) for i, a in enumerate(corners) for b in corners[:i])
+    cones = matrices(view, "/meshcat/cone/")
+    assert len(cones) == 8
+    for matrix in cones.values():
+        across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
+        assert across < 0.7 * nearest
+        assert across / along == pytest.approx(0.7, rel=1e-5)
+    view.close()
 
 
 def test_the_colours_are_those_of_the_code(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
