@@ -9,7 +9,9 @@ import hashlib
 import json
 from pathlib import Path
 
-from floatbase.lessons.notebooks import FOLDER, read
+import nbformat
+
+from floatbase.lessons.notebooks import FOLDER, read, without_outputs
 
 MINE = "my"
 _MEMORY = ".from.json"  # for each lesson, the digest of the course's text that the learner's copy started from
@@ -47,7 +49,11 @@ def prepare(folder: Path = FOLDER) -> list[str]:
 
 
 def _copy(source: Path, target: Path) -> None:
-    target.write_bytes(source.read_bytes())
+    """A lesson is copied without its outputs: they would answer what the learner is asked to predict."""
+    if source.suffix == ".ipynb":
+        nbformat.write(without_outputs(read(source)), target)
+    else:
+        target.write_bytes(source.read_bytes())
 
 
 def _remembered(path: Path) -> dict[str, str]:

@@ -29,6 +29,12 @@ def course(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def test_a_copy_does_not_answer_what_it_asks_the_learner_to_predict(course: Path) -> None:
+    write(course / "00_a.ipynb", "first = 1", output="1\n")
+    prepare(course)
+    assert nbformat.read(course / MINE / "00_a.ipynb", as_version=4).cells[0].outputs == []
+
+
 def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
     assert prepare(course) == ["00_a.ipynb: new"]
     write(course / MINE / "00_a.ipynb", "first = 'my answer'")
