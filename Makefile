@@ -25,6 +25,8 @@ BASE := $(wordlist 2,99,$(FOUND))
 # the part of JupyterLab that asks the network for news and updates, off in .venv
 NEWS := @jupyterlab/apputils-extension:announcements
 FIRST := /lab/tree/my/00_start_here.ipynb
+# which tabs were open is kept with this copy of the course, so that tabs of another copy do not open here
+TABS := $(CURDIR)/$(VENV)/workspaces
 
 help:
 	@echo "make lab     open the course in JupyterLab"
@@ -38,7 +40,7 @@ help:
 lab: setup
 	@$(BIN)/python -m floatbase.lessons.workspace
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
-		--LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
+		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
 test: setup
 	$(BIN)/ruff check .

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import psutil
 import pytest
+from nbformat.v4 import new_code_cell, new_notebook
 
+from floatbase.lessons import progress
 from floatbase.lessons.exercises import check, exercises
 from floatbase.lessons.notebooks import FOLDER, execute, read, solved
 
@@ -95,3 +97,19 @@ def test_an_exercise_has_no_answer_at_first_and_says_so(name: str) -> None:
     verdict = check(name, None)
     assert not verdict.right
     assert "no answer yet" in verdict.text
+
+
+def test_running_a_lesson_counts_no_try_of_a_learner(tmp_path: Path) -> None:
+    tried = 'from floatbase.lessons.exercises import check\nfrom floatbase.lessons import progress\ncheck("00.1", 1.0)'
+    notebook = new_notebook(cells=[new_code_cell(tried), new_code_cell("print(progress.load(), progress.path())")])
+    check("00.1", 2.0)
+    before = progress.load()
+    execute(notebook, tmp_path)
+    (printed,) = notebook.cells[1].outputs
+    assert printed.text.startswith("{'00.1': {'tries': 1, 'right': 0}}")
+    assert str(progress.path()) not in printed.text
+    assert progress.load() == before
+
+
+def test_tests_leave_the_progress_of_whoever_runs_them_alone() -> None:
+    assert Path.home() not in progress.path().parents

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -40,11 +42,17 @@ def solved(notebook: Any) -> Any:
     return notebook
 
 
-def execute(notebook: Any, folder: Path) -> Any:
-    """Run all cells in a fresh kernel in `folder`, in place; an error in a cell is raised."""
+def execute(notebook: Any, folder: Path, **settings: str) -> Any:
+    """Run all cells in a fresh kernel in `folder`, in place; an error in a cell is raised.
+
+    The kernel has a home of its own, so that what the notebook answers is not counted as a learner's progress.
+    settings: more of the kernel's environment.
+    """
     from nbclient import NotebookClient
 
-    return NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}}).execute()
+    client = NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}})
+    with tempfile.TemporaryDirectory(prefix="floatbase-") as home:
+        return client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
 
 
 def run(path: Path) -> None:
