@@ -16,6 +16,8 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.errors import InputError
 
+FLAT = 1e-12  # curvature below this part of the largest counts as none
+
 
 @dataclass(frozen=True, eq=False)
 class Affine:
@@ -181,20 +183,30 @@ class Quadratic:
         return Quadratic(f.A.T @ self.H @ f.A, f.A.T @ (self.H @ f.b + self.g), self(f.b))
 
     def minimiser(self) -> Array:
-        """The minimiser of smallest norm, shape (n,).
+        """The minimiser of smallest norm, shape (n,). Raises `InputError` where the cost has no minimum."""
+        return self.minimised_over(np.eye(self.n)).b
 
-        Raises `InputError` where the cost has no minimum: a direction without curvature but with slope, or with
-        negative curvature.
+    def minimised_over(self, N: npt.ArrayLike) -> Affine:
+        """x -> the point of least cost on x + span N; N: orthonormal columns, shape (n, p).
+
+        The cost there, `self.pullback(self.minimised_over(N))`, is the partial minimisation of this one; where N spans some
+        of the variables, its H on the others is the Schur complement. A direction that costs nothing is left alone. Raises
+        `InputError` where the cost falls for ever along a column of N: negative curvature, or slope without curvature.
         """
-        values, vectors = np.linalg.eigh(self.H)
-        scale = float(np.abs(values).max(initial=0.0))
-        if values.size and values[0] < -1e-9 * scale:
+        N = checked("N", N, (self.n, None))
+        values, vectors = np.linalg.eigh(N.T @ self.H @ N)
+        largest = float(np.abs(values).max(initial=0.0))
+        if values.size and values[0] < -1e-9 * largest:
             raise InputError(f"the cost has no minimum: its smallest curvature is {values[0]:.3g}.")
-        curved = values > 1e-12 * scale
-        slope = vectors.T @ self.g
+        curved = values > FLAT * largest
+        slope = vectors.T @ (N.T @ self.g)
         if np.any(np.abs(slope[~curved]) > 1e-7 * (1.0 + float(np.abs(self.g).max(initial=0.0)))):
-            raise InputError("the cost has no minimum: it falls for ever along a direction without curvature.")
-        return -vectors[:, curved] @ (slope[curved] / values[curved])
+            raise InputError(
+                "the cost has no minimum: it falls for ever along a direction without curvature. Add a cost there."
+            )
+        W = N @ vectors[:, curved]
+        step = W / values[curved]
+        return Affine(np.eye(self.n) - step @ (W.T @ self.H), -step @ slope[curved])
 
     def __add__(self, other: Quadratic) -> Quadratic:
         if not isinstance(other, Quadratic):

@@ -138,6 +138,25 @@ def test_among_many_minimisers_the_smallest_is_given(seed: int, m: int, n: int) 
     assert np.allclose(fb.Quadratic.from_residual(A, r).minimiser(), np.linalg.lstsq(A, r)[0], atol=1e-6)
 
 
+@pytest.mark.parametrize(("curvature", "counts"), [(1e-10, True), (1e-13, False)])
+def test_what_counts_as_curvature_is_decided_in_one_place(curvature: float, counts: bool) -> None:
+    """A direction with a 1e-12th of the largest curvature or less is flat, for the minimiser and for a partial one."""
+    cost = fb.Quadratic(np.diag([1.0, curvature]), np.array([0.0, -curvature]))
+    over = cost.minimised_over(np.array([[0.0], [1.0]]))
+    assert np.allclose(cost.minimiser(), [0.0, float(counts)])
+    assert np.allclose(cost.minimised_over(np.eye(2))([3.0, 4.0]), [0.0, 1.0 if counts else 4.0])
+    assert np.allclose(over([3.0, 4.0]), [3.0, 1.0])  # alone it is the largest there is
+
+
+def test_a_partial_minimum_is_the_least_of_all_points_that_keep_the_rest() -> None:
+    rng = np.random.default_rng(0)
+    cost, N = quadratic(rng, 5), np.linalg.qr(rng.normal(size=(5, 2)))[0]
+    best, x = cost.minimised_over(N), rng.normal(size=5)
+    assert np.allclose(N @ (N.T @ (best(x) - x)), best(x) - x)
+    assert all(cost(x + N @ z) >= cost(best(x)) for z in rng.normal(size=(20, 2)))
+    assert np.allclose(best(best(x)), best(x))
+
+
 def test_a_cost_that_falls_for_ever_has_no_minimum() -> None:
     flat = fb.Quadratic(np.diag([1.0, 0.0]), np.array([1.0, 0.5]))
     with pytest.raises(InputError, match="no minimum: it falls for ever along a direction without curvature"):

@@ -14,7 +14,7 @@ from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
 from floatbase.dynamics.subspace import feasible_space
 from floatbase.errors import InputError
-from floatbase.objectives.centroidal import force_bias, wanted_wrench, wrench_objective
+from floatbase.objectives.centroidal import force_bias, rotational_inertia, wanted_wrench, wrench_objective
 from floatbase.objectives.pullback import cost_on_space
 from floatbase.robots.robot import Robot
 from floatbase.robots.state import State
@@ -84,10 +84,3 @@ class AnalyticController:
         beta = cost_on_space(space, on_qdd, on_tau, on_forces).minimiser()
         qdd, tau, forces = space(beta)
         return AnalyticCommand(tau, forces, qdd)
-
-
-def rotational_inertia(state: State) -> Array:
-    """Inertia of the whole robot about its centre of mass, joints locked, shape (3, 3), kg·m², world."""
-    data = state.robot.model.createData()
-    pin.ccrba(state.robot.model, data, state.q, state.v)
-    return np.array(data.Ig.inertia)

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from floatbase._arrays import Array
+from floatbase.control.linear_programs import OPTIMAL, linear_program
 from floatbase.errors import InfeasibleError, SolverError
 
 _TOLERANCE = 1e-9  # a violation below this counts as none
@@ -59,18 +60,14 @@ def contradicting_equalities(A: Array, b: Array, tolerance: float) -> tuple[int,
 
 def _least_violation(G: Array, h: Array) -> tuple[float, list[int]]:
     """The least s ≥ 0 with G y ≤ h + s, and the rows that hold it there."""
-    from scipy.optimize import linprog  # slow to load, and only needed when something has gone wrong
-
     n = G.shape[1]
-    found = linprog(
+    found = linear_program(
         np.append(np.zeros(n), 1.0),
-        A_ub=np.hstack([G, -np.ones((len(G), 1))]),
-        b_ub=h,
+        inequalities=(np.hstack([G, -np.ones((len(G), 1))]), h),
         bounds=[(None, None)] * n + [(0.0, None)],
-        method="highs",
-        options={"primal_feasibility_tolerance": _HIGHS, "dual_feasibility_tolerance": _HIGHS},
+        tolerance=_HIGHS,
     )
-    if found.status != 0:
+    if found.status != OPTIMAL:
         raise SolverError(f"the linear program that looks for conflicting rows ended with: {found.message}")
     violation = float(np.max(G @ found.x[:n] - h, initial=0.0))
     return violation, [int(i) for i in np.flatnonzero(np.abs(found.ineqlin.marginals) > 1e-9)]

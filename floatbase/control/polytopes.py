@@ -1,5 +1,4 @@
-"""Geometry of cones and polytopes that `wrenches` needs: facets from rays, vertices from farthest points, linear
-programs.
+"""Geometry of cones and polytopes that `wrenches` needs: facets from rays, vertices from farthest points.
 
 Nothing here knows of robots. qhull only says which rays or points belong to a facet; the numbers are computed from
 those again, so that its own tolerances do not stay in the answer.
@@ -7,38 +6,19 @@ those again, so that its own tolerances do not stay in the answer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import OptimizeResult, linprog
 from scipy.spatial import ConvexHull, QhullError
 
 from floatbase._arrays import Array
+from floatbase.control.linear_programs import linear_program
 from floatbase.errors import SolverError
 
 FLAT = 1e-9  # part of the size below which a set counts as flat, a point as on a facet
 _ROUNDS = 200  # of looking for farther points; each adds one at least, and the stances of the course need about ten
 _SAME_DIRECTION = 1e-6  # rad, normals nearer than this are one
-
-
-def linear_program(
-    cost: Array,
-    equalities: tuple[Array, Array] | None = None,
-    inequalities: tuple[Array, Array] | None = None,
-    bounds: Sequence[tuple[float | None, float | None]] | tuple[float | None, float | None] = (0.0, None),
-) -> OptimizeResult:
-    """min costᵀ x, A x = b, G x ≤ h; `.status` is 0 (optimal), 2 (infeasible) or 3 (unbounded), never anything else.
-
-    Raises `SolverError` when HiGHS gives up.
-    """
-    A, b = equalities if equalities is not None else (None, None)
-    G, h = inequalities if inequalities is not None else (None, None)
-    for presolve in (True, False):  # presolve may stop at "infeasible or unbounded"; the simplex method then decides
-        result = linprog(cost, G, h, A, b, bounds, method="highs-ds", options={"presolve": presolve})
-        if result.status in (0, 2, 3):
-            return result
-    raise SolverError(f"HiGHS could not solve a linear program of {cost.size} variables: {result.message}")
 
 
 def cone_rows(rays: Array) -> tuple[Array, Array]:

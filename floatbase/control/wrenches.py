@@ -16,18 +16,20 @@ import numpy.typing as npt
 
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.control.friction import FrictionPolyhedron
-from floatbase.control.polytopes import cone_rows, linear_program, vertices
+from floatbase.control.linear_programs import INFEASIBLE, UNBOUNDED, linear_program
+from floatbase.control.polytopes import cone_rows, vertices
 from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InfeasibleError, InputError
+from floatbase.objectives.centroidal import grasp_matrix
 from floatbase.robots.state import State
 
 TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets
-_INFEASIBLE, _UNBOUNDED = 2, 3
 
 
 @dataclass(frozen=True, eq=False)
 class WrenchSet:
-    """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i) with every f_i in its friction polyhedron.
+    """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i) with every f_i in its friction polyhedron: the contact wrench
+    cone (CWC), also called gravito-inertial wrench cone, of the stance.
 
     `wrench_set` makes it from a state and its contacts.
     points: x_i, shape (P, 3), m, world. cones: a `FrictionPolyhedron` for each point. about: x_c, shape (3,), m,
@@ -66,10 +68,8 @@ class WrenchSet:
 
         Without limits the set is their sums with weights ≥ 0. Some may be sums of others.
         """
-        blocks = []
-        for point, cone in zip(self.points, self.cones, strict=True):
-            blocks.append(np.hstack([cone.rays, np.cross(point - self.about, cone.rays)]))
-        return read_only(np.vstack(blocks).T)
+        at = np.split(grasp_matrix(self.points, self.about), len(self.points), axis=1)
+        return read_only(np.hstack([grasp @ cone.rays.T for grasp, cone in zip(at, self.cones, strict=True)]))
 
     @cached_property
     def rows(self) -> Array:
@@ -103,13 +103,13 @@ class WrenchSet:
         """
         w = checked("wrench", wrench, (6,))
         scale = float(np.linalg.norm(self._to_newton @ w)) or self.weight
-        G = np.hstack([self._to_newton @ self._grasp, np.zeros((6, 1))])
+        G = np.hstack([self._to_newton @ grasp_matrix(self.points, self.about), np.zeros((6, 1))])
         rows, h = self._force_rows
         cost = np.append(np.zeros(3 * len(self.points)), -1.0)
         result = linear_program(cost, (G, self._to_newton @ w / scale), (rows, h / scale), (None, None))
-        if result.status == _INFEASIBLE:
+        if result.status == INFEASIBLE:
             return -np.inf
-        return np.inf if result.status == _UNBOUNDED else -scale * float(result.fun)
+        return np.inf if result.status == UNBOUNDED else -scale * float(result.fun)
 
     def contains(self, wrench: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
         """Whether contact forces in their polyhedra, and within their limits, make the wrench, shape (6,).
@@ -144,9 +144,9 @@ class WrenchSet:
             self._limit_rows(1),
             [(0.0, None)] * N + [(None, None)],
         )
-        if result.status == _INFEASIBLE:
+        if result.status == INFEASIBLE:
             raise InfeasibleError("no wrench start + s · direction can be produced, however large or small s is.")
-        return np.inf if result.status == _UNBOUNDED else -float(result.fun) / scale
+        return np.inf if result.status == UNBOUNDED else -float(result.fun) / scale
 
     def torques(self, force: npt.ArrayLike | None = None) -> Array:
         """The slice at a total force: vertices, shape (k, 3), N·m, of the torques τ_c that can go with it.
@@ -182,12 +182,12 @@ class WrenchSet:
 
         def farthest(direction: Array) -> Array:
             result = linear_program(-(direction @ values), (fixed, at / scale), limits)
-            if result.status == _UNBOUNDED:
+            if result.status == UNBOUNDED:
                 raise InputError(
                     "this slice of the wrench set has no end: contacts can be squeezed against each other without "
                     "limit. Give max_normal_force."
                 )
-            if result.status == _INFEASIBLE:
+            if result.status == INFEASIBLE:
                 raise InfeasibleError("no contact forces add up to what was asked for.")
             return scale * (values @ result.x)
 
@@ -200,12 +200,6 @@ class WrenchSet:
     def _to_newton(self) -> Array:
         """Divides torques by `arm`, shape (6, 6)."""
         return np.diag(np.repeat([1.0, 1.0 / self.arm], 3))
-
-    @cached_property
-    def _grasp(self) -> Array:
-        """G_f of (20) above G_τ of (21), shape (6, 3 P)."""
-        turned = [np.cross(point - self.about, np.eye(3)).T for point in self.points]
-        return np.vstack([np.tile(np.eye(3), len(self.points)), np.hstack(turned)])
 
     @cached_property
     def _force_rows(self) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,8 @@ from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InputError
 from floatbase.robots.robot import Robot
 from floatbase.robots.state import State
+
+Block: TypeAlias = Literal["qdd", "tau", "forces"]  # the three unknowns of (7): q̈, τ, λ
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
 
 RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
+MOTION_TOLERANCE = 1e-4  # directions of motion that A holds by less than this part of the largest count as not held
 
 
 def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
@@ -36,44 +37,62 @@ def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ContactSpace:
-    """The contacts of (7) without their repetitions: r = rank J independent motions and forces.
+    """The contacts of (7) along the directions that they resolve: r independent motions and the forces that hold them.
 
-    Where J loses rank, or nearly does, rows repeat each other up to rounding. The rank is decided here, once, and all that
-    follows is written in orthonormal coordinates, so that nothing divides by rounding.
-    rows: (r, nv), orthonormal, and b: (r,), with rows q̈ = b for A q̈ = b, in the least-squares sense where rows contradict
-    each other. push: (nv, r), orthonormal: Jᵀ λ = push y. lift: (k, r): the smallest λ of a y. free: (k, k - r): null(Jᵀ).
+    The rank r is decided here, once, for everything that follows (`contact_space`).
+    rows: (r, nv), orthonormal, and b: (r,): rows q̈ = b stands for A q̈ = b, in the least-squares sense where rows contradict
+    each other. lift: (k, r): the smallest λ that gives q̈ a part along the rows, rows M⁻¹ Jᵀ lift = 1. free: (k, k - r),
+    orthonormal: forces that the resolved motions do not feel; null(Jᵀ), but for directions that A resolves badly.
     """
 
     rows: Array
     b: Array
-    push: Array
     lift: Array
     free: Array
 
     @property
     def r(self) -> int:
-        """rank J."""
+        """rank J, as far as the contacts resolve it."""
         return int(self.rows.shape[0])
 
 
 def contact_space(eom: EquationsOfMotion) -> ContactSpace:
-    """The independent part of the contacts of (7), by singular values (tolerance `RANK_TOLERANCE`)."""
-    r = rank(eom.A)
-    if rank(eom.J) != r:
-        raise InputError(f"forces reach {rank(eom.J)} directions of motion, but the contacts keep {r}: A and J do not fit.")
-    U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
-    U_J, s_J, Vt_J = np.linalg.svd(eom.J, full_matrices=True)
+    """The resolved part of the contacts of (7), by singular values of A (tolerance `MOTION_TOLERANCE`).
+
+    Where J loses rank (solo8 on four feet), nearby states have a singular value σ that is small and of no use: measured
+    angles and velocities are not good enough to tell it from 0, and ζ would multiply their noise in b by 1/σ². So such a
+    direction is left out altogether: no row holds it, no force is spent on it. The answer is exact for a robot whose A differs
+    by less than that part; Newton's law holds exactly for this one, and A q̈ - b is off by at most σ |q̈| beside the part of b
+    that A cannot meet. A stance well away from such places has no such direction, and nothing is left out.
+    Raises `InputError` when forces and rows of a contact do not fit each other.
+    """
+    U, s, Vt = _resolved(eom)
+    rows = Vt
+    W = rows @ _inverse_inertia(eom, eom.J.T)
+    P, w, Qt = np.linalg.svd(W)
+    _check_fit(eom, w)
     return ContactSpace(
-        rows=read_only(Vt[:r]),
-        b=read_only((U[:, :r].T @ eom.b) / s[:r]),
-        push=read_only(Vt_J[:r].T),
-        lift=read_only(U_J[:, :r] / s_J[:r]),
-        free=read_only(U_J[:, r:]),
+        rows=read_only(rows),
+        b=read_only((U.T @ eom.b) / s),
+        lift=read_only((Qt[: w.size].T / w) @ P.T),
+        free=read_only(Qt[w.size :].T),
     )
 
 
+def resolved_motion(eom: EquationsOfMotion) -> tuple[Array, Array]:
+    """(5) A, shape (m, nv), and b, shape (m,), m/s², without the directions that A resolves badly (see `contact_space`).
+
+    Both are as they were at a stance well away from a loss of rank, but for parts of b that A cannot meet.
+    """
+    U, s, Vt = _resolved(eom)
+    return read_only(U * s @ Vt), read_only(U @ (U.T @ eom.b))
+
+
 def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
-    """(8) A M⁻¹ Jᵀ, shape (m, k): how the contacts' accelerations answer to their forces; J M⁻¹ Jᵀ for points."""
+    """(8) A M⁻¹ Jᵀ, shape (m, k): how the contacts' accelerations answer to their forces.
+
+    For points J M⁻¹ Jᵀ, known as the Delassus matrix; its inverse, where there is one, is the inertia that contacts feel.
+    """
     return read_only(eom.A @ _inverse_inertia(eom, eom.J.T))
 
 
@@ -81,11 +100,11 @@ def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     """(9) ζ: τ -> λ, from (8) A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ).
 
     Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet, corners of
-    a flat foot) this is the smallest λ, as the pseudo-inverse has it. Source: the document, §2.2.1.
+    a flat foot) this is the smallest λ, as the pseudo-inverse has it. Directions of motion that the contacts resolve worse
+    than `MOTION_TOLERANCE` count as not held, see `contact_space`. Source: the document, §2.2.1.
     """
     space = contact_space(eom)
-    y = _independent_forces(eom, space)
-    return Affine(space.lift @ y.A, space.lift @ y.b)
+    return Affine.linear(space.lift) @ _wanted_push(eom, space)
 
 
 def forces_are_unique(eom: EquationsOfMotion) -> bool:
@@ -98,10 +117,7 @@ def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
 
     Source: the document, §3.
     """
-    space = contact_space(eom)
-    y = _independent_forces(eom, space)
-    A = _inverse_inertia(eom, eom.S + space.push @ y.A)
-    return Affine(A, _inverse_inertia(eom, space.push @ y.b - eom.h))
+    return _motion_of(eom, Affine.identity(eom.d), forces_from_torques(eom))
 
 
 def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -112,9 +128,8 @@ def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
     """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
-    space = contact_space(eom)
-    y = _independent_forces(eom, space)
-    return _with_forces(Affine.stack(tau=Affine.identity(eom.d), y=y), space, {"tau": slice(0, eom.d)})
+    pairs = _pairs(eom, contact_space(eom))
+    return _orthonormal(Affine.stack(tau=pairs["tau"], forces=pairs["forces"]))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -167,22 +182,22 @@ class FeasibleSpace:
 def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     """(13) The space of all motions that the robot and its contacts allow at this state: v + V⊥ β.
 
-    The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the independent part
-    of the contacts, which gives the same space as the SVD of B and keeps its digits where J nearly loses rank.
+    The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the resolved part
+    of the contacts (`contact_space`), which gives the same space as the SVD of B, and a sane one where J nearly loses rank.
     """
-    space = contact_space(eom)
-    y = _independent_forces(eom, space)
-    qdd = Affine(_inverse_inertia(eom, eom.S + space.push @ y.A), _inverse_inertia(eom, space.push @ y.b - eom.h))
-    motions = Affine.stack(qdd=qdd, tau=Affine.identity(eom.d), y=y)
-    blocks = {"qdd": slice(0, eom.nv), "tau": slice(eom.nv, eom.nv + eom.d)}
-    return FeasibleSpace(eom, _with_forces(motions, space, blocks))
+    pairs = _pairs(eom, contact_space(eom))
+    qdd = _motion_of(eom, pairs["tau"], pairs["forces"])
+    return FeasibleSpace(eom, _orthonormal(Affine.stack(qdd=qdd, tau=pairs["tau"], forces=pairs["forces"])))
 
 
 def internal_forces(eom: EquationsOfMotion) -> Array:
-    """Forces that torques can squeeze in without moving anything: orthonormal columns of null(J_bᵀ), shape (k, n).
+    """Forces between the contacts that move nothing once torques balance them: orthonormal columns of null(J_bᵀ), (k, n).
 
     J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint columns.
-    n = k - rank J_b: 6 for four point feet. With a fixed base every λ is internal.
+    n = k - rank J_b: 6 for four point feet. With a fixed base every λ is internal. Where J has full rank torques can bring
+    all of them about, and only them, without moving anything: ζ answers -J_jᵀ λ with λ. Where J loses rank (solo8 on four
+    feet) the k - r directions of null(Jᵀ) are among them: they need no torques, and no torques can bring them about, which
+    leaves rank J - rank J_b that torques choose.
     """
     return null_space(_base_columns(eom).T)
 
@@ -197,8 +212,8 @@ class Dimensions:
     """Sizes, ranks and dimensions of (7) at one state, by singular values.
 
     d, k, nv: lengths of τ, λ, q̈. rank_J, rank_J_base: of J and of its base columns. null_B, null_C: dimensions of the null
-    spaces of (12) and (10), both d + k - rank J. internal: of null(J_bᵀ). undetermined: of null(Jᵀ). rank_V_qdd: how many of
-    the directions of β move the robot at all: d - rank J + rank J_b.
+    spaces of (12) and (10), both d + k - rank J. internal: of null(J_bᵀ), of which torques choose internal - undetermined.
+    undetermined: of null(Jᵀ). rank_V_qdd: how many of the directions of β move the robot at all: d - rank J + rank J_b.
     """
 
     nv: int
@@ -217,11 +232,12 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Counts every dimension of §2.2 at this state.
 
     The rank of J is decided once (`contact_space`). B and C are then counted, each by its own singular values, with the
-    independent rows and forces in place of A and J, whose r numbers say the same; null(Jᵀ) comes on top.
+    resolved rows and forces in place of A and J, whose r numbers say the same; null(Jᵀ) comes on top.
     """
     space = contact_space(eom)
-    B = np.block([[eom.M, -eom.S, -space.push], [space.rows, np.zeros((space.r, eom.d + space.r))]])
-    C = space.rows @ _inverse_inertia(eom, np.hstack([eom.S, space.push]))
+    push = np.linalg.qr(eom.J.T @ space.lift)[0]
+    B = np.block([[eom.M, -eom.S, -push], [space.rows, np.zeros((space.r, eom.d + space.r))]])
+    C = space.rows @ _inverse_inertia(eom, np.hstack([eom.S, push]))
     free = eom.k - space.r
     return Dimensions(
         nv=eom.nv,
@@ -237,22 +253,46 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     )
 
 
-def _independent_forces(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
-    """τ -> y, the forces of (9) in the r independent coordinates in which J M⁻¹ Jᵀ is always invertible."""
-    inertia = space.rows @ _inverse_inertia(eom, space.push)
-    right = Affine(-space.rows @ _inverse_inertia(eom, eom.S), space.b + space.rows @ _inverse_inertia(eom, eom.h))
-    return Affine(np.linalg.solve(inertia, right.A), np.linalg.solve(inertia, right.b))
+def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
+    """U, s, Vt of A's singular value decomposition, without the directions that A resolves badly."""
+    U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
+    r = int(np.sum(s > MOTION_TOLERANCE * s.max(initial=0.0)))
+    return U[:, :r], s[:r], Vt[:r]
 
 
-def _with_forces(motions: Affine, space: ContactSpace, blocks: dict[str, slice]) -> Affine:
-    """All points of `motions`, whose last block is y, with every λ that belongs to y: as v + V⊥ β, v ⊥ V⊥ orthonormal."""
-    rest = motions.n_out - space.r
-    k, free = space.free.shape
-    lift = np.block([[np.eye(rest), np.zeros((rest, space.r))], [np.zeros((k, rest)), space.lift]])
-    directions = np.hstack([lift @ motions.A, np.vstack([np.zeros((rest, free)), space.free])])
-    V = np.linalg.qr(directions)[0]
-    point = lift @ motions.b
-    return Affine(V, point - V @ (V.T @ point), {**blocks, "forces": slice(rest, rest + k)})
+def _check_fit(eom: EquationsOfMotion, w: Array) -> None:
+    """Forces must be able to hold every resolved row, w being how they do it, and must push along rows of A only."""
+    if np.any(w <= RANK_TOLERANCE * w.max(initial=0.0)):
+        reached = int(np.sum(w > RANK_TOLERANCE * w[0]))
+        raise InputError(f"the contacts keep {w.size} directions of motion, but forces reach {reached}: A and J do not fit.")
+    beside = eom.J - eom.J @ np.linalg.pinv(eom.A, rcond=RANK_TOLERANCE) @ eom.A
+    if np.max(np.abs(beside), initial=0.0) > 1e-6 * np.max(np.abs(eom.J), initial=0.0):
+        raise InputError("forces push along motions that the contacts do not keep: A and J do not fit.")
+
+
+def _wanted_push(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
+    """τ -> the part of q̈ along the resolved rows that forces must add to that of S τ - h, shape (r,)."""
+    return Affine(-space.rows @ _inverse_inertia(eom, eom.S), space.b + space.rows @ _inverse_inertia(eom, eom.h))
+
+
+def _pairs(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
+    """(τ, z) -> (τ, λ): the smallest λ for τ, and any of the free ones with it."""
+    d, free = eom.d, space.free.shape[1]
+    smallest = Affine.linear(space.lift) @ _wanted_push(eom, space)
+    tau = Affine.linear(np.hstack([np.eye(d), np.zeros((d, free))]))
+    return Affine.stack(tau=tau, forces=Affine(np.hstack([smallest.A, space.free]), smallest.b))
+
+
+def _motion_of(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Affine:
+    """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h) of τ and λ that depend on something."""
+    A = _inverse_inertia(eom, eom.S @ tau.A + eom.J.T @ forces.A)
+    return Affine(A, _inverse_inertia(eom, eom.S @ tau.b + eom.J.T @ forces.b - eom.h))
+
+
+def _orthonormal(f: Affine) -> Affine:
+    """The values of f as v + V⊥ β: V⊥ orthonormal, v the smallest of them."""
+    V = np.linalg.qr(f.A)[0]
+    return Affine(V, f.b - V @ (V.T @ f.b), f.blocks)
 
 
 def _base_columns(eom: EquationsOfMotion) -> Array:

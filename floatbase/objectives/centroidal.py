@@ -13,14 +13,23 @@ from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.dynamics.subspace import RANK_TOLERANCE, null_space, rank, torque_force_matrix, torque_force_space
+from floatbase.dynamics.subspace import RANK_TOLERANCE, null_space, rank, resolved_motion, torque_force_space
 from floatbase.errors import InputError
 from floatbase.robots.state import State
 
 
+def grasp_matrix(points: Array, about: Array) -> Array:
+    """(20)(21) G_f above G_τ, shape (6, 3n): forces at points, shape (n, 3), m, to their wrench about a point, shape (3,).
+
+    Known as the grasp matrix in manipulation. N and N·m, world.
+    """
+    blocks = [np.vstack([np.eye(3), pin.skew(point - about)]) for point in points]
+    return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
+
+
 def force_sum(contacts: Contacts) -> Array:
     """(20) G_f, shape (3, 3n): f_c = G_f λ, one identity block for each point (four for four feet). N, world."""
-    return read_only(np.tile(np.eye(3), contacts.n_points))
+    return grasp_matrix(np.zeros((contacts.n_points, 3)), np.zeros(3))[:3]
 
 
 def moment_sum(state: State, contacts: Contacts) -> Array:
@@ -28,8 +37,7 @@ def moment_sum(state: State, contacts: Contacts) -> Array:
 
     The order matters: footnote 10 of the document prints x_c - x_i, which would give the opposite moment.
     """
-    blocks = [pin.skew(x - state.com) for x in contacts.positions(state)]
-    return read_only(np.hstack(blocks) if blocks else np.zeros((3, 0)))
+    return grasp_matrix(contacts.positions(state), state.com)[3:]
 
 
 def com_wrench(state: State, contacts: Contacts) -> Affine:
@@ -62,6 +70,13 @@ def wanted_wrench(
     a = checked("com_acceleration", com_acceleration, (3,), "m/s²")
     gravity = state.robot.model.gravity.linear
     return read_only(state.robot.mass * (a - gravity)), checked("angular_momentum_rate", angular_momentum_rate, (3,))
+
+
+def rotational_inertia(state: State) -> Array:
+    """Inertia of the whole robot about its centre of mass, joints locked, shape (3, 3), kg·m², world."""
+    data = state.robot.model.createData()
+    pin.ccrba(state.robot.model, data, state.q, state.v)
+    return read_only(data.Ig.inertia)
 
 
 def tangential_bias(contacts: Contacts) -> Quadratic:
@@ -121,9 +136,9 @@ def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
     f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k: forces out of reach,
     one τ for each λ, and a choice among many. Source: the document, §3.1.2.
     """
-    C, a = torque_force_matrix(eom)
-    C_tau, C_forces = C[:, : eom.d], C[:, eom.d :]
-    inverse = np.linalg.pinv(C_tau, rcond=RANK_TOLERANCE)
+    A, b = resolved_motion(eom)
+    C_tau, C_forces = A @ np.linalg.solve(eom.M, eom.S), A @ np.linalg.solve(eom.M, eom.J.T)
+    inverse, a = np.linalg.pinv(C_tau, rcond=RANK_TOLERANCE), b + A @ np.linalg.solve(eom.M, eom.h)
     forces = torque_force_space(eom)["forces"]
     U = np.linalg.svd(forces.A, full_matrices=False)[0]
     return TorqueForForces(

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from floatbase._arrays import Array
 from floatbase.affine import Affine, Quadratic
-from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.dynamics.equations import Block, EquationsOfMotion
 from floatbase.dynamics.subspace import FeasibleSpace, accelerations_from_torques, null_space, rank
-from floatbase.errors import InputError
-
-Block = Literal["qdd", "tau", "forces"]
-_FLAT = 1e-14  # curvature below this part of the largest counts as none
 
 
 def pullback(cost: Quadratic, f: Affine) -> Quadratic:
@@ -67,36 +61,18 @@ def best_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> Aff
     Raises `InputError` where the cost has no minimum over what is left open.
     """
     start = smallest_coordinates(space, block)
-    return minimised_over(cost, null_space(space.map[block].A, absolute=True)) @ start
+    return cost.minimised_over(null_space(space.map[block].A, absolute=True)) @ start
 
 
 def seen_from_best(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
-    """(19) made honest: the cost on β seen from one block, minimised over what the block leaves free (a Schur complement).
+    """(19) made honest: the cost on β seen from one block, minimised over what the block leaves free.
+
+    A partial minimisation, that is a Schur complement: see `Quadratic.minimised_over`.
 
     Answers "what does this motion cost at least?". Never above `seen_from_smallest`, and equal to it where V of the
     block has full column rank.
     """
     return cost.pullback(best_coordinates(cost, space, block))
-
-
-def minimised_over(cost: Quadratic, N: Array) -> Affine:
-    """x -> the point of least cost on x + span N; N: orthonormal columns, shape (n, p).
-
-    Raises `InputError` where the cost falls for ever along a column of N. A direction that costs nothing is left alone.
-    """
-    if N.shape[1] == 0:
-        return Affine.identity(cost.n)
-    values, vectors = np.linalg.eigh(N.T @ cost.H @ N)
-    largest = float(np.abs(values).max())
-    if values[0] < -1e-9 * largest:
-        raise InputError("the cost bends down along a direction that it should be minimised over: it has no least value there.")
-    curved = values > _FLAT * largest
-    slope = vectors.T @ (N.T @ cost.g)
-    if np.any(np.abs(slope[~curved]) > 1e-7 * (1.0 + float(np.abs(cost.g).max(initial=0.0)))):
-        raise InputError("the cost falls for ever along a direction that it should be minimised over; add a cost there.")
-    W = N @ vectors[:, curved]
-    step = W / values[curved]
-    return Affine(np.eye(cost.n) - step @ W.T @ cost.H, -step @ slope[curved])
 
 
 def minimise_on(cost: Quadratic, subspace: Affine) -> Array:

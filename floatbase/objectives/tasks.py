@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +19,10 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive
 from floatbase.affine import Affine
-from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.dynamics.equations import Block, EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.robots.state import State
 
-Block: TypeAlias = Literal["qdd", "tau", "forces"]
 Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 _ZERO3 = (0.0, 0.0, 0.0)
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, checked, positive, read_only, unit_quaternion
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots.robot import Foot, Robot, torque_limits_of
 
@@ -216,8 +216,8 @@ def _reference(model: pin.Model, loader: _Loader, entry: Entry | None) -> Array:
 
 def _checked_posture(name: str, model: pin.Model, floating: bool, asked: npt.ArrayLike) -> Array:
     q = checked("posture", asked, (model.nq,))
-    if floating and abs(float(np.linalg.norm(q[3:7])) - 1.0) > 1e-6:
-        raise InputError(f"the base quaternion posture[3:7] of {name} (x y z w) must have length 1, not {q[3:7]}.")
+    if floating:
+        unit_quaternion(f"posture[3:7] of {name}", q[3:7])
     return q
 
 

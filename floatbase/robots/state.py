@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, checked, read_only, unit_quaternion
 from floatbase.errors import InputError
 from floatbase.robots.robot import Robot
 
@@ -35,12 +35,7 @@ class State:
         vars(self)["q"] = checked("q", q, (robot.nq,))
         vars(self)["v"] = checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,))
         if robot.is_floating:
-            length = float(np.linalg.norm(self.q[3:7]))
-            if abs(length - 1.0) > 1e-6:
-                raise InputError(
-                    f"the base quaternion q[3:7] (x y z w) has length {length:.6g}; it must be 1. "
-                    "Divide it by its length, or use robot.standing()."
-                )
+            unit_quaternion("q[3:7]", self.q[3:7], ", or use robot.standing()")
 
     def __setattr__(self, name: str, value: object) -> None:
         raise InputError(f"a State does not change; state.at({name}=…) makes a new one." if name in "qv" else f"no {name}.")

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from floatbase.control.polytopes import cone_rows, linear_program, vertices
+from floatbase.control.linear_programs import linear_program
+from floatbase.control.polytopes import cone_rows, vertices
 
 Array = npt.NDArray[np.float64]
 seeds = st.integers(0, 100_000)

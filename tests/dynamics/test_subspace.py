@@ -10,6 +10,7 @@ import itertools
 from functools import cache
 
 import judges
+import mujoco
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -17,7 +18,7 @@ import pytest
 import scipy.linalg
 
 import floatbase as fb
-from floatbase.dynamics import EquationsOfMotion, FlatFootContact, subspace
+from floatbase.dynamics import EquationsOfMotion, FlatFootContact, PointContact, subspace
 from floatbase.dynamics.constraints import fixed_frame
 
 Array = npt.NDArray[np.float64]
@@ -234,14 +235,118 @@ def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_ra
     assert found.rank_V_qdd == found.d - found.rank_J + found.rank_J_base
 
 
+def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
+    """solo8 on four feet, 10^-exponent away from where it loses rank, moving with noise of `speed` m/s and rad/s."""
+    robot = judges.load("solo8")
+    rng = np.random.default_rng(0)
+    state = judges.along(robot.standing(), rng.normal(size=robot.nv), 10.0**-exponent)
+    return fb.equations_of_motion(state.at(v=speed * rng.normal(size=robot.nv)), fb.Contacts.points(robot))
+
+
 @pytest.mark.parametrize("exponent", range(1, 13))
-def test_contacts_hold_under_eta_however_near_the_robot_is_to_losing_rank(exponent: int) -> None:
-    """A q̈ = b to 1e-6 m/s² also where J M⁻¹ Jᵀ is nearly singular: its condition is the square of that of J."""
-    standing = judges.load("solo8").standing()
-    away = np.random.default_rng(0).normal(size=standing.robot.nv)
-    eom = fb.equations_of_motion(judges.along(standing, away, 10.0**-exponent), fb.Contacts.points(standing.robot))
-    tau = np.random.default_rng(1).normal(size=8)
-    assert np.max(np.abs(eom.A @ subspace.accelerations_from_torques(eom)(tau) - eom.b)) < 1e-6
+def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_ten_thousandth(exponent: int) -> None:
+    """A q̈ = b to 1e-10 of |q̈| along the resolved directions, and along the others to their singular value times |q̈|."""
+    eom = near_singular(exponent)
+    qdd = subspace.accelerations_from_torques(eom)(np.random.default_rng(1).normal(size=8))
+    U, s, _ = np.linalg.svd(eom.A)
+    gap, kept = np.abs(U.T @ (eom.A @ qdd - eom.b)), s > 1e-4 * s[0]
+    assert np.max(gap[kept]) < 1e-10 * np.linalg.norm(qdd)
+    assert np.all(gap[~kept] <= (s[~kept] + 1e-10) * np.linalg.norm(qdd))
+    assert kept.sum() == subspace.contact_space(eom).r == (11 if exponent < 3 else 10)
+
+
+@pytest.mark.parametrize("exponent", range(3, 13))
+@pytest.mark.parametrize("speed", [0.0, 0.01, 0.1])
+def test_velocity_noise_makes_no_force_near_a_loss_of_rank(exponent: int, speed: float) -> None:
+    """The torques that hold solo8 still at the singular stance: nearby they make the same forces to 1 % of the weight.
+
+    To the letter of (9), joint angles off by 1e-6 rad and a velocity off by 0.1 ask for more than 1e8 N.
+    """
+    robot = judges.load("solo8")
+    standing, contacts = robot.standing(), fb.Contacts.points(robot)
+    tau = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing))(standing.q, standing.v).tau
+    eom = near_singular(exponent, speed)
+    wanted = subspace.forces_from_torques(fb.equations_of_motion(standing, contacts))(tau)
+    assert np.max(np.abs(subspace.forces_from_torques(eom)(tau) - wanted)) < 0.01 * robot.weight
+    assert np.max(np.abs(subspace.accelerations_from_torques(eom)(tau))) < 0.2 + 10.0 * speed
+    space = subspace.feasible_space(eom)
+    assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight  # the smallest point of all; q̈ in rad/s² is in it
+
+
+@pytest.mark.parametrize("exponent", range(1, 13))
+def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_losing_rank(exponent: int) -> None:
+    """Also for forces along directions that the contacts resolve badly: they push a little, and q̈ says so."""
+    eom = near_singular(exponent, 0.1)
+    space = subspace.feasible_space(eom)
+    qdd, tau, forces = space(10.0 * np.random.default_rng(2).normal(size=space.dimension))
+    assert np.max(np.abs(judges.aba(eom, tau, forces) - qdd)) < 1e-9 * np.max(np.abs(qdd))
+    assert space.dimension == eom.d + eom.k - subspace.dimensions(eom).rank_J
+
+
+def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_the_rows_forbids() -> None:
+    """A leaning of 1e-4 rad is below what contacts resolve: torques that roll the base meet no wall of 500 N there."""
+    robot = judges.load("solo8")
+    contacts, sim = fb.Contacts.points(robot), fb.Simulation(robot)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
+    run = fb.rollout(sim, controller, 1.0, pushes=[fb.Push([0.0, 0.1, 0.0], 0.9)], control_period=2e-3)
+    eom = fb.equations_of_motion(sim.state, contacts)
+    _, s, Vt = np.linalg.svd(eom.A)
+    assert 1e-6 < s[10] / s[0] < subspace.MOTION_TOLERANCE
+    rolling = 0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()  # N·m, torques along the badly resolved direction
+    change, rolls = [], []
+    for tau in (run.tau[-1], run.tau[-1] + rolling):
+        sim.data.ctrl[sim._motors] = tau
+        for _ in range(3):  # the contact solver starts from its last answer
+            mujoco.mj_forward(sim.model, sim.data)
+        change.append(sim.contact_forces())
+        rolls.append(sim.data.qacc[3])
+    roll, forces = rolls[1] - rolls[0], (change[1] - change[0]).sum(axis=0)
+    assert abs(roll) > 1.0
+    assert subspace.accelerations_from_torques(eom).A[3] @ rolling == pytest.approx(roll, rel=0.05)
+    found = (subspace.forces_from_torques(eom).A @ rolling).reshape(4, 3)
+    assert np.max(np.abs(found.sum(axis=0) - forces)) < 0.05 * np.max(np.abs(forces))
+    assert np.max(np.abs(found - (change[1] - change[0]))) < 0.3  # N; lateral shares are what softness decides
+    to_the_letter = np.linalg.pinv(eom.A @ np.linalg.solve(eom.M, eom.J.T), rcond=1e-12) @ eom.A
+    assert np.max(np.abs(to_the_letter @ np.linalg.solve(eom.M, eom.S @ rolling))) > 100.0
+
+
+def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_to_it() -> None:
+    eom = near_singular(6, 0.1)
+    U, _, Vt = np.linalg.svd(eom.A)
+    A, b = subspace.resolved_motion(eom)
+    assert np.max(np.abs(U[:, 10:].T @ b)) < 1e-12 < np.max(np.abs(U[:, 10:].T @ eom.b))
+    assert np.max(np.abs(A @ Vt[10])) < 1e-12 < np.max(np.abs(eom.A @ Vt[10]))
+    assert np.allclose(U[:, :10].T @ b, U[:, :10].T @ eom.b, atol=1e-12)
+    regular = fb.equations_of_motion(judges.load("go2").random_state(0), fb.Contacts.points(judges.load("go2")))
+    for found, given in zip(subspace.resolved_motion(regular), (regular.A, regular.b), strict=True):
+        assert np.allclose(found, given, atol=1e-12)
+
+
+def test_contacts_whose_forces_push_where_nothing_is_kept_are_refused() -> None:
+    """A thruster is no contact: the rows must keep what the forces push along."""
+
+    class Thruster(PointContact):
+        def constraint(self, state: fb.State, t: float = 0.0) -> tuple[Array, Array]:
+            A, b = super().constraint(state, t)
+            return A[:2], b[:2]
+
+    state = judges.load("go2").standing()
+    with pytest.raises(fb.FloatbaseError, match="forces push along motions that the contacts do not keep"):
+        subspace.feasible_space(fb.equations_of_motion(state, fb.Contacts([Thruster("FL_foot", radius=0.022)])))
+
+
+@pytest.mark.parametrize(("name", "unseen"), [("go2", 0), ("solo12", 0), ("solo8", 2)])
+def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(name: str, unseen: int) -> None:
+    """ζ answers -J_jᵀ λ with λ for an internal λ, without its part in null(Jᵀ): k - rank J_b - (k - rank J) are left."""
+    state = judges.load(name).standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    F, N = subspace.internal_forces(eom), subspace.undetermined_forces(eom)
+    assert np.allclose(F @ (F.T @ N), N, atol=1e-9)  # null(Jᵀ) lies in null(J_bᵀ)
+    answer = subspace.forces_from_torques(eom).A @ (-eom.J[:, 6:].T @ F)
+    assert np.allclose(answer, F - N @ (N.T @ F), atol=1e-9)
+    found = subspace.dimensions(eom)
+    assert (found.internal, found.undetermined) == (6, unseen)
+    assert np.linalg.matrix_rank(answer, tol=1e-8) == found.internal - found.undetermined == found.rank_J - found.rank_J_base
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)

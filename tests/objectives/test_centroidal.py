@@ -57,6 +57,16 @@ def momentum_rate(state: fb.State, contacts: fb.Contacts, forces: Array, tau: Ar
     return (ends[0] - ends[1]) / (2.0 * dt)
 
 
+def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> None:
+    """(20)(21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i; no points give a matrix without columns."""
+    rng = np.random.default_rng(0)
+    points, about, forces = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=(5, 3))
+    wrench = centroidal.grasp_matrix(points, about) @ forces.ravel()
+    assert np.allclose(wrench[:3], forces.sum(axis=0))
+    assert np.allclose(wrench[3:], np.cross(points - about, forces).sum(axis=0))
+    assert centroidal.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
+
+
 # (20)(21) ----------------------------------------------------------------------------------------------------------------
 
 
@@ -324,6 +334,17 @@ def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> N
     assert np.allclose(zeta(tau + more), zeta(tau), atol=1e-8)
     assert np.linalg.norm(eta(tau + more) - eta(tau)) > 1e-2
     assert np.allclose(found.free_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8)  # the smallest has none of them
+
+
+@pytest.mark.parametrize("exponent", [3, 5, 7])
+def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_rank(exponent: int) -> None:
+    """solo8 almost symmetric with 0.1 rad/s of noise: (25) taken to the letter asks for hundreds of N·m and more."""
+    standing, contacts = judges.load("solo8").standing(), fb.Contacts.points(judges.load("solo8"))
+    wanted = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
+    rng = np.random.default_rng(0)
+    near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).at(v=0.1 * rng.normal(size=14))
+    there, here = (centroidal.torque_for_forces(fb.equations_of_motion(s, contacts)).torque(wanted) for s in (standing, near))
+    assert np.max(np.abs(here - there)) < 0.3  # N·m
 
 
 def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxpys() -> None:

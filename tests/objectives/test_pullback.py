@@ -226,7 +226,7 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
     squeeze = subspace.internal_forces(eom)[:, 0]
     reward = pullback.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
     for call in (pullback.seen_from_best, pullback.best_coordinates):
-        with pytest.raises(fb.FloatbaseError, match="falls for ever along a direction that it should be minimised over"):
+        with pytest.raises(fb.FloatbaseError, match="falls for ever along a direction without curvature. Add a cost"):
             call(reward, space, "qdd")
     assert np.isfinite(pullback.seen_from_smallest(reward, space, "qdd")(np.zeros(18)))
 
@@ -236,7 +236,7 @@ def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> 
     eom = eom_of("go2", 4)
     space = subspace.feasible_space(eom)
     hill = pullback.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
-    with pytest.raises(fb.FloatbaseError, match="bends down"):
+    with pytest.raises(fb.FloatbaseError, match="no minimum: its smallest curvature is -"):
         pullback.seen_from_best(hill, space, "qdd")
 
 
@@ -283,11 +283,11 @@ def test_minimised_over_a_span_is_the_schur_complement() -> None:
     rng = np.random.default_rng(2)
     A = rng.normal(size=(9, 6))
     cost, N = Quadratic.from_residual(A, rng.normal(size=9)), np.eye(6)[:, 4:]
-    seen = cost.pullback(pullback.minimised_over(cost, N))
+    seen = cost.pullback(cost.minimised_over(N))
     H = cost.H
     assert np.allclose(seen.H[:4, :4], H[:4, :4] - H[:4, 4:] @ np.linalg.solve(H[4:, 4:], H[4:, :4]), atol=1e-10)
     assert np.allclose(seen.H[4:], 0.0, atol=1e-10)
-    assert pullback.minimised_over(cost, np.zeros((6, 0))).n_in == 6
+    assert cost.minimised_over(np.zeros((6, 0))).n_in == 6
 
 
 def test_a_block_that_does_not_exist_is_named() -> None:

@@ -1,0 +1,39 @@
+"""Linear programs, in one place: geometry of cones, wrenches of a stance, rows in conflict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from floatbase._arrays import Array
+from floatbase.errors import SolverError
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
+
+OPTIMAL, INFEASIBLE, UNBOUNDED = 0, 2, 3
+
+
+def linear_program(
+    cost: Array,
+    equalities: tuple[Array, Array] | None = None,
+    inequalities: tuple[Array, Array] | None = None,
+    bounds: Sequence[tuple[float | None, float | None]] | tuple[float | None, float | None] = (0.0, None),
+    tolerance: float | None = None,
+) -> OptimizeResult:
+    """min costᵀ x, A x = b, G x ≤ h; `.status` is `OPTIMAL`, `INFEASIBLE` or `UNBOUNDED`, never anything else.
+
+    tolerance: what rows and multipliers may be off by, HiGHS's own 1e-7 by default. Raises `SolverError` when HiGHS gives up.
+    """
+    from scipy.optimize import linprog  # slow to load, and never needed while all goes well
+
+    A, b = equalities if equalities is not None else (None, None)
+    G, h = inequalities if inequalities is not None else (None, None)
+    options = (
+        {} if tolerance is None else dict.fromkeys(("primal_feasibility_tolerance", "dual_feasibility_tolerance"), tolerance)
+    )
+    for presolve in (True, False):  # presolve may stop at "infeasible or unbounded"; the simplex method then decides
+        result = linprog(cost, G, h, A, b, bounds, method="highs-ds", options={"presolve": presolve, **options})
+        if result.status in (OPTIMAL, INFEASIBLE, UNBOUNDED):
+            return result
+    raise SolverError(f"HiGHS could not solve a linear program of {cost.size} variables: {result.message}")
