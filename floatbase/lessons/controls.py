@@ -16,17 +16,17 @@ def slider_panel(
     draw: Callable[..., str | None],
     wait: bool = False,
     beside: bool = False,
-    **ranges: tuple[float, float, float],
+    **ranges: tuple[float, float, float] | tuple[float, float, float, str],
 ) -> widgets.VBox:
-    """The live picture with a slider for each of `ranges`: name=(lowest, first, highest); "_" in a name shows as a blank.
+    """The live picture with a slider for each of `ranges`: name=(lowest, first, highest) or (lowest, first, highest, unit).
 
-    draw: called at once and at every move as draw(name=value, …), in the kernel's thread, so it should take a few
-    milliseconds. What it returns, HTML or plain text, stands between the picture and the sliders, or to the right of the
-    picture with `beside`. wait: call it only when a slider is let go, for functions that take a little longer. Should it
-    raise an error of the package, that stands there instead.
+    "_" in a name shows as a blank. draw: called at once and at every move as draw(name=value, …), in the kernel's thread, so
+    it should take a few milliseconds. What it returns, HTML or plain text, stands between the picture and the sliders, or to
+    the right of the picture with `beside`. wait: call it only when a slider is let go, for functions that take a little
+    longer. Should it raise an error of the package, that stands there instead.
     """
     note = widgets.HTML()
-    sliders = {name: _slider(name, *bounds, wait) for name, bounds in ranges.items()}
+    sliders = {name: _slider(name, *bounds, wait=wait) for name, bounds in ranges.items()}
 
     def moved(_: Any = None) -> None:
         try:
@@ -42,13 +42,13 @@ def slider_panel(
     return widgets.VBox([*top, *sliders.values()])
 
 
-def _slider(name: str, low: float, first: float, high: float, wait: bool) -> widgets.FloatSlider:
+def _slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:
     return widgets.FloatSlider(
         value=first,
         min=low,
         max=high,
         step=(high - low) / 100,
-        description=name.replace("_", " "),
+        description=name.replace("_", " ") + (f" [{unit}]" if unit else ""),
         readout_format=".2f" if high - low < 20 else ".0f",
         continuous_update=not wait,
         style={"description_width": "12em"},

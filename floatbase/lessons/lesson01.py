@@ -141,10 +141,28 @@ def base_turn(record: Rollout) -> Array:
 # pictures ---------------------------------------------------------------------------------------------------------------
 
 
+PRESSING_VIEW = View(66.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
+
+
+def show_arm(view: Viewer, state: fb.State) -> Viewer:
+    """The arm in front of the wall, with the axes x, y, z of the world at its base."""
+    tool = state.point("tool0")
+    extra = _wall(tool) | below("axes", marks.frame_axes(np.eye(4), 0.28))
+    names: dict[str, npt.ArrayLike] = {
+        "x": [0.32, 0.0, 0.03],
+        "y": [0.0, 0.33, 0.03],
+        "tool": tool + [-0.06, 0.0, 0.16],
+        "wall": [tool[0], 0.0, 0.95],
+    }
+    extra |= {f"label/{name}": shapes.label(at, name, 0.05, plate=False) for name, at in names.items()}
+    view.show(state, com=False, extra=extra)
+    return view.camera(PRESSING_VIEW)
+
+
 def pressing_panel(view: Viewer, state: fb.State) -> widgets.VBox:
     """Figure 1, left: a slider for how hard the arm presses; the wall answers with f_r, and the bolts with a force and τ_b."""
     view.show(state, com=False)
-    view.camera(View(66.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62)))
+    view.camera(PRESSING_VIEW)
     tool = state.point("tool0")
     scene = _wall(tool) | below("bolts", props.bolts(np.zeros(3), 0.11))
 
@@ -154,12 +172,13 @@ def pressing_panel(view: Viewer, state: fb.State) -> widgets.VBox:
         extra = dict(scene)
         if press:
             tip = tool + view.scale * force
-            start = np.array([0.0, 0.0, 0.03]) - view.scale * bolts
+            end = np.array([-0.14, 0.0, 0.03])  # behind the base, where it is seen
+            start = end - view.scale * bolts
             extra["f/wall"] = shapes.arrow(tool, view.scale * force, MEASURED, view.painter.size)
             extra["f/bolts"] = shapes.arrow(start, view.scale * bolts, MEASURED, view.painter.size)
             extra["f/moment"] = marks.curled_arrow([0.0, 0.16, 0.1], 0.003 * moment, MEASURED)
             extra["label/wall"] = shapes.label(tip + [0.0, 0.0, 0.06], "f{r}", 0.06, plate=False)
-            extra["label/bolts"] = shapes.label(start + [0.0, 0.0, 0.06], "bolts", 0.05, plate=False)
+            extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06, plate=False)
             extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06, plate=False)
         view.show(state, com=False, extra=extra)
         tau = state.h - state.frame_jacobian("tool0")[:3].T @ force
@@ -168,7 +187,7 @@ def pressing_panel(view: Viewer, state: fb.State) -> widgets.VBox:
             f"<b>{np.linalg.norm(moment):.0f} N·m</b>; largest motor torque {abs(tau).max():.0f} N·m"
         )
 
-    return slider_panel(view, draw, press=(0.0, 60.0, 120.0))
+    return slider_panel(view, draw, press=(0.0, 60.0, 120.0, "N"))
 
 
 def play_pressing(view: Viewer, record: Rollout) -> Viewer:
@@ -180,7 +199,9 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
         for push in record.pushes:
             if push.acts_at(float(record.time[i])):
                 vector = view.scale * push.force
-                drawn["f/wall"] = shapes.arrow(state.point(push.frame), vector, MEASURED, view.painter.size)
+                tool = state.point(push.frame)
+                drawn["f/wall"] = shapes.arrow(tool, vector, MEASURED, view.painter.size)
+                drawn["label/wall"] = shapes.label(tool + vector + [0.0, 0.0, 0.07], "f{r}", 0.06, plate=False)
         return drawn
 
     return _play(view, record, picture, View(66.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
@@ -216,7 +237,8 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> widget
             f"τ<sub>c</sub> = {_row(moment)} N·m"
         )
 
-    panel = slider_panel(view, draw, forwards=(-6.0, 2.0, 6.0), up=(-6.0, 0.0, 6.0), turn=(-40.0, 0.0, 40.0))
+    along = (-6.0, 0.0, 6.0, "m/s²")
+    panel = slider_panel(view, draw, forwards=(-6.0, 2.0, 6.0, "m/s²"), up=along, turn=(-40.0, 0.0, 40.0, "rad/s²"))
     view.camera(View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.42), 0.62)))
     return panel
 
@@ -234,11 +256,14 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> widg
         qdd = eom.acceleration(np.zeros(eom.d), f)
         rate = momentum_rate(state, qdd) + np.concatenate([state.robot.mass * gravity, np.zeros(3)])
         picture = view.painter.picture(state, contacts, planned=f, wrench=rate, cones=False)
-        view.draw({p: item for p, item in picture.items() if p not in ("ground", "com/line", "com/projection")})
+        hidden = ("ground", "patch", "com/line", "com/projection")
+        drawn = {path: item for path, item in picture.items() if not path.startswith(hidden)}
+        view.draw({path.replace("planned/", "thrust/"): item for path, item in drawn.items()})
         return f"f<sub>c</sub> = {_row(rate[:3])} N, τ<sub>c</sub> = {_row(rate[3:])} N·m"
 
-    panel = slider_panel(view, draw, left_feet=(0.0, 40.0, 80.0), right_feet=(0.0, 40.0, 80.0), twist=(-40.0, 0.0, 40.0))
-    view.camera(View(50.0, 14.0, 1.0, around=((0.0, 0.0, 0.5), 0.75)))
+    each = (-40.0, 30.0, 40.0, "N")
+    panel = slider_panel(view, draw, left_feet=each, right_feet=each, twist=(-40.0, 0.0, 40.0, "N"))
+    view.camera(View(50.0, 14.0, 1.0, around=((0.0, 0.0, 0.33), 0.55)))
     return panel
 
 
@@ -426,6 +451,12 @@ EXERCISES = (
                 "All four feet together carry one weight, not four.": lambda: 4 * _carried_by_friction(),
                 "That is friction times mass, in kg; a force needs one more factor.": lambda: _carried_by_friction() / 9.81,
                 "μ multiplies the normal force; it does not divide it.": lambda: _carried_by_friction() / 0.49,
+                "That is what the controller's four-sided pyramid allows. Asked is what the floor can do: the round cone.": (
+                    lambda: _carried_by_friction() / np.sqrt(2.0)
+                ),
+                "Friction answers along the floor only as far as the normal force goes: multiply by μ, once.": (
+                    lambda: 0.7 * _carried_by_friction()
+                ),
             },
         ),
         explanation="Each foot gives at most μ times its normal force, and the normal forces add up to the weight.",

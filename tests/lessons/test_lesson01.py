@@ -139,6 +139,8 @@ def test_wrong_actuation_matrices_get_their_hint(answer: Any, text: str) -> None
         (0.7 * 9.81 / 4, "one foot"),
         (4 * 0.7 * 9.81, "one weight"),
         (9.81 / 0.7, "does not divide"),
+        (0.7 * 9.81 / np.sqrt(2), "the round cone"),
+        (0.7 * 0.7 * 9.81, "μ, once"),
         (-0.7 * 9.81, "sign"),
     ],
 )
@@ -176,3 +178,11 @@ def test_thrusts_by_the_lever_rule_are_right_in_either_shape(go2: Robot) -> None
 )
 def test_wrong_thrusts_get_their_hint(change: Any, text: str, go2: Robot) -> None:
     assert text in hint("01.4", change(balanced(go2)))
+
+
+def test_a_slider_names_its_unit(arm: Robot) -> None:
+    view = fb.Viewer(arm)
+    try:
+        assert lesson01.pressing_panel(view, arm.standing()).children[2].description == "press [N]"
+    finally:
+        view.close()
