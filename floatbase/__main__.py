@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
 
 import floatbase as fb
 from floatbase.objectives.tasks import Task
 from floatbase.robots.robot import Robot
-from floatbase.simulation.live import Live
+from floatbase.simulation.live import SEEN, Live
+from floatbase.viewer.recording import push_at
+
+PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller; all of them stand and are pushed
 
 
 class Playground:
@@ -28,8 +34,16 @@ class Playground:
         self.stance = {foot.frame: True for foot in robot.feet}
         self.shift = [0.0, 0.0, 0.0]  # m, of the centre of mass
         self.force = 0.1 * robot.weight  # N, of a push
-        self.note = ""
-        self.run = Live(self.sim, self._controller(), self._show)
+        self.towards = 90.0  # degrees, of a push: 0 forwards, 90 to the left
+        self.pushed = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
+        self.note = self.outcome = ""
+        self.last: fb.Rollout | None = None
+        self._drawing = threading.Lock()  # the run draws, and so does who pauses it
+        controller = self._controller()
+        self.period = control_period(self.sim, controller)
+        self.run = Live(self.sim, controller, self._show, control_period=self.period)
+        self.run.on_status(self._say)
+        self.pace = Pace()
         self._add_controls()
 
     def start(self) -> None:
@@ -49,8 +63,8 @@ class Playground:
         view.button("reset", self.run.reset)
         view.slider("speed", self.run.slow_motion, 1.0, 0.05, 1.0, 0.05)
         view.slider("push [N]", self._set_force, self.force, 0.0, 0.5 * weight, 1.0)
-        for name, direction in (("push forwards", 0), ("push left", 1)):
-            view.button(name, lambda axis=direction: self._push(axis))  # type: ignore[misc]
+        view.slider("push towards [°]", self._turn, self.towards, -180.0, 180.0, 5.0)
+        view.button("push", self._push)
         if not self.robot.is_floating:
             return
         for axis, name in enumerate("xyz"):
@@ -88,8 +102,13 @@ class Playground:
     def _set_force(self, force: float) -> None:
         self.force = force
 
-    def _push(self, axis: int) -> None:
-        self.run.push([self.force if i == axis else 0.0 for i in range(3)])
+    def _turn(self, towards: float) -> None:
+        self.towards = towards
+
+    def _push(self) -> None:
+        angle = math.radians(self.towards)
+        self.run.start()
+        self.run.push([self.force * math.cos(angle), self.force * math.sin(angle), 0.0], frame=self.pushed)
 
     def _pause(self) -> None:
         self.run.pause()
@@ -112,13 +131,63 @@ class Playground:
         self._change()
 
     def _show(self, record: fb.Rollout) -> None:
-        """Draw the last row of a slice, with what stopped the run, if anything did."""
-        push = next(((p.frame, p.force) for p in record.pushes if p.acts_at(float(record.time[-1]))), None)
-        outcome = "" if record.outcome == "completed" else f"{record.outcome}: press reset"
-        title = "\n".join(part for part in (f"{self.robot.name}, {record.time[-1]:.1f} s", outcome, self.note) if part)
-        self.view.show(
-            record.final, record.contacts, record.measured[-1], record.planned[-1], push=push, support=True, title=title
-        )
+        """Draw the last row of a slice."""
+        self.last = record
+        self._draw()
+
+    def _say(self, status: str) -> None:
+        """Tell what stopped the run, if anything did, over the last picture."""
+        self.outcome = {"running": "", "paused": "paused"}.get(status, f"{status}: press reset")
+        self._draw()
+
+    def _draw(self) -> None:
+        record = self.last
+        if record is None:
+            return
+        with self._drawing:
+            self.view.show(
+                record.final, record.contacts, record.measured[-1], record.planned[-1], push=push_at(record, -1, SEEN),
+                support=True, title="\n".join(filter(None, [self._headline(float(record.time[-1])), self.outcome, self.note])),
+            )  # fmt: skip
+
+    def _headline(self, now: float) -> str:
+        """Who, when, and how fast: the part of real time that this machine reaches, and how often the controller is asked."""
+        speed = self.pace.at(now)
+        told = "" if speed is None else f", {speed:.0%} of real time"
+        return f"{self.robot.name}, {now:.1f} s{told}, control every {1e3 * self.period:g} ms"
+
+
+class Pace:
+    """How fast a simulation runs, as a part of real time, over the last seconds. clock: s."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, over: float = 2.0):
+        self._clock, self._over = clock, over
+        self._seen: deque[tuple[float, float]] = deque()  # clock and simulated time, s
+
+    def at(self, simulated: float) -> float | None:
+        """The pace now that the simulation has come to `simulated` s; None for half a second after a start or a pause."""
+        now = self._clock()
+        if self._seen and (simulated < self._seen[-1][1] or now - self._seen[-1][0] > self._over):
+            self._seen.clear()
+        self._seen.append((now, simulated))
+        while now - self._seen[0][0] > self._over:
+            self._seen.popleft()
+        since, start = self._seen[0]
+        return (simulated - start) / (now - since) if now - since > 0.5 else None
+
+
+def control_period(sim: fb.Simulation, controller: fb.WholeBodyController, share: float = 0.5) -> float:
+    """The shortest of `PERIODS`, s, of which physics and controller together need at most `share` on this machine, so that
+    pictures find time too; the longest when none is enough. Puts the robot back where it stood."""
+    shortest, ticks = PERIODS[0], 10
+    tries = []
+    for _ in range(4):  # the first one warms up, and the best of the others is this machine when it is not interrupted
+        start = time.perf_counter()
+        fb.rollout(sim, controller, ticks * shortest, control_period=shortest)
+        tries.append((time.perf_counter() - start) / ticks)
+    sim.reset()
+    tick = min(tries[1:])
+    return next((period for period in PERIODS if tick <= share * period), PERIODS[-1])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -146,17 +215,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _view(asked: argparse.Namespace) -> int:
     """Run until Ctrl-C or a polite kill."""
     ended = threading.Event()
-    playground = Playground(fb.load(asked.robot), friction=asked.friction, background=asked.background, port=asked.port)
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        playground.start()
-        print(f"{asked.robot} at {playground.view.url} (end with Ctrl-C)", flush=True)
-        if not asked.no_browser:
-            playground.view.window.open()
-        while not ended.wait(timeout=0.5):
-            pass
+        playground = Playground(fb.load(asked.robot), friction=asked.friction, background=asked.background, port=asked.port)
+        try:
+            playground.start()
+            print(f"{asked.robot} at {playground.view.url} (end with Ctrl-C)", flush=True)
+            if not asked.no_browser:
+                playground.view.window.open()
+            ended.wait()
+        finally:
+            playground.close()
     finally:
-        playground.close()
         for number, handler in before.items():
             signal.signal(number, handler)
     return 0

@@ -2,60 +2,95 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import ipywidgets as widgets
 
-from floatbase.simulation.live import Live
+from floatbase.simulation.live import SEEN, Live
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.rollout import Controller, Rollout
+from floatbase.viewer.recording import push_at
 from floatbase.viewer.scene import Viewer
 
 
 def live(sim: Simulation, controller: Controller, view: Viewer, **options: Any) -> Live:
-    """A background run that draws itself into `view`; options as for `Live`. Nothing moves before `start`."""
+    """A background run that draws itself into `view`, a push as an arrow for half a second; options as for `Live`. Nothing
+    moves before `start`."""
 
     def show(record: Rollout) -> None:
-        last = record.final
-        view.show(last, contacts=record.contacts, forces=record.measured[-1])
+        view.show(record.final, contacts=record.contacts, forces=record.measured[-1], push=push_at(record, -1, SEEN))
 
     return Live(sim, controller, show, **options)
 
 
 def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
-    """The live picture with a slider for a sideways push, N, along +y, which acts for 0.1 s when the slider is let go.
+    """The live picture with a handle to push the robot in any horizontal direction, for 0.1 s at a time.
 
-    Moving the slider starts the run when it is paused; buttons run, pause and reset it. Nothing here waits.
+    The first slider says how hard, N, and pushes when it is let go; the second says where to, in degrees: 0 forwards, 90 to
+    the robot's left (+y, where it begins), 180 backwards; the button pushes once more. A push starts the run when it is paused;
+    buttons run, pause and reset it. A line says what happens, and what stopped the run. Nothing here waits. The picture goes
+    on as long as `view` is not displayed again below: give an interactive part a `Viewer` of its own.
     """
-    force = widgets.FloatSlider(
-        value=0.0,
-        min=-most,
-        max=most,
-        step=5.0,
-        description="push [N]",
+    force = _slider("push [N]", 0.0, -most, most, 5.0)
+    towards = _slider("towards [°]", 90.0, -180.0, 180.0, 15.0)
+    line = widgets.Label(value=run.status)
+
+    def push(_: Any = None) -> None:
+        if not force.value:
+            line.value = "a push of 0 N: set how hard first"
+            return
+        run.start()
+        run.push(_horizontal(force.value, towards.value))
+        line.value = f"pushed with {abs(force.value):.0f} N {_direction(force.value, towards.value)} for 0.1 s"
+
+    def let_go(change: dict[str, Any]) -> None:
+        if change["new"]:
+            push()
+
+    def reset(_: Any) -> None:
+        force.value, towards.value = 0.0, 90.0
+        run.reset()
+
+    def say(status: str) -> None:
+        line.value = status if status in ("running", "paused") else f"{status}: press reset"
+
+    run.on_status(say)
+    force.observe(let_go, names="value")
+    buttons = [_button("run", lambda _: run.start()), _button("pause", lambda _: run.pause()), _button("reset", reset)]
+    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="100%"))
+    return widgets.VBox([picture, force, widgets.HBox([towards, _button("push", push)]), widgets.HBox([*buttons, line])])
+
+
+def _slider(text: str, value: float, low: float, high: float, step: float) -> widgets.FloatSlider:
+    """A slider that tells its value when it is let go."""
+    return widgets.FloatSlider(
+        value=value,
+        min=low,
+        max=high,
+        step=step,
+        description=text,
         continuous_update=False,
         readout_format=".0f",
         layout=widgets.Layout(width="60%"),
     )
-    status = widgets.Label(value=run.status)
 
-    def button(text: str, then: Callable[[], None]) -> widgets.Button:
-        def act(_: widgets.Button) -> None:
-            then()
-            status.value = run.status
 
-        made = widgets.Button(description=text, layout=widgets.Layout(width="6em"))
-        made.on_click(act)
-        return made
+def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:
+    made = widgets.Button(description=text, layout=widgets.Layout(width="6em"))
+    made.on_click(pressed)
+    return made
 
-    def pushed(change: dict[str, Any]) -> None:
-        if change["new"]:
-            run.start()
-            run.push([0.0, change["new"], 0.0])
-            status.value = f"pushed with {change['new']:.0f} N for 0.1 s"
 
-    force.observe(pushed, names="value")
-    buttons = [button("run", run.start), button("pause", run.pause), button("reset", run.reset)]
-    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="100%"))
-    return widgets.VBox([picture, force, widgets.HBox([*buttons, status])])
+def _horizontal(force: float, towards: float) -> list[float]:
+    """A force of `force` N, shape (3,), world, towards so many degrees."""
+    angle = math.radians(towards)
+    return [force * math.cos(angle), force * math.sin(angle), 0.0]
+
+
+def _direction(force: float, towards: float) -> str:
+    """Where a push goes, in words where there is a word."""
+    angle = round(towards + (180.0 if force < 0 else 0.0)) % 360
+    words = {0: "forwards", 90: "to the left", 180: "backwards", 270: "to the right"}
+    return words.get(angle, f"towards {angle if angle <= 180 else angle - 360}°")

@@ -10,18 +10,21 @@ import numpy.typing as npt
 
 from floatbase._arrays import positive
 from floatbase.simulation.physics import Push, Simulation
-from floatbase.simulation.rollout import Controller, Rollout, rollout
+from floatbase.simulation.rollout import Actuators, Controller, Rollout, rollout
 
 FRAME = 1.0 / 30.0  # s between pictures, about
+SEEN = 0.4  # s for which a slice still lists a push that is over: a tenth of a second is too short for the eye
 
 
 class Live:
     """Runs `rollout` in slices of a 30th of a second in a thread of its own and hands each slice to `show`.
 
-    show: called with each slice, in that thread. control_period: s. idle: s without a word from outside after which the
-    run pauses by itself, so that a forgotten page costs nothing. A fall or a failed controller pauses it too; `status`
-    says why. Everything that has to do with the simulation happens between slices; no call here waits for physics or
-    pictures.
+    show: called with each slice, in that thread; its `pushes` are those that act and those that ended less than `SEEN` s ago.
+    control_period: s. actuators: as for `rollout`. after_reset: called after each reset, in that thread, to let begin anew
+    what has a memory of its own, as `actuators.reset(…)`. idle: s without a word from outside after which the run pauses by
+    itself, so that a forgotten page costs nothing. A fall or a failed controller pauses it too; `status` says why, and
+    `on_status` tells at once. Everything that has to do with the simulation happens between slices; but for `close`, no call
+    here waits for physics or pictures. While it is paused there is no thread.
     """
 
     def __init__(
@@ -31,31 +34,37 @@ class Live:
         show: Callable[[Rollout], None],
         *,
         control_period: float = 2e-3,
+        actuators: Actuators | None = None,
+        after_reset: Callable[[], None] | None = None,
         idle: float = 120.0,
     ):
         self._sim = sim
         self._show = show
         self._period = positive("control_period", control_period, "s")
         self._frame = max(1, round(FRAME / self._period)) * self._period  # s, a whole number of ticks
+        self._actuators, self._after_reset = actuators, after_reset
         self._idle = positive("idle", idle, "s")
         self._lock = threading.Lock()
-        self._wake = threading.Event()
         self._controller = controller
         self._pushes: tuple[Push, ...] = ()
         self._asked: list[Push] = []
         self._reset = False
-        self._running = False
-        self._closing = False
         self._speed = 1.0
         self._status = "paused"
+        self._told: Callable[[str], None] | None = None
         self.error: Exception | None = None
         self._touched = time.monotonic()
+        self._stop: threading.Event | None = None  # of the present thread; set or None while paused
         self._thread: threading.Thread | None = None
 
     @property
     def status(self) -> str:
-        """ "running", "paused", or why it stopped: "fell", "diverged", "controller failed: …"."""
+        """ "running", "paused", or why it stopped: "fell", "diverged", "controller failed: …", "stopped: …"."""
         return self._status
+
+    def on_status(self, told: Callable[[str], None] | None) -> None:
+        """Call `told(status)` whenever the status changes, in the thread that changed it."""
+        self._told = told
 
     def start(self) -> None:
         """Run, or go on after a pause; a fallen robot is put back on its feet."""
@@ -63,17 +72,21 @@ class Live:
             self._touch()
             if self._status not in ("running", "paused"):
                 self._reset = True
-            self._running, self._status = True, "running"
-            if self._thread is None or not self._thread.is_alive():
-                self._closing = False
-                self._thread = threading.Thread(target=self._loop, name="floatbase-live", daemon=True)
+            if self._stop is None or self._stop.is_set():
+                self._stop = threading.Event()
+                self._thread = threading.Thread(
+                    target=self._loop, args=(self._stop, self._thread), name="floatbase-live", daemon=True
+                )
                 self._thread.start()
-        self._wake.set()
+            changed = self._become("running")
+        self._tell(changed)
 
     def pause(self) -> None:
         """Stop after the present slice; `start` goes on from there."""
         with self._lock:
-            self._running, self._status = False, "paused"
+            self._halt()
+            changed = self._become("paused")
+        self._tell(changed)
 
     def reset(self) -> None:
         """Put the robot back on its feet and run."""
@@ -101,54 +114,80 @@ class Live:
             self._speed = positive("speed", speed)
 
     def close(self) -> None:
-        """End the thread; waits until the present slice is done."""
-        with self._lock:
-            self._running, self._closing, self._status = False, True, "paused"
-            thread = self._thread
-        self._wake.set()
+        """Pause, and wait until the present slice is done and its thread has ended."""
+        self.pause()
+        thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(timeout=5.0)
 
     def _touch(self) -> None:
         self._touched = time.monotonic()
 
-    def _loop(self) -> None:
-        due = time.monotonic()
-        while True:
-            if not self._running:
-                if self._closing:
-                    return
-                self._wake.wait(timeout=1.0)
-                self._wake.clear()
-                due = time.monotonic()
-                continue
-            self._slice()
-            due = max(
-                due + self._frame / self._speed, time.monotonic() - FRAME
-            )  # a slow machine falls behind, it does not race
-            time.sleep(max(0.0, due - time.monotonic()))
+    def _halt(self) -> None:
+        if self._stop is not None:
+            self._stop.set()
 
-    def _slice(self) -> None:
+    def _become(self, status: str) -> bool:
+        """Take a status; whether it is another one."""
+        before, self._status = self._status, status
+        return before != status
+
+    def _tell(self, changed: bool) -> None:
+        """Never under the lock: who is told may well call back."""
+        if changed and self._told is not None:
+            self._told(self._status)
+
+    def _loop(self, stop: threading.Event, before: threading.Thread | None) -> None:
+        """Slice after slice until `stop`, once the thread before has ended."""
+        if before is not None:
+            before.join()
+        due = time.monotonic()
+        while not stop.is_set():
+            self._slice(stop)
+            # a slow machine falls behind, it does not race
+            due = max(due + self._frame / self._speed, time.monotonic() - FRAME)
+            stop.wait(max(0.0, due - time.monotonic()))
+
+    def _slice(self, stop: threading.Event) -> None:
         """One slice of physics and its picture."""
         with self._lock:
             controller, asked, reset = self._controller, self._asked, self._reset
             self._asked, self._reset = [], False
-        if reset:
-            self._sim.reset()
-            self._pushes, asked = (), []
-        now = self._sim.time
-        self._pushes = tuple(p for p in self._pushes if now < p.start + p.duration) + tuple(
-            Push(p.force, now, p.duration, p.frame) for p in asked
-        )
         try:
-            record = rollout(self._sim, controller, self._frame, self._pushes, self._period)
+            if reset:
+                self._start_anew()
+                asked = []
+            record = rollout(self._sim, controller, self._frame, self._with(asked), self._period, self._actuators)
             if len(record):
                 self._show(record)
             outcome = record.outcome if record.error is None else f"{record.outcome}: {record.error}"
         except Exception as error:  # whatever a learner's controller raises must show, or the picture just stands still
             outcome, self.error = f"stopped: {type(error).__name__}: {error}", error
+        self._judge(outcome, stop)
+
+    def _start_anew(self) -> None:
+        self._sim.reset()
+        self._pushes = ()
+        if self._after_reset is not None:
+            self._after_reset()
+
+    def _with(self, asked: list[Push]) -> tuple[Push, ...]:
+        """The pushes of the next slice: those asked for begin now."""
+        now = self._sim.time
+        going_on = tuple(p for p in self._pushes if now < p.start + p.duration + SEEN)
+        self._pushes = going_on + tuple(Push(p.force, now, p.duration, p.frame) for p in asked)
+        return self._pushes
+
+    def _judge(self, outcome: str, stop: threading.Event) -> None:
+        """Go on, or pause for what came out of a slice or because nobody looks."""
         with self._lock:
-            if outcome != "completed" and self._running:
-                self._running, self._status = False, outcome
-            elif self._running and time.monotonic() - self._touched > self._idle:
-                self._running, self._status = False, "paused"
+            changed = False
+            if stop.is_set():  # somebody paused meanwhile, and has said so
+                pass
+            elif outcome != "completed":
+                stop.set()
+                changed = self._become(outcome)
+            elif time.monotonic() - self._touched > self._idle:
+                stop.set()
+                changed = self._become("paused")
+        self._tell(changed)

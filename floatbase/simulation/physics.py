@@ -19,7 +19,7 @@ from floatbase.simulation.conversion import Conversion
 
 _CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
 _GROUND = "ground"
-FALLEN_HEIGHT = 0.4  # part of the base's height over the ground at the last reset
+FALLEN_HEIGHT = 0.4  # a base is down when less is left of its height over the ground at the last reset
 FALLEN_TILT = np.deg2rad(60.0)  # between the base's vertical now and at the last reset
 
 
@@ -122,7 +122,8 @@ class Simulation:
         if not self.robot.is_floating:
             return False
         height, up = self._base_pose()
-        return height < FALLEN_HEIGHT * self._upright[0] or float(up @ self._upright[1]) < np.cos(FALLEN_TILT)
+        sunk = self._upright[0] - height > (1.0 - FALLEN_HEIGHT) * self._stature
+        return sunk or float(up @ self._upright[1]) < np.cos(FALLEN_TILT)
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing upright on the ground's plane by default, at time 0."""
@@ -135,6 +136,7 @@ class Simulation:
         self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
         self._upright = self._base_pose()
+        self._stature = self._base_stature(state)
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
@@ -182,6 +184,12 @@ class Simulation:
         """Height of the base's origin over the ground, m, and its vertical in the world, shape (3,)."""
         vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
         return float(self.ground.normal @ self.data.xpos[self._base]), vertical.copy()
+
+    def _base_stature(self, state: State) -> float:
+        """What a fall is measured by, m: the height of the base at a reset; of a base that begins on the ground or below it,
+        how far the centre of mass is from it."""
+        height = self._upright[0]
+        return height if height > 1e-3 else float(np.linalg.norm(state.com - self.data.xpos[self._base]))
 
     def _apply(self, push: Push) -> None:
         """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,9 @@ import umsgpack
 from floatbase._arrays import Array
 from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture
+
+if TYPE_CHECKING:
+    from floatbase.simulation.rollout import Rollout
 
 REPETITIONS = 10_000  # meshcat's default is 1, after which a picture falls back to its start
 _SMOOTH, _STEP = 2301, 2300  # three.js: linear and discrete interpolation
@@ -69,6 +72,15 @@ def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
     t = np.asarray(times, dtype=np.float64)
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
     return np.unique(np.clip(np.searchsorted(t, ticks - 1e-9), 0, len(t) - 1))
+
+
+def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] | None:
+    """Frame and force of the push that acts at a row of a record, or that ended less than `seen` s before; the newest one."""
+    now = float(rollout.time[row])
+    for push in sorted(rollout.pushes, key=lambda push: push.start, reverse=True):
+        if push.acts_at(now) or 0.0 <= now - push.start < push.duration + seen - 1e-9:
+            return push.frame, push.force
+    return None
 
 
 def _courses(pictures: list[Picture]) -> dict[str, _Course]:

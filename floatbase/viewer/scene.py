@@ -172,7 +172,7 @@ class Viewer:
                 rollout.contacts,
                 rollout.measured[i],
                 rollout.planned[i] if planned and np.isfinite(rollout.planned[i]).all() else None,
-                com=com, cones=cones, support=support, ghost=ghost, push=_push_at(rollout, i),
+                com=com, cones=cones, support=support, ghost=ghost, push=recording.push_at(rollout, i),
             )
             for i in rows
         ]  # fmt: skip
@@ -274,11 +274,3 @@ class Viewer:
         own = {"push": self.painter.text}
         items = [[hexadecimal(own.get(kind, colour)), text] for kind, colour, text in LEGEND if kind in kinds]
         self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
-
-
-def _push_at(rollout: Rollout, row: int) -> tuple[str, npt.ArrayLike] | None:
-    """Frame and force of the push that acts at a row of a record."""
-    for push in rollout.pushes:
-        if push.acts_at(float(rollout.time[row])):
-            return push.frame, push.force
-    return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.simulation.live import Live
+from floatbase.simulation.live import SEEN, Live
+from floatbase.viewer.recording import push_at
 
 ROBOT = judges.load("go2")
 CONTROLLER = fb.WholeBodyController(ROBOT, fb.Contacts.points(ROBOT), fb.standing_tasks(ROBOT.standing()))
@@ -76,3 +78,95 @@ def test_pushes_asked_for_before_a_reset_are_forgotten(run: Live, slices: list[f
     run.reset()
     until(lambda: len(slices) > 3)
     assert all(not s.pushes for s in slices[:3])
+
+
+def threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "floatbase-live"]
+
+
+def test_a_pause_ends_the_thread_and_a_close_has_ended_it(run: Live, slices: list[fb.Rollout]) -> None:
+    before = len(threads())
+    run.start()
+    until(lambda: len(slices) > 0)
+    run.pause()
+    until(lambda: len(threads()) == before)
+    run.start()
+    run.close()
+    assert len(threads()) == before
+
+
+def test_it_runs_after_a_start_that_crosses_a_close(run: Live, slices: list[fb.Rollout]) -> None:
+    for _ in range(50):
+        run.start()
+        closing = threading.Thread(target=run.close)
+        closing.start()
+        run.start()
+        closing.join()
+        if run.status == "running":
+            count = len(slices)
+            until(lambda count=count: len(slices) > count)  # type: ignore[misc]
+        run.close()
+        assert run.status == "paused"
+    assert all(late.time[0] > early.time[-1] for early, late in zip(slices, slices[1:], strict=False))  # one thread at a time
+
+
+def test_a_status_is_told_as_it_comes(run: Live, slices: list[fb.Rollout]) -> None:
+    told: list[str] = []
+    run.on_status(told.append)
+    run.start()
+    run.start()
+    until(lambda: len(slices) > 0)
+    run.pause()
+    run.push([0.0, 500.0, -200.0], duration=0.3)
+    run.start()
+    until(lambda: run.status == "fell")
+    assert told == ["running", "paused", "running", "fell"]
+
+
+def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
+    run = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append, idle=0.2)
+    run.start()
+    until(lambda: run.status == "paused")
+    assert slices
+    run.close()
+
+
+def test_a_push_is_on_record_until_it_has_been_seen(run: Live, slices: list[fb.Rollout]) -> None:
+    run.push([0.0, 20.0, 0.0], duration=0.1)
+    run.start()
+    until(lambda: bool(slices) and slices[-1].time[-1] > 1.0)
+    run.pause()
+    shown = [(s.time[-1], push_at(s, -1, SEEN)) for s in slices]
+    assert {push is not None for t, push in shown if t < 0.1 + SEEN - 0.01} == {True}
+    assert {push is not None for t, push in shown if t > 0.1 + SEEN + 0.01} == {False}
+    assert not any(push_at(s, -1) for s in slices if s.time[-1] > 0.1)
+
+
+def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.Rollout]) -> None:
+    class Delay:
+        """Gives the torques asked for a step ago."""
+
+        def __init__(self) -> None:
+            self.reset()
+
+        def reset(self) -> None:
+            self.last = CONTROLLER(ROBOT.standing().q, np.zeros(ROBOT.nv)).tau
+            self.steps, self.resets = 0, getattr(self, "resets", -1) + 1
+
+        def step(self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+            self.last, now = tau_desired, self.last
+            self.steps += 1
+            return now
+
+    delay = Delay()
+    run = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append, actuators=delay, after_reset=delay.reset)
+    run.start()
+    until(lambda: len(slices) > 3)
+    run.pause()
+    run.close()
+    assert delay.steps == sum(len(s) for s in slices) * 2  # steps of the physics, two for each tick
+    asked = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])
+    np.testing.assert_allclose(slices[1].tau[0], asked, atol=1e-9)
+    run.reset()
+    until(lambda: delay.resets == 1)
+    run.close()

@@ -11,6 +11,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.errors import InfeasibleError
+from floatbase.lessons.lesson01 import unbolted
 from floatbase.robots.state import State
 
 
@@ -49,6 +50,20 @@ def test_forces_that_a_controller_does_not_give_are_not_numbers_but_are_measured
     assert np.all(np.isnan(record.planned))
     assert record.contacts.point_names == sim.point_names
     assert record.measured[:5].reshape(5, 4, 3)[:, :, 2].sum() > 0
+
+
+def test_a_base_that_begins_at_height_zero_falls_only_when_it_sinks() -> None:
+    arm = unbolted(judges.load("ur5"))
+    q = arm.standing().q.copy()
+    q[2] = 0.0
+    sim = fb.Simulation(arm)
+    sim.reset(fb.State(arm, q))
+    sim.step(np.zeros(arm.d))
+    assert sim.q[2] < 0.0
+    assert not sim.fallen
+    sim.data.qpos[2] = -1.0
+    sim.step(np.zeros(arm.d))
+    assert sim.fallen
 
 
 def test_a_robot_that_stands_on_its_back_has_fallen(sim: fb.Simulation) -> None:

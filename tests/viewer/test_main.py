@@ -8,9 +8,11 @@ import sys
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
-from floatbase.__main__ import Playground, main
+from floatbase import Contacts, Simulation, WholeBodyController, standing_tasks
+from floatbase.__main__ import PERIODS, Pace, Playground, control_period, main
 from floatbase.robots import Robot, load, robots
 
 from .looks import picture
@@ -49,7 +51,7 @@ def playground(go2: Robot) -> Iterator[Playground]:
 
 def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) -> None:
     page.goto(playground.view.url)
-    page.wait_for_function("window.viewer && viewer.gui_controllers['push left']")
+    page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
 
     def moved(axis: int, target: float) -> bool:
         """Whether the centre of mass comes within 1 cm of where it should."""
@@ -84,6 +86,54 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
             break
     assert "measured/FR_foot" in playground.view.canvas.picture
     assert "measured/FL_foot" not in playground.view.canvas.picture
+
+
+def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
+    page.goto(playground.view.url)
+    page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
+    page.evaluate("viewer.gui_controllers['push towards [°]'].setValue(-90)")
+    page.evaluate("viewer.gui_controllers['push [N]'].setValue(40)")
+    page.evaluate("viewer.gui_controllers['push'].fire()")
+    drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
+    page.wait_for_function(f"{drawn}.children.length > 0")
+    arrow = page.evaluate(f"{drawn}.matrix.elements.slice(8, 11)")
+    np.testing.assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
+    picture(page, "bare_page_pushed")
+    page.wait_for_function(f"{drawn}.children.length == 0")
+    page.evaluate("viewer.gui_controllers['push [N]'].setValue(1e9)")
+    for _ in range(40):  # until it is down
+        page.evaluate("viewer.gui_controllers['push'].fire()")
+        page.wait_for_timeout(100)
+        if playground.run.status == "fell":
+            break
+    page.wait_for_function("document.getElementById('title').textContent.includes('fell: press reset')")
+    page.evaluate("viewer.gui_controllers['reset'].fire()")
+    page.wait_for_function("!document.getElementById('title').textContent.includes('fell')")
+    assert playground.run.status == "running"
+
+
+def test_the_pace_is_simulated_time_over_time() -> None:
+    now = [0.0]
+    pace = Pace(lambda: now[0])
+    for i in range(101):
+        now[0] = 0.03 * i
+        told = pace.at(0.5 * now[0])
+        assert (told is None) == (now[0] <= 0.5)
+    assert told == pytest.approx(0.5)
+    now[0] += 60.0  # a pause
+    assert pace.at(2.0) is None
+    now[0] += 0.6
+    assert pace.at(2.6) == pytest.approx(1.0)
+    assert pace.at(0.0) is None  # a reset
+
+
+def test_the_control_period_leaves_room_and_the_robot_where_it_stood(go2: Robot) -> None:
+    sim = Simulation(go2)
+    controller = WholeBodyController(go2, Contacts.points(go2), standing_tasks(go2.standing()))
+    assert control_period(sim, controller, share=1e9) == PERIODS[0]
+    assert control_period(sim, controller, share=1e-9) == PERIODS[-1]
+    assert sim.time == 0.0
+    np.testing.assert_allclose(sim.q, go2.standing().q)
 
 
 @pytest.mark.parametrize("name", ["ur5", "talos"])
