@@ -13,6 +13,7 @@ function startViewer() {
     set_follow: camera.follow,
     set_title: (command) => { part("title").textContent = command.text; },
     set_legend: (command) => { part("legend").replaceChildren(...command.items.map(legendLine)); },
+    set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
     set_theme: (command) => { document.body.className = command.name; },
     set_animation: (command) => { meshcat(command); player.load(command); },
     set_control: (command) => { meshcat(command); viewer.gui.open(); },
@@ -106,14 +107,77 @@ function apply(frame) {
   }
 }
 
+// A browser gives its pages 16 WebGL contexts together. So a page in a frame starts when it is first seen, and while it is out
+// of sight it gives its context back and leaves a still image; changed(seen) is called whenever that changes.
+function onSight(changed) {
+  if (window.top === window) return changed(true);
+  new IntersectionObserver((entries) => changed(entries.at(-1).isIntersecting)).observe(document.documentElement);
+}
+
+const REST_AFTER = 1000;  // ms out of sight
+
+function startRest(viewer) {
+  const canvas = viewer.renderer.domElement, pane = part("meshcat-pane");
+  let seen = true, resting = false, waiting = [], timer = 0;
+  const later = () => {
+    clearTimeout(timer);
+    if (!seen) timer = setTimeout(rest, REST_AFTER);
+  };
+  function rest() {
+    pane.style.backgroundImage = `url(${viewer.capture_image()})`;
+    canvas.style.visibility = "hidden";
+    resting = true;
+    viewer.renderer.forceContextLoss();
+  }
+  function wake() {
+    if (resting) setTimeout(() => viewer.renderer.forceContextRestore());
+    resting = false;
+  }
+  canvas.addEventListener("webglcontextrestored", () => {
+    viewer.render();
+    canvas.style.visibility = "";
+    pane.style.backgroundImage = "";
+    waiting.splice(0).forEach((go) => go());
+  });
+  viewer.resting = () => resting;
+  return {
+    sight(now) {
+      seen = now;
+      if (seen) wake();
+      later();
+    },
+    awake: () => new Promise((go) => {
+      if (!viewer.renderer.getContext().isContextLost()) return go();
+      waiting.push(go);
+      wake();
+      later();
+    }),
+  };
+}
+
+// Call start() once, when the page is first seen, and look after its context from then on.
+function startWhenSeen(start) {
+  let rest = null;
+  onSight((seen) => {
+    if (rest === null && seen) {
+      window.viewer = startViewer();
+      rest = startRest(viewer);
+      start(rest);
+    }
+    if (rest !== null) rest.sight(seen);
+  });
+}
+
 // The live page: follow a window, and come back by itself when the window does.
-function follow() {
-  const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket`);
+function follow(rest) {
+  const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket${location.search}`);
   socket.binaryType = "arraybuffer";
   viewer.connection = socket;
-  socket.onmessage = (message) => {
+  part("kept").querySelector("button").onclick = () => socket.send('{"type": "live"}');
+  socket.onmessage = async (message) => {
     if (typeof message.data == "string") {
       const asked = JSON.parse(message.data);
+      await rest.awake();
       viewer.set_3d_pane_size();
       socket.send(JSON.stringify({type: "image", id: asked.id, data: viewer.capture_image()}));
     } else {
@@ -145,8 +209,10 @@ async function open() {
   const script = document.createElement("script");
   script.textContent = new TextDecoder().decode(await unpack("viewer-code"));
   document.body.appendChild(script);
-  window.viewer = startViewer();
-  apply(await unpack("scene"));
-  viewer.num_messages_received++;
-  viewer.set_3d_pane_size();
+  const scene = await unpack("scene");
+  startWhenSeen(() => {
+    apply(scene);
+    viewer.num_messages_received++;
+    viewer.set_3d_pane_size();
+  });
 }

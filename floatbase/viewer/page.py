@@ -20,6 +20,8 @@ _BODY = """
 <div><div id="meshcat-pane"></div></div>
 <div id="title"></div><div id="legend"></div>
 <div id="notice">The viewer is closed. This page comes back when it is opened again.</div>
+<div id="kept" title="This viewer is displayed again further down and live there.">kept picture ·
+<button>make live</button></div>
 <div id="player"><button title="play or pause">▶</button><input type="range" min="0" step="0.001" title="time">
 <output></output><select title="speed"><option value="1">1×</option><option value="0.5">½×</option>
 <option value="0.25">¼×</option><option value="0.1">⅒×</option></select></div>
@@ -38,7 +40,7 @@ def viewer_code() -> bytes:
 @cache
 def live_page() -> str:
     """The page that a window serves."""
-    start = "var viewer = startViewer(); follow();"
+    start = "window.MeshCat ? startWhenSeen(follow) : comeBack();"  # the window may close while the page loads
     return _page(f'<script src="main.min.js"></script><script>{_own("page.js")}{start}</script>', "floatbase")
 
 

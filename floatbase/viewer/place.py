@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 
 # set by JupyterHub and Binder, Codespaces, VS Code on another machine, Deepnote, Kaggle, SageMaker, and by ssh
 SIGNS = (
@@ -22,3 +24,20 @@ def kernel_is_remote() -> bool:
     if asked in ("live", "static"):
         return asked == "static"
     return "google.colab" in sys.modules or any(os.environ.get(sign) for sign in SIGNS)
+
+
+def before_each_cell(call: Callable[[], None]) -> Callable[[], None]:
+    """Call this before each cell of the notebook runs; outside of IPython never. Returns what ends it."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if shell is None:
+        return lambda: None
+
+    def run(_: object) -> None:
+        call()
+
+    def end() -> None:
+        with suppress(ValueError):  # the shell has forgotten it already
+            shell.events.unregister("pre_run_cell", run)
+
+    shell.events.register("pre_run_cell", run)
+    return end

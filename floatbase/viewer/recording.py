@@ -62,11 +62,6 @@ def animate(
     return Animation({path: course.item for path, course in courses.items()}, command, float(t[-1]))
 
 
-def no_animation() -> wire.Update:
-    """The command that ends an animation and puts everything back where it was before."""
-    return wire.encode({"type": "set_animation", "path": "", "animations": [], "options": {"play": False}})
-
-
 def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
     """Rows of a record to draw, `rate` a second: the first, the last, and those nearest to the ticks between."""
     t = np.asarray(times, dtype=np.float64)

@@ -48,7 +48,8 @@ class Viewer:
     Raises `InputError` for arguments that cannot be, and `ViewerError` when the port is taken.
 
     In a notebook a viewer as the last line of a cell shows itself: the live page, or, where the kernel is on another machine
-    and its page cannot be reached, the scene as it is now. Elsewhere open `viewer.url` in a browser.
+    and its page cannot be reached, the scene as it is now. Elsewhere open `viewer.url` in a browser. Displayed again further
+    down, a viewer is live there, and the picture above is kept as it was: an interactive part gets a `Viewer` of its own.
     """
 
     def __init__(
@@ -135,7 +136,7 @@ class Viewer:
     def draw(self, picture: Picture, title: str | None = None) -> None:
         """Draw a picture, from `painter.picture` or your own items, and nothing else."""
         if self._moving:
-            self.window.put([recording.no_animation()])
+            self.window.put([wire.no_animation()])
             self._moving = False
         self.canvas.draw(picture)
         self._caption(picture, title)
@@ -246,7 +247,8 @@ class Viewer:
         frame = f'title="{self.robot.name}" style="width: 100%; height: {self.height}px; border: 0; border-radius: 6px"'
         if kernel_is_remote() or not self.window.is_open:
             return f'<iframe srcdoc="{html.escape(self.static_html())}" {frame}></iframe>'
-        return f'<iframe src="{self.url}" {frame}></iframe>' + _PROBE.replace("URL", self.url)
+        address = self.window.open_display()
+        return f'<iframe src="{address}" {frame}></iframe>' + _PROBE.replace("URL", address)
 
     def __repr__(self) -> str:
         return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"

@@ -29,6 +29,8 @@ import tornado.websocket
 
 from floatbase.errors import ViewerError
 from floatbase.viewer import page, wire
+from floatbase.viewer.displays import Displays
+from floatbase.viewer.place import before_each_cell
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -58,7 +60,7 @@ class Window:
     def __init__(self, port: int = 0):
         self.scene = wire.Scene()
         self._server = _Server(self.scene, _listen(port))
-        self._closer = weakref.finalize(self, self._server.stop)
+        self._closer = weakref.finalize(self, _both, self._server.stop, before_each_cell(self._server.displays.mark))
 
     @property
     def port(self) -> int:
@@ -69,6 +71,12 @@ class Window:
     def web_url(self) -> str:
         """Address of the page."""
         return f"http://{ADDRESS}:{self.port}/"
+
+    def open_display(self) -> str:
+        """Address of a page for a notebook's output: live until the next one opens, then it keeps the picture it had."""
+        number = self._server.displays.open()
+        self._server.keep()
+        return f"{self.web_url}?display={number}"
 
     @property
     def browsers(self) -> int:
@@ -112,9 +120,10 @@ class Window:
         return page.file_page(self.scene.lasting())
 
     def get_image(self, timeout: float = 10.0) -> Image:
-        """A picture of the page that connected last, as a PIL image.
+        """A picture of the live page that connected last, as a PIL image.
 
-        Raises `ViewerError` at once when no page is connected, and after `timeout` s when the page does not answer.
+        Raises `ViewerError` at once when no page is connected or all keep earlier pictures, and after `timeout` s when the
+        page does not answer.
         """
         from PIL import Image
 
@@ -143,6 +152,11 @@ class Window:
         return f"Window({self.web_url}, {'open' if self.is_open else 'closed'})"
 
 
+def _both(first: Callable[[], None], second: Callable[[], None]) -> None:
+    first()
+    second()
+
+
 def _listen(port: int) -> list[socket.socket]:
     """Sockets on the loopback address."""
     if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port < 65536:
@@ -162,6 +176,7 @@ class _Server:
     def __init__(self, scene: wire.Scene, sockets: list[socket.socket]):
         self.scene = scene
         self.port: int = sockets[0].getsockname()[1]
+        self.displays = Displays(scene)
         self.clients: list[_Socket] = []
         self.on_control: Callable[[str, Any], None] | None = None
         self._sockets = sockets
@@ -181,6 +196,10 @@ class _Server:
         elif self._asked <= self._sent:
             self._call(self.flush)
             self._asked = number  # after the call: an interrupt between the two costs a wake-up too many, not one too few
+
+    def keep(self) -> None:
+        """Let the pages of earlier displays keep their pictures."""
+        self._call(self._keep)
 
     def capture(self) -> Future[str]:
         """Ask the last page for a picture, as a data URL."""
@@ -231,11 +250,19 @@ class _Server:
         self._sent = max(self.scene.newest, self._asked)
         for client in list(self.clients):
             client.next_frame()
-        self.scene.seen_by_all = min((client.seen for client in self.clients), default=self.scene.newest)
+        seen = (client.seen for client in self.clients if client.scene is self.scene)
+        self.scene.seen_by_all = min(seen, default=self.scene.newest)
+
+    def _keep(self) -> None:
+        for client in list(self.clients):
+            client.keep()
 
     def _capture(self, answer: Future[str]) -> None:
-        if self.clients:
-            self.clients[-1].ask_picture(answer)
+        live = [client for client in self.clients if client.wanted is self.scene]
+        if live:
+            live[-1].ask_picture(answer)
+        elif self.clients:
+            answer.set_exception(ViewerError("every open page keeps an earlier picture; press 'make live' in one of them."))
         else:
             answer.set_exception(ViewerError("the browser closed before the picture was taken; open it again."))
 
@@ -268,15 +295,29 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
 
     def initialize(self, server: _Server) -> None:
         self.server = server
+        self.scene = self.wanted = server.scene
         self.seen = 0
+        self._display = 0
         self._busy_since: float | None = None
         self._requests: list[str] = []
         self._pictures: dict[int, Future[str]] = {}
 
     def open(self, *_: str, **__: str) -> None:
         self.set_nodelay(True)
+        number = self.get_query_argument("display", "")
+        self._display = int(number) if number.isdecimal() else 0
         self.server.clients.append(self)
+        kept = self.server.displays.kept(self._display)
+        if kept is not None:
+            self.scene = wire.Scene()  # so that the first frame is the whole of the kept one
+            self.wanted = kept
         self.next_frame()
+
+    def keep(self) -> None:
+        """Keep the picture that this page's display had, if a newer one has opened and the reader has not asked otherwise."""
+        if self.wanted is self.server.scene:
+            self.wanted = self.server.displays.kept(self._display) or self.wanted
+            self.next_frame()
 
     def on_close(self) -> None:
         if self in self.server.clients:
@@ -289,6 +330,9 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
         if answer.get("type") == "done":
             self._busy_since = None
             self.server.flush()
+        elif answer.get("type") == "live":
+            self._display, self.wanted = 0, self.server.scene
+            self.next_frame()
         elif answer.get("type") == "image" and answer.get("id") in self._pictures:
             self._pictures.pop(answer["id"]).set_result(answer["data"])
         elif answer.get("type") == "control" and self.server.on_control is not None:
@@ -311,13 +355,21 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
             if now - self._busy_since > PATIENCE:
                 self.close(1008, "the page does not read")
             return
-        newest, commands = self.server.scene.since(self.seen)
+        newest, commands = self._news()
         if commands:
             self._busy_since, self.seen = now, newest
             self._write(wire.frame(commands), binary=True)
         for request in self._requests:
             self._write(request, binary=False)
         self._requests.clear()
+
+    def _news(self) -> tuple[int, list[bytes]]:
+        """Number of the newest change, and what the page has to be told to show it."""
+        if self.scene is self.wanted:
+            return self.scene.since(self.seen)
+        before, self.scene = self.scene, self.wanted
+        told = wire.page_command("set_kept", kept=self.scene is not self.server.scene)[1]
+        return self.scene.newest, [*self.scene.instead_of(before), told]
 
     def _write(self, message: bytes | str, binary: bool) -> None:
         """Hand a message to the connection; when the page has gone, `on_close` tidies up."""

@@ -25,9 +25,10 @@ Update = tuple[Key, bytes]
 # meshcat's commands, and those that our page adds
 STORED = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "set_control", "delete_control",
-    "set_camera", "set_follow", "set_title", "set_legend", "set_theme",
+    "set_camera", "set_follow", "set_title", "set_legend", "set_theme", "set_kept",
 )  # fmt: skip
 
+_ANIMATION: Key = ("/", "set_animation", "")
 _FLOAT32 = np.dtype([("code", "u1"), ("value", ">f4")])  # MessagePack: the byte 0xca, then a big-endian float
 
 
@@ -75,8 +76,13 @@ def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> 
 
 
 def page_command(kind: str, **values: Any) -> Update:
-    """One of our page's own commands that belong to no object: set_title, set_legend, set_follow, set_theme."""
+    """One of our page's own commands that belong to no object: set_title, set_legend, set_follow, set_theme, set_kept."""
     return encode({"type": kind, "path": "", **values})
+
+
+def no_animation() -> Update:
+    """The command that ends an animation and puts everything back where it was before."""
+    return encode({"type": "set_animation", "path": "", "animations": [], "options": {"play": False}})
 
 
 def set_control(name: str, **range_of_values: float) -> Update:
@@ -132,6 +138,29 @@ class Scene:
             newest = self.newest
             entries = [entry for entry in self._entries.values() if entry[0] > number]
         return newest, [command for _, command in sorted(entries)]
+
+    def copy(self) -> Scene:
+        """The scene as it is now, which later changes leave alone; the commands themselves are shared."""
+        other = Scene()
+        with self._lock:
+            other.newest, other._entries = self.newest, dict(self._entries)
+        return other
+
+    def instead_of(self, shown: Scene) -> list[bytes]:
+        """The commands that lead a page from another scene to this one: settings only where they differ, so that the
+        reader's own view stays, and everything that is drawn."""
+        with shown._lock:
+            old = dict(shown._entries)
+        with self._lock:
+            entries = sorted((number, key, command) for key, (number, command) in self._entries.items())
+        commands = [delete("/meshcat")[1]]
+        if _ANIMATION in old and _ANIMATION not in self._entries:
+            commands.append(no_animation()[1])
+        for _, key, command in entries:
+            setting = not key[0].startswith("/meshcat") and key != _ANIMATION
+            if not _is_gone(key) and not (setting and key in old and old[key][1] == command):
+                commands.append(command)
+        return commands
 
     def commands(self) -> dict[Key, dict[str, Any]]:
         """The scene as decoded commands: what tests and exports read."""

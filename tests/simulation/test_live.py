@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import judges
 import numpy as np
@@ -107,7 +108,7 @@ def test_it_runs_after_a_start_that_crosses_a_close(run: Live, slices: list[fb.R
             until(lambda count=count: len(slices) > count)  # type: ignore[misc]
         run.close()
         assert run.status == "paused"
-    assert all(late.time[0] > early.time[-1] for early, late in zip(slices, slices[1:], strict=False))  # one thread at a time
+    assert all(late.time[0] > early.time[-1] for early, late in pairwise(slices))  # one thread at a time
 
 
 def test_a_status_is_told_as_it_comes(run: Live, slices: list[fb.Rollout]) -> None:

@@ -157,12 +157,12 @@ def test_a_remote_kernel_shows_the_scene_itself(
     for name in place.SIGNS:
         monkeypatch.delenv(name, raising=False)
     viewer.show(standing)
-    assert f'src="{viewer.url}"' in viewer._repr_html_()
+    assert f'src="{viewer.url}?display=' in viewer._repr_html_()
     monkeypatch.setenv(sign, "yes")
     shown = viewer._repr_html_()
     assert "srcdoc=" in shown and viewer.url not in shown
     monkeypatch.setenv("FLOATBASE_VIEWER", "live")
-    assert f'src="{viewer.url}"' in viewer._repr_html_()
+    assert f'src="{viewer.url}?display=' in viewer._repr_html_()
 
 
 def test_a_saved_animation_plays_from_disk_without_network(page, viewer: Viewer, go2: Robot, tmp_path: Path) -> None:

@@ -263,7 +263,7 @@ def test_every_robot_is_shown_from_every_side(name: str) -> None:
 
 
 def test_a_notebook_shows_the_live_page(viewer: Viewer) -> None:
-    assert f'<iframe src="{viewer.url}"' in viewer._repr_html_()
+    assert f'<iframe src="{viewer.url}?display=1"' in viewer._repr_html_()
     viewer.close()
     assert "closed" in viewer._repr_html_()
     assert "closed" in repr(viewer)

@@ -50,9 +50,11 @@ def in_a_loop(coroutine: Coroutine[Any, Any, Any]) -> Any:
         return pool.submit(asyncio.run, coroutine).result()
 
 
-async def connect(window: Window, origin: str | None = None) -> tornado.websocket.WebSocketClientConnection:
+async def connect(
+    window: Window, origin: str | None = None, display: int | str = ""
+) -> tornado.websocket.WebSocketClientConnection:
     headers = {} if origin is None else {"Origin": origin}
-    url = window.web_url.replace("http", "ws") + "socket"
+    url = window.web_url.replace("http", "ws") + f"socket?display={display}"
     return await tornado.websocket.websocket_connect(tornado.httpclient.HTTPRequest(url, headers=headers))
 
 
