@@ -1,0 +1,146 @@
+"""The problems on which floatbase and its C++ peers are compared: one optimum, in words that each of them has.
+
+Common to all: keep standing on all feet (centre of mass, base orientation, posture, with the gains and weights of
+`fb.standing_tasks`), four friction facets |f_x|, |f_y| ≤ μ f_z, no pull, torque limits. What the peers cannot say, the
+problem does without:
+
+- contacts are at the foot frames themselves, not at the balls' lowest points; normals point up;
+- the peers' friction pyramids touch the cone from outside (`inside=False`) and turn with a flat foot, so Talos' soles are level
+  and straight in every state, as they are on level ground;
+- TSID (from Python) has no torque regularisation, and for flat feet only one of the foot's wrench rather than of the corner
+  forces. It adds 1e-8 to the diagonal of its Hessian: that is a force regularisation, and on flat feet the only one;
+- placo's flat feet are a force at each corner there too: points without weight carry the forces, the foot's frame keeps still.
+  Its own flat foot carries a wrench without a limit to the moment about the normal; that is an easier problem, measured apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import floatbase as fb
+
+ROBOTS = ("go2", "solo12", "talos")
+SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
+MU = 0.7
+HESSIAN = 1e-8  # DEFAULT_HESSIAN_REGULARIZATION of TSID
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """Weights of ‖λ‖² and ‖τ‖², as the peer is told and as the same optimum needs them in floatbase."""
+
+    peer_force: float
+    peer_torque: float
+    hessian: float
+    force: float
+    torque: float
+
+
+REGULARISATION = {
+    ("tsid", "points"): Regularisation(1e-5, 0.0, HESSIAN, 1e-5 + HESSIAN, 0.0),
+    ("tsid", "flat"): Regularisation(0.0, 0.0, HESSIAN, HESSIAN, 0.0),
+    ("placo", "points"): Regularisation(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
+    ("placo", "flat"): Regularisation(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
+    ("placo planar", "flat"): Regularisation(0.0, 1e-3, 1e-13, 1e-11, 1e-3),
+}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One robot's problem as one peer can state it."""
+
+    robot: fb.robots.Robot
+    peer: str
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the feet are flat."""
+        return all(foot.is_flat for foot in self.robot.feet)
+
+    @property
+    def regularisation(self) -> Regularisation:
+        """Weights of forces and torques."""
+        return REGULARISATION[self.peer, "flat" if self.is_flat else "points"]
+
+    @property
+    def contacts(self) -> fb.Contacts:
+        """All feet."""
+        return (fb.Contacts.flat_feet if self.is_flat else fb.Contacts.points)(self.robot, mu=MU)
+
+    @property
+    def tasks(self) -> tuple[Any, ...]:
+        """Standing, and what regularises."""
+        weights = self.regularisation
+        return (
+            *fb.standing_tasks(self.robot.standing()),
+            fb.ForceTask(weight=weights.force),
+            fb.TorqueTask(weight=weights.torque),
+        )
+
+    def controller(self, path: str) -> fb.WholeBodyController:
+        """floatbase's answer to it."""
+        return fb.WholeBodyController(self.robot, self.contacts, self.tasks, facets=4, inside=False, path=path)
+
+    def states(self, label: str, n: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Random configurations and velocities, the same ones every time."""
+        found = [self.robot.random_state(seed, SPREADS[label]) for seed in range(n)]
+        return [(level_soles(self.robot, s.q) if self.is_flat else np.array(s.q), np.array(s.v)) for s in found]
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """The problem in numbers and names, for a process without floatbase."""
+        robot, (com, base, posture) = self.robot, self.tasks[:3]
+        return {
+            "robot": robot.name,
+            "peer": self.peer,
+            "urdf": str(robot.urdf),
+            "joints": list(robot.joint_names),
+            "armature": robot.model.armature[6:].tolist(),
+            "torque_limits": robot.torque_limits.tolist(),
+            "base": robot.base,
+            "com": _told(com, com.position),
+            "orientation": _told(base, base.rotation),
+            "posture": _told(posture, np.asarray(posture.q)[7:]),
+            "force_weight": self.regularisation.peer_force,
+            "hessian": self.regularisation.hessian,
+            "torque_weight": self.regularisation.peer_torque,
+            "contacts": [
+                {"frame": foot.frame, "mu": MU, "corners": _plain(foot.corners), "planar": self.peer == "placo planar"}
+                for foot in robot.feet
+            ],
+        }
+
+
+def _plain(array: Any) -> Any:
+    return None if array is None else np.asarray(array).tolist()
+
+
+def _told(task: Any, target: Any) -> dict[str, Any]:
+    return {"target": _plain(target), "kp": task.kp, "kd": task.kd, "weight": task.weight}
+
+
+@lru_cache
+def problem(robot: str, peer: str) -> Problem:
+    """The problem of that name. Point feet are taken without their balls: they touch at their frames."""
+    feet = fb.load(robot).feet
+    return Problem(fb.load(robot, feet=[foot if foot.is_flat else foot.frame for foot in feet]), peer)
+
+
+def level_soles(robot: fb.robots.Robot, q: np.ndarray) -> np.ndarray:
+    """q with its leg joints changed until every foot's frame is that of the world: Newton's method with least steps."""
+    model, data, q = robot.model, robot.model.createData(), np.array(q)
+    frames = [robot.frame_id(foot.frame) for foot in robot.feet]
+    for _ in range(50):
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        error = np.concatenate([pin.log3(data.oMf[frame].rotation) for frame in frames])
+        if np.max(np.abs(error)) < 1e-14:
+            break
+        J = np.vstack([pin.getFrameJacobian(model, data, frame, pin.LOCAL)[3:, 6:] for frame in frames])
+        q = pin.integrate(model, q, np.concatenate([np.zeros(6), -np.linalg.pinv(J) @ error]))
+    return q

@@ -1,0 +1,83 @@
+"""TSID's side of the comparison: `peers.py` starts it in TSID's environment. What is said here is said in TSID's own words.
+
+Contacts are motion constraints without gains (J q̈ = -J̇ q̇); forces are regularised alike along all axes (by default the normal
+counts a thousandth) and may be as large as they like.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import tsid
+from peer_wire import Contender, serve
+
+HARD, SOFT = 0, 1  # priority levels
+NO_LIMIT = 1e6  # N
+
+
+def build(description: dict) -> Contender:
+    """The formulation and solver of a problem."""
+    model = pin.buildModelFromUrdf(description["urdf"], pin.JointModelFreeFlyer())
+    if list(model.names)[2:] != description["joints"]:
+        raise SystemExit(f"TSID orders the joints as {list(model.names)[2:]}, the problem as {description['joints']}.")
+    model.armature = np.concatenate([np.zeros(6), description["armature"]])
+    robot = tsid.RobotWrapper(model, tsid.RootJointType.FLOATING_BASE_SYSTEM, False)
+    formulation = tsid.InverseDynamicsFormulationAccForce("standing", robot, False)
+    formulation.computeProblemData(0.0, pin.neutral(model), np.zeros(model.nv))
+    kept = [_add_contact(formulation, robot, contact, description["force_weight"]) for contact in description["contacts"]]
+    kept += [*_add_tasks(formulation, robot, description), robot]
+    solver = tsid.SolverHQuadProgFast("solver")
+    solver.resize(formulation.nVar, formulation.nEq, formulation.nIn)
+
+    def tick(q, v, kept=kept):  # TSID only points at its tasks and robot: keep them
+        solution = solver.solve(formulation.computeProblemData(0.0, q, v))
+        return formulation.getActuatorForces(solution) if solution.status == 0 else None
+
+    stages = {
+        "computeProblemData": lambda q, v: formulation.computeProblemData(0.0, q, v),
+        "solve": solver.solve,
+        "getActuatorForces": formulation.getActuatorForces,
+    }
+    return Contender(tick, stages)
+
+
+def _add_contact(formulation, robot, contact: dict, force_weight: float):
+    frame, normal = contact["frame"], np.array([0.0, 0.0, 1.0])
+    if contact["corners"] is None:
+        made = tsid.ContactPoint(frame, robot, frame, normal, contact["mu"], 0.0, NO_LIMIT)
+        made.useLocalFrame(False)
+        size = 3
+        made.setRegularizationTaskWeightVector(np.ones(size))
+    else:
+        made = tsid.Contact6d(frame, robot, frame, np.array(contact["corners"]).T, normal, contact["mu"], 0.0, NO_LIMIT)
+        size = 6
+    made.setKp(np.zeros(size))
+    made.setKd(np.zeros(size))
+    made.setReference(pin.SE3.Identity())
+    formulation.addRigidContact(made, force_weight)
+    return made
+
+
+def _add_tasks(formulation, robot, description: dict) -> list:
+    com = tsid.TaskComEquality("com", robot)
+    base = tsid.TaskSE3Equality("orientation", robot, description["base"])
+    base.setMask(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]))
+    posture = tsid.TaskJointPosture("posture", robot)
+    wanted = {kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")}
+    wanted["orientation"] = np.concatenate([np.zeros(3), wanted["orientation"].ravel(order="F")])  # place, then columns
+    for task, kind, size in ((com, "com", 3), (base, "orientation", 6), (posture, "posture", robot.na)):
+        task.setKp(description[kind]["kp"] * np.ones(size))
+        task.setKd(description[kind]["kd"] * np.ones(size))
+        sample = tsid.TrajectorySample(wanted[kind].size, size)
+        sample.value(wanted[kind])
+        task.setReference(sample)
+        formulation.addMotionTask(task, description[kind]["weight"], SOFT, 0.0)
+    limits = np.array(description["torque_limits"])
+    bounds = tsid.TaskActuationBounds("torque limits", robot)
+    bounds.setBounds(-limits, limits)
+    formulation.addActuationTask(bounds, 1.0, HARD, 0.0)
+    return [com, base, posture, bounds]
+
+
+if __name__ == "__main__":
+    serve(build)

@@ -1,0 +1,116 @@
+"""How `peers.py` talks with the processes that it compares, each in an environment of its own; needs numpy alone.
+
+An order is a line of JSON on the standard input of a process, the answer a line on its standard output:
+
+    {"problem": {…}}                 build the problem that `peer_problems.Problem.description` describes
+    {"states": {label: [[q, v], …]}} keep these states
+    {"torques": label}               the torques at each of them, null where the solver found none
+    {"clock": label}                 the time of each tick, µs
+    {"stages": label}                the median time of each stage of the tick, µs
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One way to solve a problem.
+
+    tick: q, v -> torques [N·m], or None where the solver found none. stages: the tick in pieces, by name; the first takes q and
+    v, each other what the one before it gave.
+    """
+
+    tick: Callable[[np.ndarray, np.ndarray], np.ndarray | None]
+    stages: Mapping[str, Callable[..., Any]]
+
+
+def serve(build: Callable[[dict[str, Any]], Contender]) -> None:
+    """Answer orders until there are no more."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what C++ libraries print is no answer
+    contender: Contender | None = None
+    states: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for line in sys.stdin:
+        ((order, what),) = json.loads(line).items()
+        answer: Any = "done"
+        if order == "problem":
+            contender = build(what)
+        elif order == "states":
+            states = {label: [(np.array(q), np.array(v)) for q, v in rows] for label, rows in what.items()}
+        else:
+            assert contender is not None, "the problem comes first"
+            answer = {"torques": _torques, "clock": _clock, "stages": _stages}[order](contender, states[what])
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
+
+
+def _torques(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[list[float] | None]:
+    found = [contender.tick(q, v) for q, v in states]
+    return [None if tau is None else np.asarray(tau).tolist() for tau in found]
+
+
+def _clock(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[float]:
+    times, tick, now = [], contender.tick, time.perf_counter_ns
+    for q, v in states:
+        start = now()
+        tick(q, v)
+        times.append(1e-3 * (now() - start))
+    return times
+
+
+def _stages(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> dict[str, float]:
+    times = np.empty((len(states), len(contender.stages)))
+    for row, (q, v) in zip(times, states, strict=True):
+        given: tuple[Any, ...] = (q, v)
+        for i, stage in enumerate(contender.stages.values()):
+            start = time.perf_counter_ns()
+            given = (stage(*given),)
+            row[i] = 1e-3 * (time.perf_counter_ns() - start)
+    return dict(zip(contender.stages, np.median(times, axis=0).tolist(), strict=True))
+
+
+class Process:
+    """A contender in a process of its own: `script` served by the `python` of its environment."""
+
+    def __init__(self, python: Path, script: Path, arguments: Sequence[str] = (), paths: Sequence[Path] = ()):
+        quiet = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(map(str, paths))}
+        self.name = script.stem
+        self.process = subprocess.Popen(
+            [str(python), str(script), *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | quiet,
+        )
+
+    def ask(self, order: str, what: Any) -> Any:
+        """The answer to one order. Raises `RuntimeError` with what the process said when it ended instead."""
+        assert self.process.stdin is not None and self.process.stdout is not None
+        try:
+            self.process.stdin.write(json.dumps({order: what}) + "\n")
+            self.process.stdin.flush()
+            line = self.process.stdout.readline()
+        except BrokenPipeError:
+            line = ""
+        if not line:
+            said = self.process.communicate()[1] or "nothing"
+            raise RuntimeError(f"{self.name} ended with code {self.process.returncode}. It said: {said[-2000:]}")
+        return json.loads(line)
+
+    def close(self) -> None:
+        """End the process."""
+        if self.process.poll() is None:
+            self.process.communicate()

@@ -1,0 +1,245 @@
+"""floatbase's tick against TSID and placo, the C++ libraries one would bind to otherwise: torques first, then times.
+
+    python benchmarks/peers.py                  makes what is missing, compares, measures -> benchmarks/peers.md, peers.png
+    python benchmarks/peers.py --env FOLDER     where the peers' environments are kept; build/peers by default
+    python benchmarks/peers.py --peers placo    only these
+
+Each library runs in a process of its own, in its own environment, through its own Python binding, on the same states; blocks of
+ticks take turns, so that a busy moment of the machine meets both. `peer_problems.py` says how the problems are made the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import peer_problems
+from peer_environments import MissingError, python_of, versions
+from peer_problems import ROBOTS, SPREADS
+from peer_wire import Process
+from tick import machine
+
+from floatbase.control import controller
+
+HERE = Path(__file__).parent
+TOLERANCE = 1e-4  # N·m, by which torques may differ for the optimum to count as one; the peers' solvers leave some 1e-5
+PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
+SIDES = {"tsid": "peer_tsid.py", "placo": "peer_placo.py", "placo planar": "peer_placo.py"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One robot, one peer, one kind of states: differences of the torques in N·m for each state, times in µs."""
+
+    robot: str
+    peer: str
+    label: str
+    states: int
+    unanswered: tuple[int, int]
+    differences: np.ndarray
+    ours: np.ndarray
+    theirs: np.ndarray
+    ratios: np.ndarray
+    stages: dict[str, float]
+
+    @property
+    def difference(self) -> float:
+        """The largest, N·m; infinite where there is none."""
+        return float(np.max(self.differences)) if self.states else np.inf
+
+    @property
+    def is_same(self) -> bool:
+        """Whether the torques agree, so that times can be compared."""
+        return self.difference <= TOLERANCE
+
+    @property
+    def ratio(self) -> float:
+        """Our median over theirs."""
+        return float(np.median(self.ours) / np.median(self.theirs))
+
+
+def compare(pair: Sequence[Process], robot: str, peer: str, n: int, rounds: int) -> Iterator[Row]:
+    """Rows of one robot and one peer."""
+    problem = peer_problems.problem(robot, peer)
+    everything = {label: [(q.tolist(), v.tolist()) for q, v in problem.states(label, n)] for label in SPREADS}
+    for process in pair:
+        process.ask("problem", problem.description)
+        process.ask("states", everything)
+    found = {label: [process.ask("torques", label) for process in pair] for label in SPREADS}
+    kept = {label: [i for i, both in enumerate(zip(*found[label], strict=True)) if None not in both] for label in SPREADS}
+    for process in pair:
+        process.ask("states", {label: [everything[label][i] for i in kept[label]] for label in SPREADS})
+    for label in SPREADS:
+        ours, theirs = ([np.array(torques[i]) for i in kept[label]] for torques in found[label])
+        unanswered = tuple(sum(tau is None for tau in torques) for torques in found[label])
+        times = np.array([[process.ask("clock", label) for process in pair] for _ in range(rounds)])
+        medians = np.median(times, axis=2)
+        yield Row(
+            robot,
+            peer,
+            label,
+            len(kept[label]),
+            unanswered,
+            np.array([np.max(np.abs(one - other)) for one, other in zip(ours, theirs, strict=True)]),
+            times[:, 0].ravel(),
+            times[:, 1].ravel(),
+            medians[:, 0] / medians[:, 1],
+            pair[1].ask("stages", label),
+        )
+
+
+def ours(path: str) -> Process:
+    """floatbase, in the environment that runs this."""
+    return Process(Path(sys.executable), HERE / "peer_ours.py", [path], [HERE.parent])
+
+
+def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
+    """Every row of one peer."""
+    names = [name for name in SIDES if name.split()[0] == peer]
+    for name, robot in [(which, robot) for which in names for robot in (ROBOTS if which == peer else ("talos",))]:
+        pair = [ours("compiled"), Process(python, HERE / SIDES[name])]
+        yield from compare(pair, robot, name, n, rounds)
+        for process in pair:
+            process.close()
+
+
+def without_numba(python: Path, n: int) -> Iterator[tuple[str, Row]]:
+    """The paths that need no compiler, on go2 against TSID."""
+    for path in get_args(controller.Path):
+        if path not in ("auto", "compiled"):
+            pair = [ours(path), Process(python, HERE / SIDES["tsid"])]
+            for row in compare(pair, "go2", "tsid", n, 3):
+                yield path, row
+            for process in pair:
+                process.close()
+
+
+# results -------------------------------------------------------------------------------------------------------------------
+
+
+def torque_table(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| robot | peer | states | compared | without answer: floatbase, peer | largest difference of a torque |"
+    yield "|---|---|---|---|---|---|"
+    for row in rows:
+        missing = " and ".join(map(str, row.unanswered))
+        yield f"| {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | {row.difference:.1e} N·m |"
+
+
+def time_table(rows: Sequence[Row], name: str = "floatbase") -> Iterator[str]:
+    yield f"| robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio of medians | of blocks |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for row in rows:
+        numbers = " | ".join(f"{x:.1f} µs" for x in (*np.percentile(row.ours, [50, 99]), *np.percentile(row.theirs, [50, 99])))
+        low, high = np.percentile(row.ratios, [10, 90])
+        yield f"| {row.robot} | {row.peer} | {row.label} | {numbers} | **{row.ratio:.2f}** | {low:.2f} to {high:.2f} |"
+
+
+def stage_table(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| robot | peer | states | where its time goes |"
+    yield "|---|---|---|---|"
+    for row in rows:
+        parts = ", ".join(f"{name} {spent:.1f} µs" for name, spent in row.stages.items())
+        yield f"| {row.robot} | {row.peer} | {row.label} | {parts} |"
+
+
+def plot(rows: Sequence[Row]) -> None:
+    """Median ticks side by side."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    peers = list(dict.fromkeys(row.peer for row in rows))
+    figure, axes = plt.subplots(1, len(peers), figsize=(5.5 * len(peers), 3.6), constrained_layout=True, squeeze=False)
+    for ax, peer in zip(axes[0], peers, strict=True):
+        mine = [row for row in rows if row.peer == peer]
+        at = np.arange(len(mine))
+        ax.bar(at - 0.2, [np.median(row.theirs) for row in mine], 0.4, label=peer, color="0.65")
+        bars = ax.bar(at + 0.2, [np.median(row.ours) for row in mine], 0.4, label="floatbase", color="tab:blue")
+        ax.bar_label(bars, [f"{row.ratio:.2f} ×" for row in mine], fontsize=8, padding=2)
+        ax.set_xticks(at, [f"{row.robot}\n{row.label}" for row in mine], fontsize=8)
+        ax.set(ylabel="median tick, µs", title=f"same torques, against {peer}")
+        ax.legend(frameon=False)
+        ax.spines[["top", "right"]].set_visible(False)
+    figure.savefig(HERE / "peers.png", dpi=120)
+
+
+INTRODUCTION = """\
+Ratios are to be trusted, microseconds to be taken with salt. Every tick goes from q and v to torques, in Python, through each
+library's own binding: `computeProblemData`, `solve` and `getActuatorForces` for TSID, `update_kinematics` and `solve` for
+placo, `controller(q, v)` for floatbase. The peers are the packages of PyPI, compiled for any processor of their kind; numba
+compiles floatbase's kernel for this one."""
+
+
+def report(rows: list[Row], plain: list[tuple[str, Row]], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
+    """The text of peers.md."""
+    equal = [row for row in rows if row.peer != "placo planar"]
+    same, other = [row for row in equal if row.is_same], [row for row in equal if not row.is_same]
+    peers = "; ".join(f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items())
+    lines = ["# The tick against C++ peers, measured", "", f"`python benchmarks/peers.py` on {machine()}. {peers}.", ""]
+    lines += [f"**Not measured: {why}**\n" for why in lacking]
+    lines += [INTRODUCTION, ""]
+    lines += ["## The same optimum", "", (peer_problems.__doc__ or "").strip(), "", *torque_table(equal), ""]
+    lines += [f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}.\n" for row in other]
+    lines += ["## Times", "", *time_table(same), ""]
+    for path in dict.fromkeys(path for path, _ in plain):
+        chosen = [row for which, row in plain if which == path and row.is_same]
+        lines += [f"Without numba, `path={path!r}`:", "", *time_table(chosen, path), ""]
+    lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(same), ""]
+    planar = [row for row in rows if row.peer == "placo planar"]
+    if planar:
+        lines += ["## An easier problem", "", *planar_section(planar), ""]
+    return "\n".join(lines)
+
+
+def planar_section(rows: Sequence[Row]) -> Iterator[str]:
+    """placo's own flat foot, which floatbase has no equal to."""
+    yield (
+        "placo's own flat foot carries six numbers instead of twelve, and has no limit to the moment about its normal: it "
+        "answers an easier problem. Where friction at the corners can give its wrenches, its torques are those of floatbase."
+    )
+    yield ""
+    for row in rows:
+        agree, largest = int(np.sum(row.differences <= TOLERANCE)), f"the largest difference is {row.difference:.1f} N·m"
+        yield f"- {row.label}: {agree} of {row.states} states have the same torques; {largest}."
+    yield ""
+    yield from time_table(rows)
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("--env", type=Path, default=HERE.parent / "build" / "peers", help="folder of the peers' environments")
+    ask.add_argument("--peers", nargs="+", choices=PACKAGES, default=list(PACKAGES))
+    ask.add_argument("--states", type=int, default=300, help="random states for each row")
+    ask.add_argument("--rounds", type=int, default=20, help="turns that each side takes")
+    options = ask.parse_args()
+    rows: list[Row] = []
+    plain: list[tuple[str, Row]] = []
+    used: dict[str, dict[str, str]] = {}
+    lacking: list[str] = []
+    for peer in options.peers:
+        try:
+            python = python_of(peer, options.env.resolve())
+            used[peer] = versions(python, PACKAGES[peer])
+            for row in measure(peer, python, options.states, options.rounds):
+                print(f"{row.robot} {row.peer} {row.label}: {row.difference:.1e} N·m, {row.ratio:.2f} ×", flush=True)
+                rows.append(row)
+            plain += without_numba(python, options.states // 6) if peer == "tsid" else []
+        except (MissingError, RuntimeError) as error:
+            lacking.append(f"{peer}. {error}")
+            print(f"No {peer}: {error}", flush=True)
+    text = report(rows, plain, used, lacking)
+    (HERE / "peers.md").write_text(text, encoding="utf-8")
+    if rows:
+        plot([row for row in rows if row.is_same])
+    print(text)
+    raise SystemExit(1 if lacking else 0)
+
+
+if __name__ == "__main__":
+    main()
