@@ -1,6 +1,7 @@
 """Make the pictures of `assets/pictures/`: `python assets/build_pictures.py [name …]`. Needs playwright and a Chromium.
 
-The document's figures, every robot of the catalogue with its forces and friction cones, and go2 on four-sided cones.
+The document's figures, every robot of the catalogue with its forces and friction cones, go2 on four-sided cones, and
+the feet of talos.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ SCENES: dict[str, Callable[[], Viewer]] = {
     **FIGURES,
     **{name: partial(standing, name) for name in fb.robots()},
     "go2_facets": partial(standing, "go2", 4),
+    "talos_feet": lambda: standing("talos").camera("feet"),
 }
 
 

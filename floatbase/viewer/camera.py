@@ -14,14 +14,15 @@ class View:
     """A direction to look from.
 
     azimuth: degrees around the vertical, 0 in front of the robot (+x), 90 at its left (+y). elevation: degrees above the
-    ground. distance: 1 fills the picture with the robot. angle: vertical field of view, degrees. around: a point, m, world, and
-    a radius, m, to fill the picture with instead of the robot.
+    ground. distance: 1 fills the picture with the robot. angle: vertical field of view, degrees. feet: fill it with the
+    robot's feet instead. around: a point, m, world, and a radius, m, to fill it with instead of the robot.
     """
 
     azimuth: float = 40.0
     elevation: float = 18.0
     distance: float = 1.0
     angle: float = 32.0
+    feet: bool = False
     around: tuple[tuple[float, float, float], float] | None = None
 
 
@@ -32,7 +33,7 @@ PRESETS = {
     "left": View(90.0, 8.0),
     "right": View(-90.0, 8.0),
     "top": View(0.0, 89.0),
-    "feet": View(40.0, 6.0, 0.75),
+    "feet": View(25.0, 12.0, feet=True),
 }
 
 

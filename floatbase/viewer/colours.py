@@ -1,7 +1,7 @@
 """The one colour code, in 3-D and in plots: colour-blind safe (Okabe and Ito), RGB from 0 to 1.
 
 Dark blue is what was measured, light blue what was planned. A friction cone is green while its force is inside, orange when
-a facet or the cone's surface is reached, and vermilion when the force is outside.
+a facet or the cone's surface is reached, vermilion when the force is outside, and a faint grey where there is no force.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ COM = _rgb("#AA3377")
 CALM = _rgb("#009E73")
 WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
+IDLE = _rgb("#8A8F98")
 SUPPORT = CALM  # veiled, on the ground
 PUSH = _rgb("#222222")  # on a dark background, the colour of its text
 LIMIT = _rgb("#888888")
@@ -32,6 +33,8 @@ X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")
 Z_AXIS = _rgb("#0072B2")
 
+GHOST_NAME = "wanted posture"  # unless it is called something else
+
 # part of a picture, its colour, and what it is: the legend, in this order
 LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("measured", MEASURED, "measured force"),
@@ -42,12 +45,14 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("cone", CALM, "friction cone: force inside"),
     ("cone", WARNING, "friction cone: surface reached"),
     ("cone", ALARM, "friction cone: force outside"),
+    ("idle cone", IDLE, "friction cone: no force"),
     ("support", SUPPORT, "support region"),
-    ("ghost", GHOST, "wanted posture"),
+    ("ghost", GHOST, GHOST_NAME),
 )
 
-# cone status -> colour, in the order of growing worry
-CONE = {"inside": CALM, "active": WARNING, "outside": ALARM}
+# cone status -> colour, in the order of growing worry; and how opaque
+CONE = {"idle": IDLE, "inside": CALM, "active": WARNING, "outside": ALARM}
+CONE_ALPHA = {"idle": 0.12, "inside": 0.28, "active": 0.28, "outside": 0.28}
 
 # background -> (top, bottom) of the page, colour of the ground's lines, colour of text
 BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from floatbase.viewer import geometry, three
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
+from floatbase.viewer.ground import LEVEL, Plane
 from floatbase.viewer.shapes import Item, Picture, arrow, flat_polygon, label, placed
 from floatbase.viewer.three import Shape
 
@@ -40,8 +41,8 @@ def push(position: npt.ArrayLike, vector: npt.ArrayLike, size: float, colour: RG
     return arrow(np.asarray(position) - np.asarray(vector), vector, colour, size, through=True)
 
 
-def support_region(positions: npt.ArrayLike, height: float) -> Picture:
-    """The convex hull of contact points, shape (n, 3), seen from above, laid on the ground at `height` m.
+def support_region(positions: npt.ArrayLike, lift: float, ground: Plane = LEVEL) -> Picture:
+    """The convex hull of contact points, shape (n, 3), seen from above, laid on the ground, `lift` m over it.
 
     Fewer than three points, or points on a line, have no region: nothing is drawn.
     """
@@ -52,8 +53,8 @@ def support_region(positions: npt.ArrayLike, height: float) -> Picture:
         corners = points[:0]
     if not len(corners):
         return {}
-    flat = np.hstack([np.round(corners, 3), np.zeros((len(corners), 1))])
-    return {"": Item(flat_polygon(flat, CALM, 0.22), placed([0.0, 0.0, height]))}
+    flat = np.round([[*corner, ground.height(corner)] for corner in corners], 3)
+    return {"": Item(flat_polygon(flat, CALM, 0.22), placed([0.0, 0.0, lift]))}
 
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:

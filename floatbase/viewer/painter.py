@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
 from floatbase._arrays import Array, checked
-from floatbase.control.friction import FrictionPolyhedron, tangents
+from floatbase.control.friction import FrictionPolyhedron
 from floatbase.dynamics.contacts import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.robots.robot import Robot
@@ -20,10 +20,11 @@ from floatbase.robots.state import State
 from floatbase.viewer import marks, shapes, three
 from floatbase.viewer.colours import GHOST, MEASURED, PLANNED, RGB
 from floatbase.viewer.cones import cone_status, polyhedron_status
+from floatbase.viewer.ground import LEVEL, Plane, plane_under
 from floatbase.viewer.meshes import JointMesh, robot_meshes
 from floatbase.viewer.shapes import Item, Picture
 
-CORNER_RADIUS = 0.65  # of a cone at a corner of a flat foot, over the distance to the next corner
+CORNER_RADIUS = 0.48  # of a cone at a corner of a flat foot, over the distance to the next corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +50,14 @@ class Painter:
     """Draws a robot.
 
     scale: m drawn for a newton; None for one that fits the robot. facets, inside: of the friction polyhedra; None for round
-    cones. ground: (3,), unit normal of the ground through the origin. lines, text: colours of the ground's lines and of text.
+    cones. ground: None for the one that the contacts stand on. lines, text: colours of the ground's lines and of text.
     """
 
     robot: Robot
     asked_scale: float | None
     facets: int | None
     inside: bool
-    ground: Array
+    ground: Plane | None
     lines: RGB
     text: RGB
 
@@ -80,15 +81,16 @@ class Painter:
         """Everything that was asked for, as path -> item; the arguments are those of `Viewer.show`."""
         self._check_state(state)
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
-        picture = self.stage() | self._robot(state, "robot", self._shapes)
+        ground = self._ground(state, contacts)
+        picture = {"ground": ground.lines(self.lines)} | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
             picture |= self._contacts(state, contacts, both, cones)
             if support:
-                picture |= below("support", marks.support_region(contacts.positions(state), 0.004 * self.size))
+                picture |= below("support", marks.support_region(contacts.positions(state), 0.004 * self.size, ground))
             if labels:
                 picture |= self._labels(state, contacts)
         if com:
-            picture |= below("com", shapes.centre_of_mass(state.com, self._ground_below(state.com), self.size))
+            picture |= below("com", shapes.centre_of_mass(state.com, ground.height(state.com), self.size))
         if wrench is not None:
             picture |= self._wrench(state, wrench)
         if push is not None:
@@ -100,20 +102,20 @@ class Painter:
             pose = state.frame_pose(frame).homogeneous
             picture |= below(f"frame/{plain(frame)}", marks.frame_axes(pose, 0.25 * self.size, frame))
         if any(path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench") for path in picture):
-            picture |= self._scale_bar
+            picture |= self._scale_bar(ground)
         return picture | dict(extra or {})
 
     def with_facets(self, facets: int | None) -> Painter:
         """The same with other friction polyhedra; what was computed for the robot is kept."""
         other = replace(self, facets=facets)
-        for name in ("home", "box", "size", "scale", "_meshes", "_shapes", "_ghosts", "_scale_bar"):
+        for name in ("home", "box", "feet_box", "size", "scale", "_meshes", "_shapes", "_ghosts", "_scale_bars"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
         return other
 
     def stage(self) -> Picture:
         """The ground alone."""
-        return {"ground": self._ground}
+        return {"ground": (self.ground or LEVEL).lines(self.lines)}
 
     @cached_property
     def home(self) -> State:
@@ -127,6 +129,17 @@ class Painter:
         points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in self._meshes]
         together = np.vstack(points)
         return np.min(together, axis=0), np.max(together, axis=0)
+
+    @cached_property
+    def feet_box(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of a box around the feet and what they stand in, m, world; a robot without feet is all
+        feet."""
+        feet = [(foot, self.home.frame_pose(foot.frame)) for foot in self.robot.feet]
+        points = [pose.act(p) for foot, pose in feet for p in ([foot.centre] if foot.corners is None else foot.corners)]
+        if not points:
+            return self.box
+        around = 0.2 * self.size * np.array([1.0, 1.0, 0.0])
+        return np.min(points, axis=0) - around, np.max(points, axis=0) + around + [0.0, 0.0, 0.35 * self.size]
 
     @cached_property
     def size(self) -> float:
@@ -188,13 +201,13 @@ class Painter:
         return picture
 
     def _cone(self, position: Array, normal: Array, mu: float, height: float, force: Array | None) -> Picture:
-        """A cone or polyhedron in the colour that the force gives it."""
+        """A cone or polyhedron in the colour that the force gives it; where there is none, it stands there grey and faint."""
         judged = None if force is None or self._is_quiet(force) else force
         if self.facets is None:
-            status = "inside" if judged is None else cone_status(judged, normal, mu)
+            status = "idle" if judged is None else cone_status(judged, normal, mu)
             return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
         polyhedron = FrictionPolyhedron(normal, mu, self.facets, self.inside)
-        status, active = ("inside", []) if judged is None else polyhedron_status(judged, polyhedron)
+        status, active = ("idle", []) if judged is None else polyhedron_status(judged, polyhedron)
         status = "inside" if status == "active" else status  # the facets that are reached light up instead
         return shapes.friction_polyhedron(position, polyhedron, height, status, active)
 
@@ -227,25 +240,30 @@ class Painter:
     def _patch_radius(self) -> float:
         return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
 
+    def _scale_bar(self, ground: Plane) -> Picture:
+        if ground not in self._scale_bars:
+            self._scale_bars[ground] = self._scale_bar_on(ground)
+        return self._scale_bars[ground]
+
     @cached_property
-    def _scale_bar(self) -> Picture:
-        """A bar for a round force of about a quarter of the weight, on the ground to the left of the robot, and behind a tall
-        one, whose picture shows less of the ground in front."""
+    def _scale_bars(self) -> dict[Plane, Picture]:
+        return {}
+
+    def _scale_bar_on(self, ground: Plane) -> Picture:
+        """A bar for a round force of about a quarter of the weight, on the ground to the left of the feet, and behind a tall
+        robot, whose picture shows less of the ground in front."""
         force = nice(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
         start = min(low[0], 0.5 * (low[0] + high[0] - length) - 0.5 * self.size)
-        at = [start, 0.5 * (low[1] + high[1]) + 0.65 * self.size, 0.01 * self.size]
+        at = np.array([start, self.feet_box[1][1] + 0.12 * self.size, 0.0])
+        at[2] = ground.height(at + [0.5 * length, 0.0, 0.0]) + 0.01 * self.size
         return below("scale", shapes.scale_bar(at, force, length, self.size, self.text))
 
-    @cached_property
-    def _ground(self) -> Item:
-        t1, t2 = tangents(self.ground)
-        return Item(shapes.ground(self.lines).shape, shapes.placed(np.zeros(3), np.stack([t1, t2, self.ground], axis=1)))
-
-    def _ground_below(self, point: Array) -> float:
-        """Height of the ground below a point, m."""
-        return -float(self.ground[:2] @ point[:2] / self.ground[2])
+    def _ground(self, state: State, contacts: Contacts | None) -> Plane:
+        if self.ground is not None or contacts is None:
+            return self.ground or LEVEL
+        return plane_under(contacts.normals, contacts.positions(state))
 
     def _check_state(self, state: Any) -> None:
         if not isinstance(state, State):
@@ -255,6 +273,12 @@ class Painter:
                 f"this viewer shows {self.robot.name}, but the state is one of {state.robot.name}; "
                 "make a Viewer for that robot."
             )
+
+
+def kinds(picture: Picture) -> set[str]:
+    """What a picture shows, in the words of `LEGEND`: the first part of every path; a cone without force is an "idle cone"."""
+    idle = shapes.cone_colour("idle")
+    return {"idle cone" if item.colour == idle else path.split("/")[0] for path, item in picture.items()}
 
 
 def nice(value: float) -> float:

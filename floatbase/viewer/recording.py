@@ -114,6 +114,7 @@ def _tracks(course: _Course, t: Array) -> Iterator[dict[str, Any]]:
         yield {"name": ".visible", "type": "bool", "times": t.tolist(), "values": course.present.tolist()}
     if course.colours is not None:
         yield from _track("shape.material.color", "color", t, course.colours[:, :3], _STEP)
+        yield from _track("shape.material.opacity", "number", t, course.colours[:, 3:], _STEP)
 
 
 def _track(name: str, kind: str, t: Array, values: Array, interpolation: int = _SMOOTH) -> Iterator[dict[str, Any]]:

@@ -19,8 +19,9 @@ from floatbase.robots.state import State
 from floatbase.viewer import page, recording, wire
 from floatbase.viewer.camera import PRESETS, View, eye_and_target
 from floatbase.viewer.canvas import ROOT, Canvas
-from floatbase.viewer.colours import BACKGROUNDS, LEGEND, hexadecimal
-from floatbase.viewer.painter import Painter
+from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, hexadecimal
+from floatbase.viewer.ground import STEEPEST, Plane
+from floatbase.viewer.painter import Painter, kinds
 from floatbase.viewer.place import kernel_is_remote
 from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.window import Window
@@ -44,7 +45,8 @@ class Viewer:
     height: of the picture in a notebook, pixels. background: "white", "light" or "dark". scale: metres drawn for a newton,
     shared by forces and cones; by default such that the robot's weight is about twice as long as its centre of mass is high.
     facets: draw friction cones as polyhedra with so many facets; None for round cones. inside: see `FrictionPolyhedron`.
-    ground: (3,), world, normal of the ground, a plane through the origin. port: of the window; a free one by default.
+    ground: (3,), world, normal of the ground, a plane through the origin; by default the plane that the contacts stand on, when
+    they share a normal, else level. port: of the window; a free one by default.
     Raises `InputError` for arguments that cannot be, and `ViewerError` when the port is taken.
 
     In a notebook a viewer as the last line of a cell shows itself: the live page, or, where the kernel is on another machine
@@ -61,7 +63,7 @@ class Viewer:
         scale: float | None = None,
         facets: int | None = None,
         inside: bool = True,
-        ground: npt.ArrayLike = UP,
+        ground: npt.ArrayLike | None = None,
         port: int = 0,
     ):
         if not isinstance(robot, Robot):
@@ -74,7 +76,7 @@ class Viewer:
         self.height = int(positive("height", height, "pixels"))
         asked = None if scale is None else positive("scale", scale, "m/N")
         lines, text = BACKGROUNDS[background][2:]
-        self.painter = Painter(robot, asked, facets, inside, unit_vector("ground", ground), lines, text)
+        self.painter = Painter(robot, asked, facets, inside, _plane(ground), lines, text)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
         self._moving = False
@@ -109,6 +111,7 @@ class Viewer:
         labels: bool = False,
         extra: Mapping[str, Item] | None = None,
         title: str | None = None,
+        ghost_name: str = GHOST_NAME,
     ) -> Viewer:
         """Draw this and nothing else; drawing the same again sends nothing.
 
@@ -117,8 +120,9 @@ class Viewer:
         com: the centre of mass and its projection on the ground. support: the region that the contact points span.
         wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world; the moment's ring has the radius that the
         force would have which makes it at a lever as long as the robot's half diagonal. push: frame and force, (3,), N, world.
-        ghost: another state of the robot, drawn as a veil. frames: names of frames to draw. labels: names of the contacts.
-        extra: more items by path, from `floatbase.viewer.shapes`, `marks` or `props`. title: a line in the corner.
+        ghost: another state of the robot, drawn as a veil; the legend calls it ghost_name. frames: names of frames to draw.
+        labels: names of the contacts. extra: more items by path, from `floatbase.viewer.shapes`, `marks` or `props`. title: a
+        line in the corner.
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
         `ViewerError` when the window is closed.
         """
@@ -126,20 +130,20 @@ class Viewer:
             state, contacts, forces, planned, com=com, cones=cones, support=support, wrench=wrench, push=push,
             ghost=ghost, frames=frames, labels=labels, extra=extra,
         )  # fmt: skip
-        self.draw(picture, title)
+        self.draw(picture, title, ghost_name)
         if self._last is None:
             self._last = state
             self.camera()
         self._last = state
         return self
 
-    def draw(self, picture: Picture, title: str | None = None) -> None:
+    def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
         """Draw a picture, from `painter.picture` or your own items, and nothing else."""
         if self._moving:
             self.window.put([wire.no_animation()])
             self._moving = False
         self.canvas.draw(picture)
-        self._caption(picture, title)
+        self._caption(kinds(picture), title, ghost_name)
 
     def play(
         self,
@@ -155,12 +159,13 @@ class Viewer:
         follow: bool = True,
         paused: bool = False,
         title: str | None = None,
+        ghost_name: str = GHOST_NAME,
     ) -> Viewer:
         """Play a record in the page, over and over, with a slider to seek and a choice of speeds; this call returns at once.
 
         speed: 1 for real time, 0.25 for slow motion. rate: pictures a second of the record. planned: the planned forces
-        too. com, cones, support, ghost: as for `show`. follow: the camera goes with the robot. paused: wait for the reader
-        to press play. Raises `InputError` for a record of another robot or without rows.
+        too. com, cones, support, ghost, ghost_name: as for `show`. follow: the camera goes with the robot. paused: wait for
+        the reader to press play. Raises `InputError` for a record of another robot or without rows.
         """
         if rollout.robot.name != self.robot.name:
             raise InputError(f"this viewer shows {self.robot.name}, but the record is one of {rollout.robot.name}.")
@@ -177,17 +182,18 @@ class Viewer:
             )
             for i in rows
         ]  # fmt: skip
-        self.play_pictures(rollout.time[rows], pictures, speed=speed, paused=paused, title=title)
+        self.play_pictures(rollout.time[rows], pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name)
         self._last = State(self.robot, rollout.q[rows[0]], rollout.v[rows[0]])
         return self.camera(follow=follow)
 
     def play_pictures(
         self, times: npt.ArrayLike, pictures: Sequence[Picture], *, speed: float = 1.0, paused: bool = False,
-        title: str | None = None,
+        title: str | None = None, ghost_name: str = GHOST_NAME,
     ) -> Viewer:  # fmt: skip
         """Play pictures, from `painter.picture` or your own items, picture i from times[i], s, on."""
         moving = recording.animate(times, pictures, ROOT, positive("speed", speed), paused)
         self.draw(moving.first, title)
+        self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name)
         self.window.put([moving.command])
         self._moving = True
         return self
@@ -201,7 +207,7 @@ class Viewer:
             if view not in PRESETS:
                 raise InputError(f"camera view is {view!r}; it must be one of {', '.join(PRESETS)}, or a View.")
             view = PRESETS[view]
-        low, high = self.painter.box
+        low, high = self.painter.feet_box if view.feet else self.painter.box
         moved = np.zeros(3)
         if self._last is not None:
             moved[:2] = self._last.com[:2] - self.painter.home.com[:2]
@@ -270,9 +276,22 @@ class Viewer:
             wire.page_command("set_theme", name=background),
         )
 
-    def _caption(self, picture: Picture, title: str | None) -> None:
+    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
         """Title, and what the colours in the picture mean."""
-        kinds = {path.split("/")[0] for path in picture}
         own = {"push": self.painter.text}
-        items = [[hexadecimal(own.get(kind, colour)), text] for kind, colour, text in LEGEND if kind in kinds]
+        items = [
+            [hexadecimal(own.get(kind, colour)), ghost_name if kind == "ghost" else text]
+            for kind, colour, text in LEGEND
+            if kind in shown
+        ]
         self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
+
+
+def _plane(ground: npt.ArrayLike | None) -> Plane | None:
+    """The plane through the origin with this normal."""
+    if ground is None:
+        return None
+    x, y, z = (float(c) for c in unit_vector("ground", ground))
+    if z < STEEPEST:
+        raise InputError(f"ground is {[x, y, z]}; the normal of the ground must point up, not along it or down.")
+    return Plane((x, y, z))

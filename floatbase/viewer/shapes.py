@@ -15,10 +15,9 @@ import numpy.typing as npt
 from floatbase._arrays import Array, read_only
 from floatbase.control.friction import FrictionPolyhedron, tangents
 from floatbase.viewer import geometry, three
-from floatbase.viewer.colours import COM, CONE, PATCH, RGB, RGBA, WARNING, with_alpha
+from floatbase.viewer.colours import COM, CONE, CONE_ALPHA, PATCH, RGB, RGBA, WARNING, with_alpha
 from floatbase.viewer.three import Shape
 
-CONE_ALPHA = 0.28
 FACET_ALPHA = 0.75
 ARROW_SLENDERNESS = 0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
 ARROW_LENGTH = 0.2  # m
@@ -63,12 +62,15 @@ def arrow(
 def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str) -> Item:
     """(28) The cone ‖f_tangent‖ ≤ μ f_normal, up to the normal force that `height` m stand for.
 
-    status: "inside", "active" or "outside", which gives the colour.
+    status: "idle" (no force), "inside", "active" or "outside", which gives the colour.
     """
-    rotation = _surface_frame(normal)
-    return Item(
-        _unit_cone(), placed(position, rotation, (mu * height, mu * height, height)), with_alpha(CONE[status], CONE_ALPHA)
-    )
+    matrix = placed(position, _surface_frame(normal), (mu * height, mu * height, height))
+    return Item(_unit_cone(), matrix, cone_colour(status))
+
+
+def cone_colour(status: str) -> RGBA:
+    """The colour that a cone of this status is drawn with."""
+    return with_alpha(CONE[status], CONE_ALPHA[status])
 
 
 def friction_polyhedron(
@@ -81,7 +83,7 @@ def friction_polyhedron(
     """The polyhedron that stands in for the cone, as the cone of its rays; facets in `active` (numbers) light up."""
     matrix = placed(position, _surface_frame(polyhedron.normal), height)
     key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside))
-    picture = {"/sides": Item(_unit_polyhedron(*key), matrix, with_alpha(CONE[status], CONE_ALPHA))}
+    picture = {"/sides": Item(_unit_polyhedron(*key), matrix, cone_colour(status))}
     for facet in np.atleast_1d(np.asarray(active, dtype=int)):
         picture[f"/facet {facet}"] = Item(_facet(*key, int(facet)), matrix)
     return picture
@@ -114,7 +116,7 @@ def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float,
     start = np.asarray(position, dtype=np.float64)
     along = geometry.frame_along([1.0, 0.0, 0.0])
     thick = 0.012 * size
-    text_at = start + np.array([length / 2, 0.0, 2.2 * thick + 0.07 * size])
+    text_at = start + np.array([length / 2, 0.17 * size, 0.03 * size])  # beside it: seen along, a bar is as short as its text
     picture = {"/bar": Item(_unit_rod(colour), placed(start, along, (thick / 2, thick / 2, length)))}
     for end, x in (("/start", 0.0), ("/end", length)):
         where = start + np.array([x, 0.0, 0.0])
@@ -177,13 +179,13 @@ def _unit_ball(colour: RGB, through: bool = False) -> Shape:
 @lru_cache(maxsize=1)
 def _unit_cone() -> Shape:
     """Point down at 0, 1 high, opening to radius 1."""
-    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 1.0)], 48), (1.0, 1.0, 1.0), opacity=CONE_ALPHA)
+    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 1.0)], 48), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"])
 
 
 @lru_cache(maxsize=64)
 def _unit_polyhedron(mu: float, facets: int, inside: bool) -> Shape:
     rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside).rays
-    return three.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA, flat=True)
+    return three.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True)
 
 
 @lru_cache(maxsize=256)

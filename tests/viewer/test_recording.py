@@ -16,7 +16,7 @@ from floatbase.robots import Robot, State, load, robots
 from floatbase.simulation.physics import Push
 from floatbase.simulation.rollout import Rollout
 from floatbase.viewer import place, recording
-from floatbase.viewer.colours import CONE, MEASURED
+from floatbase.viewer.colours import CONE, CONE_ALPHA, MEASURED
 from floatbase.viewer.scene import Viewer
 
 from .conftest import SCREENSHOTS
@@ -87,6 +87,10 @@ def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hid
     slips = (times > 0.8) & (times < 1.2)
     np.testing.assert_allclose(colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6)
     np.testing.assert_allclose(colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6)
+    times, faint = moving["cone/RR_foot/surface", "shape.material.opacity"]  # its force ends
+    np.testing.assert_allclose(faint[:, 0], np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"]), atol=1e-6)
+    legend = [text for _, text in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
+    assert "friction cone: no force" in legend
     times, visible = moving["measured/RR_foot", ".visible"]
     np.testing.assert_array_equal(visible[:, 0], times <= 1.5)
     times, pushed = moving["push", ".visible"]

@@ -11,8 +11,9 @@ import pytest
 from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, load, robots
+from floatbase.simulation.physics import Ground, Simulation
 from floatbase.viewer.camera import PRESETS
-from floatbase.viewer.colours import ALARM, BACKGROUNDS, CALM, MEASURED, PLANNED, WARNING
+from floatbase.viewer.colours import ALARM, BACKGROUNDS, CALM, IDLE, MEASURED, PLANNED, WARNING
 from floatbase.viewer.scene import Viewer
 from floatbase.viewer.three import code
 
@@ -118,6 +119,83 @@ def test_a_cone_says_whether_its_force_is_inside_on_the_surface_or_outside(
     assert set(colours(viewer, "/meshcat/cone/").values()) == {ALARM}
 
 
+@pytest.mark.parametrize("facets", [None, 4])
+def test_a_cone_without_a_force_is_grey_and_faint(
+    go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, facets: int | None
+) -> None:
+    viewer = Viewer(go2, facets=facets)
+    names = contacts.point_names
+
+    def looks() -> dict[str, list[float]]:
+        commands = viewer.window.scene.commands().items()
+        return {p.split("/")[3]: c["value"] for (p, _, name), c in commands if name == "color" and "/cone/" in p}
+
+    viewer.show(standing, contacts)
+    assert [looks()[name][:3] for name in names] == 4 * [list(IDLE)]
+    up = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
+    viewer.show(standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]])  # the second in the air, the third all but
+    assert [looks()[name][:3] for name in names] == [list(CALM), list(IDLE), list(IDLE), list(CALM)]
+    assert looks()[names[1]][3] < 0.5 * looks()[names[0]][3]
+    viewer.show(standing, contacts, forces=0 * up, planned=up)  # what is measured counts
+    assert [looks()[name][:3] for name in names] == 4 * [list(IDLE)]
+    viewer.close()
+
+
+def normal_and_point(viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
+    """Normal of the ground in the scene, and a point of it."""
+    ground = matrices(viewer, "/meshcat/ground")[""]
+    return ground[:3, 2], ground[:3, 3]
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3])
+def test_the_ground_lies_under_the_contacts_of_a_slope(viewer: Viewer, go2: Robot, height: float) -> None:
+    slope = np.array([0.3, -0.15, 1.0]) / np.linalg.norm([0.3, -0.15, 1.0])
+    state = Simulation(go2, Ground(normal=slope)).state
+    q = state.q.copy()
+    q[:3] += height * slope
+    state, contacts = State(go2, q), Contacts.points(go2, normals=slope)
+    viewer.show(state, contacts, support=True)
+    normal, point = normal_and_point(viewer)
+    np.testing.assert_allclose(normal, slope, atol=1e-6)
+    for position in (*contacts.positions(state), matrices(viewer, "/meshcat/com/")["projection"][:3, 3]):
+        assert normal @ (position - point) == pytest.approx(0.0, abs=0.006)
+    lowered = viewer.window.scene.commands()["/meshcat/support", "set_object", ""]["object"]
+    corners = np.frombuffer(lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<i2").reshape(-1, 3)
+    for corner in corners * lowered["object"]["matrix"][0]:
+        assert normal @ (corner - point) == pytest.approx(0.0, abs=0.002)
+
+
+def test_the_ground_is_level_where_contacts_do_not_say_otherwise(go2: Robot, standing: State) -> None:
+    slope = np.array([0.6, 0.0, 0.8])
+    ditch = {foot.frame: [0.0, -0.4 if foot.frame[1] == "L" else 0.4, 1.0] for foot in go2.feet}
+    viewer = Viewer(go2)
+    for contacts in (None, Contacts.points(go2), Contacts.points(go2, normals=ditch), Contacts.points(go2, normals=[1, 0, 0])):
+        viewer.show(standing, contacts)
+        np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
+    viewer.show(standing, Contacts.points(go2, normals=slope))  # a slope that the feet do not stand on
+    np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
+    viewer.close()
+    viewer = Viewer(go2, ground=slope)
+    viewer.show(standing, Contacts.points(go2))
+    np.testing.assert_allclose(normal_and_point(viewer)[0], slope, atol=1e-6)
+    viewer.close()
+
+
+@pytest.mark.parametrize("name", [name for name in robots() if load(name).feet])
+def test_the_feet_fill_the_picture_of_the_feet(name: str) -> None:
+    robot = load(name)
+    viewer = Viewer(robot)
+    viewer.show(robot.standing()).camera("feet")
+    camera = viewer.window.scene.commands()["/", "set_camera", ""]
+    eye, target = (np.array([c[0], -c[2], c[1]]) for c in (camera["position"], camera["target"]))
+    contacts = (Contacts.flat_feet if robot.feet[0].is_flat else Contacts.points)(robot)
+    ways = contacts.positions(robot.standing()) - eye
+    ahead = (target - eye) / np.linalg.norm(target - eye)
+    angles = np.degrees(np.arccos(ways @ ahead / np.linalg.norm(ways, axis=1)))
+    assert 0.25 < angles.max() / (camera["fov"] / 2) < 1.0
+    viewer.close()
+
+
 def test_polyhedra_light_the_facets_that_are_reached(go2: Robot, standing: State, contacts: Contacts) -> None:
     viewer = Viewer(go2, facets=4)
     force = np.tile([0.0, 0.0, 40.0], (4, 1))
@@ -204,6 +282,13 @@ def test_the_legend_names_what_is_in_the_picture_and_nothing_else(
     assert legend(viewer) == ["planned force", "centre of mass", *cone]
     viewer.show(standing, contacts, forces=0 * forces, planned=forces, cones=False, com=False)
     assert legend(viewer) == ["planned force"]
+    viewer.show(standing, ghost=standing, ghost_name="where it began", com=False)
+    assert legend(viewer) == ["where it began"]
+    one_off = forces * [[1.0], [1.0], [1.0], [0.0]]
+    viewer.show(standing, contacts, one_off, com=False)
+    assert legend(viewer) == ["measured force", *cone, "friction cone: no force"]
+    viewer.show(standing, contacts, com=False)
+    assert legend(viewer) == ["friction cone: no force"]
     viewer.show(standing, com=False)
     assert legend(viewer) == []
 
@@ -229,7 +314,7 @@ def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
     assert len(cones) == 8
     for matrix in cones.values():
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
-        assert across < 0.7 * nearest
+        assert across < 0.5 * nearest
         assert across / along == pytest.approx(0.7, rel=1e-5)
     view.close()
 
@@ -283,6 +368,7 @@ def test_wrong_input_is_explained(viewer: Viewer, go2: Robot, standing: State, c
         (lambda: viewer.camera("above"), "camera view is 'above'; it must be one of default, front"),
         (lambda: Viewer("go2"), "Viewer needs a Robot, as in fb.Viewer"),
         (lambda: Viewer(go2, background="pink"), "background is 'pink'; it must be one of white, light, dark"),
+        (lambda: Viewer(go2, ground=[1, 0, 0]), "the normal of the ground must point up"),
         (lambda: Viewer(go2, facets=2), "facets is 2; .* whole number ≥ 3"),
         (lambda: Viewer(go2, scale=-1), "scale is -1; it must be > 0 m/N"),
     ):
