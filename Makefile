@@ -1,12 +1,14 @@
-# `make lab` opens the course, `make test` checks everything. Both first make .venv, from the exact lock in environment.txt.
+# `make lab` opens the course, `make test` checks everything, `make pages` writes the lessons as HTML. All first make .venv, from
+# the exact lock in environment.txt.
 #
 #   PYTHON=…       the Python to use, such as python3.12 or a path; without it the first of python3, python3.13, … that fits
 #   LAB_ARGS=…     more options for JupyterLab, such as --no-browser or --port=9000
+#   PAGES_ARGS=…   options for the pages, such as "--to DIR" or "notebooks/01_floating_base.ipynb"
 #   PYTEST_ARGS=…  more options for pytest, such as "-k friction" or tests/control
 #   LOCK_ARGS=…    more options for `uv pip compile`, such as --upgrade
 
 .DEFAULT_GOAL := help
-.PHONY: help lab test setup lock clean python
+.PHONY: help lab test pages setup lock clean python
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -31,6 +33,7 @@ TABS := $(CURDIR)/$(VENV)/workspaces
 help:
 	@echo "make lab     open the course in JupyterLab"
 	@echo "make test    run ruff, mypy, the tests and the notebooks"
+	@echo "make pages   write each lesson as one HTML page, into build/pages"
 	@echo "make setup   only make .venv"
 	@echo "make lock    write environment.txt anew from pyproject.toml"
 	@echo "make clean   remove .venv and everything else that was made"
@@ -46,6 +49,9 @@ test: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+pages: setup
+	$(BIN)/python -m floatbase.lessons.pages $(PAGES_ARGS)
 
 setup: $(VENV)/ready-$(KEY)
 
@@ -75,7 +81,7 @@ lock: | python
 	"$(BASE)" -m venv build/uv
 	build/uv/bin/python -m pip --disable-pip-version-check install -q uv
 	build/uv/bin/uv pip compile -q --universal --python-version 3.11 --fork-strategy fewest \
-		--extra fast --extra test --extra meshes --no-annotate --no-emit-index-url \
+		--extra fast --extra test --extra meshes --extra pages --no-annotate --no-emit-index-url \
 		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
 
 clean:

@@ -37,9 +37,21 @@ def slider_panel(
     for slider in sliders.values():
         slider.observe(moved, names="value")
     moved()
-    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="62%" if beside else "100%"))
+    picture = widgets.HTML(layout=widgets.Layout(width="62%" if beside else "100%"))
     top = [widgets.HBox([picture, note])] if beside else [picture, note]
-    return widgets.VBox([*top, *sliders.values()])
+    return _Panel(view, picture, [*top, *sliders.values()])
+
+
+class _Panel(widgets.VBox):
+    """A panel whose picture is put in when it is displayed: by then the camera has been placed, which a still picture keeps."""
+
+    def __init__(self, view: Viewer, picture: widgets.HTML, children: list[widgets.Widget]):
+        super().__init__(children)
+        self._view, self._picture = view, picture
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        self._picture.value = self._view._repr_html_()
+        return super()._repr_mimebundle_(**kwargs)
 
 
 def _slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:

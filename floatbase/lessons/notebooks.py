@@ -50,7 +50,8 @@ def execute(notebook: Any, folder: Path, **settings: str) -> Any:
     """
     from nbclient import NotebookClient
 
-    client = NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}})
+    quiet = ["--IPKernelApp.log_level=40"]  # its warning that this machine's loopback is not encrypted says nothing here
+    client = NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}}, extra_arguments=quiet)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as home:
         return client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
 

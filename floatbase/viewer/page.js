@@ -206,13 +206,36 @@ async function unpack(id) {
 }
 
 async function open() {
-  const script = document.createElement("script");
-  script.textContent = new TextDecoder().decode(await unpack("viewer-code"));
-  document.body.appendChild(script);
+  load(new TextDecoder().decode(await unpack("viewer-code")));
   const scene = await unpack("scene");
-  startWhenSeen(() => {
-    apply(scene);
-    viewer.num_messages_received++;
-    viewer.set_3d_pane_size();
-  });
+  startWhenSeen(() => draw(scene));
+}
+
+function load(code) {
+  const script = document.createElement("script");
+  script.textContent = code;
+  document.body.appendChild(script);
+}
+
+function draw(scene) {
+  apply(scene);
+  viewer.num_messages_received++;
+  viewer.set_3d_pane_size();
+}
+
+// The inner page: says that it is ready, is handed {code, scene}, and answers with a picture or what went wrong. The page
+// around it takes it away when it is out of sight.
+function waitForScene() {
+  window.onmessage = ({data}) => {
+    window.onmessage = null;
+    try {
+      load(data.code);
+      window.viewer = startViewer();
+      draw(data.scene);
+      parent.postMessage({picture: viewer.capture_image()}, "*");
+    } catch (error) {
+      parent.postMessage({failed: String(error)}, "*");
+    }
+  };
+  parent.postMessage({ready: true}, "*");
 }

@@ -1,6 +1,7 @@
-"""The two pages: the live one, which follows a window, and the file that holds a scene and needs no server.
+"""The pages: the live one, which follows a window; the file that holds a scene and needs no server; and the inner page,
+which stands in a frame of a page of several scenes.
 
-Both load meshcat's own viewer and feed it the same frames (see `wire.frame`); what they add to it stands in page.js.
+All load meshcat's own viewer and feed it the same frames (see `wire.frame`); what they add to it stands in page.js.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import base64
 import gzip
 import html
+import re
 from collections.abc import Iterable
 from functools import cache
 from importlib.util import find_spec
@@ -46,26 +48,39 @@ def live_page() -> str:
 
 def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
     """A page that holds the viewer and a scene, and needs neither server nor network: 0.3 MB and the scene."""
-    held = _held("viewer-code", _packed_code()) + _held("scene", _packed(wire.frame(commands)))
-    return _page(f"{held}<script>{_own('page.js')}open();</script>", title)
+    text = held_viewer_code() + held("scene", wire.frame(commands))
+    return _page(f"{text}<script>{_own('page.js')}open();</script>", title)
+
+
+def scene_in(text: str) -> list[bytes]:
+    """The commands that a file page holds. Raises `ViewerError` for another text."""
+    found = re.search(r'id="scene">([^<]*)<', text)
+    if found is None:
+        raise ViewerError("this page holds no scene; pages that do are written by Viewer.save.")
+    return wire.unframe(gzip.decompress(base64.b64decode(found.group(1))))
 
 
 @cache
-def _packed_code() -> str:
-    return _packed(viewer_code())
+def inner_page() -> str:
+    """A page for a frame: the page around it hands it the viewer's code and a frame of commands, as page.js says."""
+    return _page(f"<script>{_own('page.js')}waitForScene();</script>", "floatbase")
+
+
+@cache
+def held_viewer_code() -> str:
+    """meshcat's viewer packed into a page, under the name viewer-code."""
+    return held("viewer-code", viewer_code())
+
+
+def held(name: str, data: bytes) -> str:
+    """Data packed into a page, for a script of the page to unpack by its name."""
+    packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    return f'<script type="text/plain" id="{name}">{packed}</script>'
 
 
 @cache
 def _own(name: str) -> str:
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
-
-
-def _packed(data: bytes) -> str:
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
-
-
-def _held(name: str, text: str) -> str:
-    return f'<script type="text/plain" id="{name}">{text}</script>'
 
 
 def _page(scripts: str, title: str) -> str:

@@ -108,6 +108,16 @@ def frame(commands: Iterable[bytes]) -> bytes:
     return b"".join(part for command in commands for part in (struct.pack("<I", len(command)), command))
 
 
+def unframe(data: bytes) -> list[bytes]:
+    """The commands of a frame, one by one."""
+    commands, at = [], 0
+    while at < len(data):
+        (length,) = struct.unpack_from("<I", data, at)
+        commands.append(data[at + 4 : at + 4 + length])
+        at += 4 + length
+    return commands
+
+
 class Scene:
     """The newest command of every key, each with the number of the change that brought it.
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import io
 
 import numpy as np
+from browsers import SCREENSHOTS
 from PIL import Image
 
 from floatbase.viewer.scene import Viewer
-
-from .conftest import SCREENSHOTS
 
 # world position of a node, in our coordinates
 WHERE = """(path) => {

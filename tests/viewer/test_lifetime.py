@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
+from browsers import CHROMIUM, FLAGS
 from jupyter_client.manager import start_new_kernel
 
 from floatbase.dynamics.contacts import Contacts
@@ -25,8 +26,6 @@ from floatbase.viewer import window as window_module
 from floatbase.viewer import wire
 from floatbase.viewer.scene import Viewer
 from floatbase.viewer.window import Window
-
-from .conftest import CHROMIUM, FLAGS
 
 MB = 1 << 20
 

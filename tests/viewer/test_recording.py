@@ -9,6 +9,7 @@ import matplotlib
 import numpy as np
 import pytest
 import umsgpack
+from browsers import SCREENSHOTS
 
 from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InputError, ViewerError
@@ -19,7 +20,6 @@ from floatbase.viewer import place, recording
 from floatbase.viewer.colours import CONE, CONE_ALPHA, MEASURED
 from floatbase.viewer.scene import Viewer
 
-from .conftest import SCREENSHOTS
 from .looks import picture, settle
 
 matplotlib.use("agg")
