@@ -30,7 +30,6 @@ from floatbase.simulation.rollout import Rollout
 from floatbase.viewer import geometry, marks, props, shapes
 from floatbase.viewer.camera import View
 from floatbase.viewer.colours import ALARM, COM, MEASURED, PLANNED, hexadecimal
-from floatbase.viewer.plots import plot_forces
 from floatbase.viewer.scene import Viewer
 from floatbase.viewer.shapes import Picture
 
@@ -43,16 +42,22 @@ DISC_RADIUS = 0.2  # m, of assets/models/disc.urdf
 
 
 def draw_equation(eom: EquationsOfMotion) -> Figure:
-    """(4) drawn to scale: which entries of M, S and Jᵀ are not zero, with the base's rows above the line."""
-    parts = [("M", eom.M), ("h", eom.h[:, None]), ("S", eom.S), ("Jᵀ", eom.J.T)]
-    widths = [max(part.shape[1], 1.6) for _, part in parts]
-    figure, axes = plt.subplots(1, 4, figsize=(9, 3.4), width_ratios=widths, layout="constrained")
-    for axis, (name, part) in zip(axes, parts, strict=True):
+    """(4) drawn to scale: which entries of M, S and Jᵀ are not zero, with the base's rows above the line; four point feet."""
+    feet = [str(name).split("_")[0] for name in eom.contacts.names]
+    in_threes = 3.0 * np.arange(len(feet)) + 1.0  # the middle of each leg's joints, and of each foot's force
+    parts = [("M q̈", eom.M, 6.0), ("+ h", eom.h[:, None], None), ("= S τ", eom.S, 0.0), ("+ Jᵀ λ", eom.J.T, 0.0)]
+    widths = [max(part.shape[1], 1.6) for _, part, _ in parts]
+    figure, axes = plt.subplots(1, 4, figsize=(9.5, 3.7), width_ratios=widths, layout="constrained")
+    for axis, (name, part, first) in zip(axes, parts, strict=True):
         filled = np.abs(part) > 1e-9 * np.abs(part).max()
         axis.imshow(np.where(filled, 1.0, 0.0), cmap="Blues", vmin=0.0, vmax=1.6, aspect="equal")
         axis.axhline(5.5, color=hexadecimal(ALARM), linewidth=1.5)
-        axis.set(title=f"{name}  {part.shape[0]} × {part.shape[1]}", xticks=[], yticks=[])
-    axes[0].set_yticks([2.5, 11.5], ["base\nrows", "joint\nrows"])
+        axis.set_title(name, fontsize=14)
+        axis.set(xlabel=f"{part.shape[0]} × {part.shape[1]}", xticks=[], yticks=[])
+        if first is not None:
+            axis.set_xticks(in_threes + first, feet, fontsize="small")
+    axes[0].set_xticks([2.5, *(in_threes + 6.0)], ["base", *feet], fontsize="small")
+    axes[0].set_yticks([2.5, *(in_threes + 6.0)], ["base", *feet], fontsize="small")
     return figure
 
 
@@ -72,7 +77,14 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         size, scale = view.painter.size, view.scale
         drawn = marks.wrench(base.translation, scale * f, MOMENT * moment, size)
         extra = {f"base{path}": item for path, item in drawn.items()} if np.linalg.norm(force) > 1e-6 else {}
-        view.show(state, contacts, planned=forces, com=False, cones=False, extra=extra)
+        if extra:
+            extra["label/base"] = shapes.label(
+                base.translation + scale * f + [0.0, 0.0, 0.04], "on the base", 0.028, plate=False
+            )
+            tip = state.point(foot) + scale * force
+            extra["label/foot"] = shapes.label(tip + [0.05, 0.0, 0.02], "on the foot", 0.028, plate=False)
+        picture = view.painter.picture(state, contacts, planned=forces, com=False, cones=False, extra=extra)
+        view.draw({path.replace("planned/", "force/"): item for path, item in picture.items()})
         torques = ", ".join(f"{x + 0.0:.1f}" for x in np.round(generalised[6:][leg], 1))
         rest = np.delete(generalised[6:], leg)
         return (
@@ -80,8 +92,8 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
             f"{torques} N·m; all other joints {np.abs(rest).max():.0f}"
         )
 
-    panel = slider_panel(view, draw, forwards=(-40.0, 0.0, 40.0), up=(0.0, 60.0, 80.0))
-    view.camera(View(48.0, 12.0, 1.0, around=((0.0, 0.0, 0.3), 0.42)))
+    panel = slider_panel(view, draw, forwards=(-40.0, 0.0, 40.0, "N"), up=(0.0, 60.0, 80.0, "N"))
+    view.camera(View(76.0, 14.0, 1.0, around=((0.0, 0.0, 0.32), 0.42)))
     return panel
 
 
@@ -123,9 +135,19 @@ def run_constant(robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike, motion
 
 
 def plot_both(record: Rollout, title: str) -> Axes:
-    """Normal forces by (7) and by the engine."""
-    axis = plot_forces(record)
-    axis.set_title(title)
+    """Vertical forces at a front and at a rear foot, by (7) and by the engine; left and right are alike."""
+    _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
+    names = list(record.contacts.names)
+    for foot, where in (("FL_foot", "front"), ("RL_foot", "rear")):
+        row = 3 * names.index(foot) + 2
+        axis.plot(
+            record.time, record.planned[:, row], color=hexadecimal(PLANNED), linewidth=4, alpha=0.7, label=f"(7), {where}"
+        )
+        axis.plot(record.time, record.measured[:, row], color=hexadecimal(MEASURED), label=f"MuJoCo, {where}")
+        axis.annotate(f"each {where} foot", (record.time[90], record.measured[90, row]), (0, 8), textcoords="offset points")
+    axis.set(xlabel="time [s]", ylabel="vertical force [N]", title=title)
+    axis.grid(alpha=0.25)
+    axis.legend(ncols=2, fontsize="small")
     return axis
 
 
@@ -164,6 +186,38 @@ def plot_strayed(curves: dict[str, Array], duration: float) -> Axes:
     axis.grid(alpha=0.25)
     axis.legend(loc="lower right", fontsize="small")
     return axis
+
+
+def turning_about_its_tool(arm: Robot, speed: float = 3.0) -> fb.State:
+    """The arm with all joints but the last moving, `speed` rad/s in all, such that the tool's origin rests: J q̇ = 0."""
+    state = arm.standing()
+    J = state.frame_jacobian("tool0")[:3]
+    elbow_first = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    v = elbow_first - np.linalg.pinv(J) @ (J @ elbow_first)
+    return state.at(v=speed * v / np.linalg.norm(v))
+
+
+def tool_path(record: Rollout) -> Array:
+    """How far the arm's tool is from where it was first, mm, for every row of a record."""
+    places = np.array([record.state(i).point("tool0") for i in range(len(record))])
+    return 1e3 * np.asarray(np.linalg.norm(places - places[0], axis=1))
+
+
+def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
+    """The arm whose b was forgotten, in front of the veil of the one whose b was kept; a red line from where the tool was."""
+    home = forgotten.state(0).point("tool0")
+    rows = np.linspace(0, len(kept) - 1, 30).astype(int)
+    pictures = []
+    for i in rows:
+        drawn = view.painter.picture(forgotten.state(i), com=False, ghost=kept.state(i))
+        drawn["home"] = shapes.arrow(home + [0.0, 0.0, 0.25], [0.0, 0.0, -0.24], PLANNED, view.painter.size)
+        way = forgotten.state(i).point("tool0") - home
+        length = float(np.linalg.norm(way))
+        if length > 2e-3:
+            drawn["way"] = shapes.rod(home, geometry.frame_along(way / length), length, 0.012, ALARM)
+        pictures.append({path.replace("ghost/", "veil/"): item for path, item in drawn.items()})
+    view.play_pictures(forgotten.time[rows], pictures, speed=0.1)
+    return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))
 
 
 def play_collapse(
@@ -243,7 +297,7 @@ def parking_panel(view: Viewer, robot: Robot) -> widgets.VBox:
         picture["wheel/now"] = _drawn(states[min(round(time * 20), len(states) - 1)], way, time)
         for name, at in (("start", corners[0]), ("end", corners[-1])):
             picture[f"mark/{name}"] = shapes.contact_patch(at + [0.0, 0.0, 0.002], [0.0, 0.0, 1.0], 0.035)
-            picture[f"name/{name}"] = shapes.label(at + [-0.12, 0.0, 0.03], name, 0.045)
+            picture[f"name/{name}"] = shapes.label(at + [-0.17, 0.0, 0.02], name, 0.05)
         view.draw(picture)
         gone = states[-1].q[:2] - states[0].q[:2]
         slip = max(float(np.abs(wheel().slip(state)).max()) for state in states)
@@ -252,8 +306,8 @@ def parking_panel(view: Viewer, robot: Robot) -> widgets.VBox:
             f"largest slip on the way {abs(slip):.3f} m/s"
         )
 
-    panel = slider_panel(view, draw, way=(0.0, 0.5, 1.0), turn=(-1.5, -0.7, 1.5), time=(0.0, 1.5, 4.0))
-    view.camera(View(-115.0, 32.0, 1.0, around=((0.4, 0.0, 0.1), 0.85)))
+    panel = slider_panel(view, draw, way=(0.0, 0.5, 1.0, "m"), turn=(-1.5, -0.7, 1.5, "rad"), time=(0.0, 1.5, 4.0, "s"))
+    view.camera(View(-115.0, 32.0, 1.0, around=((0.38, 0.05, 0.1), 0.62)))
     return panel
 
 
@@ -421,6 +475,12 @@ EXERCISES = (
                     "The base's rows are zero: only motors leave them alone, a foot's force does not.": (
                         _generalised_joints_only
                     ),
+                    "This is the Jacobian of the standing robot; `moving` has another posture, so another J.": (
+                        lambda: fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T @ [10.0, -5.0, 40.0]
+                    ),
+                    "These are the angular rows of the Jacobian; a force at a point takes the linear ones, which come first.": (
+                        lambda: _scene()[0].frame_jacobian("FL_foot")[3:].T @ [10.0, -5.0, 40.0]
+                    ),
                     "Zero would mean that the force does nothing.": lambda: np.zeros(18),
                 },
             ),
@@ -446,6 +506,9 @@ EXERCISES = (
                 ),
                 "This is the velocity of the foot; asked is an acceleration.": lambda: _velocity_of(
                     _scene()[0], "FL_foot", 0.0
+                ),
+                "These are the angular rows of the drift; a point takes the linear ones, which come first.": lambda: (
+                    -_scene()[0].frame_drift("FL_foot")[3:]
                 ),
             },
         ),

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.lessons import lesson02
+from floatbase.lessons import lesson01, lesson02
 from floatbase.lessons.exercises import check
 from floatbase.robots.robot import Robot
 
@@ -90,7 +90,8 @@ def test_sliders_of_every_picture_redraw_it(go2: Robot) -> None:
 def test_the_equation_is_drawn_and_the_collapse_is_played(go2: Robot) -> None:
     state, contacts = go2.standing(), lesson02.pins(go2)
     figure = lesson02.draw_equation(fb.equations_of_motion(state, contacts))
-    assert [axis.get_title().split()[0] for axis in figure.axes] == ["M", "h", "S", "Jᵀ"]
+    assert [axis.get_title() for axis in figure.axes] == ["M q̈", "+ h", "= S τ", "+ Jᵀ λ"]
+    assert [label.get_text() for label in figure.axes[3].get_xticklabels()] == ["FL", "FR", "RL", "RR"]
     states = lesson02.collapse(state, contacts, motion, True, 0.02)
     view = fb.Viewer(go2)
     try:
@@ -204,3 +205,39 @@ def test_holding_by_levers_is_right_and_wrong_holdings_get_their_hint(
 )
 def test_holdings_of_the_wrong_kind_get_their_hint(answer: Any, text: str) -> None:
     assert text in hint("02.4", answer)
+
+
+def test_the_arm_turns_about_a_tool_that_rests() -> None:
+    arm = fb.load("ur5", posture=lesson01.PRESSING)
+    state = lesson02.turning_about_its_tool(arm)
+    assert np.linalg.norm(state.v) == pytest.approx(3.0)
+    assert abs(state.frame_velocity("tool0")[:3]).max() < 1e-12
+    assert np.linalg.norm(state.frame_drift("tool0")[:3]) > 0.3
+
+
+def test_a_jacobian_of_another_posture_and_angular_rows_get_their_hint(moving: fb.State) -> None:
+    standing = moving.robot.standing()
+    assert "another posture" in hint("02.2", standing.frame_jacobian("FL_foot")[:3].T @ PUSH)
+    assert "angular rows" in hint("02.2", moving.frame_jacobian("FL_foot")[3:].T @ PUSH)
+    assert "angular rows" in hint("02.3", -moving.frame_drift("FL_foot")[3:])
+
+
+def test_the_arm_without_its_drift_leaves_and_both_are_played() -> None:
+    arm = fb.load("ur5", posture=lesson01.PRESSING)
+    start = lesson02.turning_about_its_tool(arm)
+
+    def controller(q: np.ndarray, v: np.ndarray, t: float) -> lesson01.Torques:
+        return lesson01.Torques(fb.State(arm, q, v).h)  # q̈ = 0: no b
+
+    sim = fb.Simulation(arm)
+    sim.reset(start)
+    record = fb.rollout(sim, controller, 0.1)
+    assert lesson02.tool_path(record)[0] == 0.0
+    assert lesson02.tool_path(record)[-1] > 1.0
+    view = fb.Viewer(arm)
+    try:
+        drawn = str(lesson02.play_tools(view, record, record).window.scene.lasting())
+        assert "veil" in drawn
+        assert "way" in drawn
+    finally:
+        view.close()
