@@ -95,7 +95,7 @@ def parts(n: int) -> Iterator[str]:
         fast = controller(robot)
         program, base = fast._program, 6
         M, h, J, Ag, oMi = program.dynamics.views
-        tree, links, table, frames, points, cones, lengths, tasks, gains, poses, limits, least = program._tables
+        tree, links, table, frames, points, cones, lengths, tasks, gains, poses, limits, least = K.unpacked(*program._packed)
         for label, spread in SPREADS.items():
             spent = []
             for q, v in states(robot, n, spread):
@@ -103,18 +103,19 @@ def parts(n: int) -> Iterator[str]:
                 velocity, drift = K.sweep(tree, J, v)
                 contact = (tree, oMi, J, velocity, drift, table, frames, points)
                 A, b, Jp = K.contact_rows(*contact)
-                V, free, _ = K.motions(A, b, v, M.T, h, Jp, base)
-                T = K.torques(V, M.T, h, Jp, base)
-                cost = (q, v, oMi, J, Ag, tree, links, tasks, gains, poses, program.targets, velocity, drift, V, free, T, base)
+                V, beta_of, _ = K.motions(A, b, v, M.T, h, Jp, base)
+                T = K.torques(V, beta_of, M.T, h, Jp, base)
+                state = (q, v, oMi, J, Ag, tree, links, tasks, gains, poses, program.targets, velocity, drift)
+                cost = (*state, V, beta_of, T, base)
                 R, diagonal, aim, _ = K.objective(*cost)
-                search = (R, diagonal, aim, V, T, cones, lengths, least, limits)
-                every = (q, v, program.targets, *program.dynamics.views, *program._tables)
+                search = (R, diagonal, aim, V, beta_of, T, cones, lengths, least, limits)
+                every = (q, v, program.targets, *program.dynamics.views, *program._packed)
                 calls = (
                     (program.dynamics.update, (q, v)),
                     (K.sweep, (tree, J, v)),
                     (K.contact_rows, contact),
                     (K.motions, (A, b, v, M.T, h, Jp, base)),
-                    (K.torques, (V, M.T, h, Jp, base)),
+                    (K.torques, (V, beta_of, M.T, h, Jp, base)),
                     (K.objective, cost),
                     (K.dual_search, search),
                     (K.tick, every),

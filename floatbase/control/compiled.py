@@ -137,33 +137,34 @@ class Program:
         from floatbase.control import kernel
 
         self.dynamics, self.solved, self._kernel = dynamics_of(robot), kernel.SOLVED, kernel.tick
-        self.robot, self.n_q, self.n_v, self.d = robot, (robot.nq,), (robot.nv,), robot.d
+        self.robot, self.q_shape, self.v_shape, self.nv, self.d = robot, (robot.nq,), (robot.nv,), robot.nv, robot.d
         self.fits = True
         self._moving: list[Target] = []
         contact_tables = _stack_contacts(robot, contacts, limits)
         self.targets, task_tables = self._task_tables(robot, tasks, contacts.k)
         bounds = (np.array(limits.torque_limits), float(limits.min_normal_force))
-        self._tables = (self.dynamics.tree, self.dynamics.links, *contact_tables, *task_tables, *bounds)
-        self.force_rows = contact_tables[3].shape[0] * contact_tables[3].shape[1]
+        self._packed = packed(self.dynamics, contact_tables, task_tables, bounds)
+        self._limited = np.isfinite(limits.torque_limits)
+        self.force_rows = contact_tables[4].size
 
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, Array, Array] | None:
         """(q̈, τ, λ) of shape (nv + d + k,), the active rows and their multipliers; None when the readable path must decide.
 
         q, v: writable float64 arrays.
         """
-        if q.shape != self.n_q or v.shape != self.n_v or not self._move(t):
+        if q.shape != self.q_shape or v.shape != self.v_shape or not self._move(t):
             return None
         dynamics = self.dynamics
         with dynamics.lock:
             dynamics.update(q, v)
-            x, active, mu, status = self._kernel(q, v, self.targets, *dynamics.views, *self._tables)
+            x, active, mu, status = self._kernel(q, v, self.targets, *dynamics.views, *self._packed)
         return (x, active, mu) if status == self.solved else None
 
     def multipliers(self, active: Array, mu: Array, rows: int) -> Array:
         """Multipliers of the readable problem's inequality rows, shape (rows,): there only limited joints have torque rows."""
         found = np.zeros(rows)
-        limited = np.isfinite(self._tables[-2])
-        place = np.concatenate([np.cumsum(limited) - 1, np.cumsum(limited) - 1 + np.sum(limited)])
+        place = np.cumsum(self._limited) - 1
+        place = np.concatenate([place, place + np.sum(self._limited)])
         for number, push in zip(active, mu, strict=True):
             at = number if number < self.force_rows else self.force_rows + place[number - self.force_rows]
             found[at] = max(push, 0.0)
@@ -213,6 +214,18 @@ def _stack_contacts(robot: Robot, contacts: Contacts, limits: Limits) -> tuple[A
     points = np.concatenate([np.zeros((0, 3)), *(part.points for part in parts)])
     cones = np.concatenate([np.zeros((0, limits.facets + 1, 3)), *(part.cones for part in parts)])
     return table, frames, points, cones, np.linalg.norm(cones, axis=2)
+
+
+def packed(
+    dynamics: Dynamics, contact_tables: tuple[Any, ...], task_tables: tuple[Any, ...], bounds: tuple[Array, float]
+) -> tuple[Any, Any, Array]:
+    """sizes, indices, numbers: all tables in three arrays, as `kernel.unpacked` takes them apart."""
+    contacts, frames, points, cones, lengths = contact_tables
+    tasks, gains, poses = task_tables
+    sizes = (len(dynamics.tree), len(contacts), len(points), cones.shape[1], len(tasks), len(bounds[0]))
+    indices = np.concatenate([np.ravel(table) for table in (dynamics.tree, contacts, tasks)])
+    real = (dynamics.links, frames, points, cones, lengths, gains, poses, *bounds)
+    return np.array(sizes, np.int64), indices, np.concatenate([np.ravel(table) for table in real])
 
 
 def _known(contact: Contact) -> PointContact | FlatFootContact:

@@ -63,6 +63,11 @@ class Command:
     evidence: Callable[[], Solution]
     path: str = "readable"
 
+    def __init__(
+        self, tau: Array, qdd: Array, forces: Array, evidence: Callable[[], Solution], path: str = "readable"
+    ) -> None:  # a frozen dataclass would set one field after the other, a microsecond in every tick
+        self.__dict__.update(tau=tau, qdd=qdd, forces=forces, evidence=evidence, path=path)
+
     @cached_property
     def solution(self) -> Solution:
         """The QP of this tick with its optimum, multipliers and residuals."""
@@ -258,7 +263,7 @@ class WholeBodyController:
             return None
         x, active, mu = answer
         x.flags.writeable = False
-        nv, tail = self.robot.nv, self.robot.nv + program.d
+        nv, tail = program.nv, program.nv + program.d
 
         def evidence() -> Solution:
             qp = self.qp(State(self.robot, q, v), t)

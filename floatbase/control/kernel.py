@@ -50,20 +50,63 @@ def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @_compiled
-def _cross(a, b, out):
-    """out = a × b, shapes (3,)."""
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-
-
-@_compiled
 def finite(values):
     """Whether all entries are finite, shape (n,)."""
     for i in range(values.size):
         if not np.isfinite(values[i]):
             return False
     return True
+
+
+# vectors in space, as three numbers: they need no memory -----------------------------------------------------------------
+
+
+@_compiled
+def xyz(array, i, first):
+    """Three numbers of row i of an array (n, m), from column `first` on."""
+    return array[i, first], array[i, first + 1], array[i, first + 2]
+
+
+@_compiled
+def column(array, first, c):
+    """Three numbers of column c of an array (n, m), from row `first` on."""
+    return array[first, c], array[first + 1, c], array[first + 2, c]
+
+
+@_compiled
+def plus(a, b):
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@_compiled
+def minus(a, b):
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@_compiled
+def times(s, a):
+    """s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@_compiled
+def dot(a, b):
+    """aᵀ b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@_compiled
+def cross(a, b):
+    """a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@_compiled
+def turned(R, a):
+    """R a, for the three columns of R."""
+    return plus(plus(times(a[0], R[0]), times(a[1], R[1])), times(a[2], R[2]))
 
 
 # dynamics ----------------------------------------------------------------------------------------------------------------
@@ -78,75 +121,67 @@ def sweep(tree, J, v):
     """
     n = tree.shape[0]
     velocity, drift = np.zeros((n, 6)), np.zeros((n, 6))
-    own, turned = np.empty(6), np.empty(3)
     for i in range(1, n):
         parent, first, count = tree[i, 0], tree[i, 1], tree[i, 2]
-        for r in range(6):
-            own[r] = 0.0
-            for c in range(first, first + count):
-                own[r] += J[r, c] * v[c]
-            velocity[i, r] = velocity[parent, r] + own[r]
-            drift[i, r] = drift[parent, r]
-        _cross(velocity[i, 3:], own[:3], turned)
-        drift[i, :3] += turned
-        _cross(velocity[i, :3], own[3:], turned)
-        drift[i, :3] += turned
-        _cross(velocity[i, 3:], own[3:], turned)
-        drift[i, 3:] += turned
+        linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for c in range(first, first + count):
+            linear = plus(linear, times(v[c], column(J, 0, c)))
+            angular = plus(angular, times(v[c], column(J, 3, c)))
+        moving, turning = plus(xyz(velocity, parent, 0), linear), plus(xyz(velocity, parent, 3), angular)
+        lift = plus(xyz(drift, parent, 0), plus(cross(turning, linear), cross(moving, angular)))
+        twist = plus(xyz(drift, parent, 3), cross(turning, angular))
+        for r in range(3):
+            velocity[i, r], velocity[i, 3 + r], drift[i, r], drift[i, 3 + r] = moving[r], turning[r], lift[r], twist[r]
     return velocity, drift
 
 
 @_compiled
-def material(motion, acceleration, at, v_out, a_out):
-    """Velocity and J̇ v of the body's point at `at` (3,), world: from its spatial velocity and drift, shapes (6,)."""
-    turned = np.empty(3)
-    _cross(motion[3:], at, turned)
-    for i in range(3):
-        v_out[i] = motion[i] + turned[i]
-    _cross(motion[3:], v_out, a_out)
-    _cross(acceleration[3:], at, turned)
-    for i in range(3):
-        a_out[i] += acceleration[i] + turned[i]
+def material(velocity, drift, joint, at):
+    """Velocity and J̇ v of the point at `at`, world, of a joint's body; velocity, drift: (n, 6) as from `sweep`."""
+    turning = xyz(velocity, joint, 3)
+    moving = plus(xyz(velocity, joint, 0), cross(turning, at))
+    own = plus(xyz(drift, joint, 0), cross(xyz(drift, joint, 3), at))
+    return moving, plus(own, cross(turning, moving))
 
 
 @_compiled
-def place(oMi, joint, frame, R, p):
-    """R (3, 3) and p (3,) of a frame in the world; oMi: (n, 12), frame: (12,) pose in its joint, by columns."""
-    for i in range(3):
-        p[i] = oMi[joint, 9 + i]
-        for j in range(3):
-            p[i] += oMi[joint, 3 * j + i] * frame[9 + j]
-            R[i, j] = 0.0
-            for c in range(3):
-                R[i, j] += oMi[joint, 3 * c + i] * frame[3 * j + c]
+def rotation_of(oMi, joint):
+    """The three columns of a joint's rotation; oMi: (n, 12), by columns, then the place."""
+    return xyz(oMi, joint, 0), xyz(oMi, joint, 3), xyz(oMi, joint, 6)
 
 
 @_compiled
-def point_rows(tree, J, joint, at, rows):
-    """Jacobian of a body's point at `at` (3,), world, into rows (3, nv), which are zero elsewhere."""
+def place(oMi, joint, frames, i):
+    """The columns of the rotation and the place, world, of frame i: (·, 12 or more), its pose in the joint as in oMi."""
+    R = rotation_of(oMi, joint)
+    columns = turned(R, xyz(frames, i, 0)), turned(R, xyz(frames, i, 3)), turned(R, xyz(frames, i, 6))
+    return columns, plus(xyz(oMi, joint, 9), turned(R, xyz(frames, i, 9)))
+
+
+@_compiled
+def point_rows(tree, J, joint, at, out, row):
+    """Jacobian of a body's point at `at`, world, into rows row:row + 3 of out (·, nv), which are zero elsewhere."""
     i = joint
     while i > 0:
         for c in range(tree[i, 1], tree[i, 1] + tree[i, 2]):
-            rows[0, c] = J[0, c] + J[4, c] * at[2] - J[5, c] * at[1]
-            rows[1, c] = J[1, c] + J[5, c] * at[0] - J[3, c] * at[2]
-            rows[2, c] = J[2, c] + J[3, c] * at[1] - J[4, c] * at[0]
+            moved = plus(column(J, 0, c), cross(column(J, 3, c), at))
+            out[row, c], out[row + 1, c], out[row + 2, c] = moved
         i = tree[i, 0]
 
 
 @_compiled
-def turning_rows(tree, J, joint, rows):
-    """Jacobian of a body's angular velocity, world, into rows (3, nv), which are zero elsewhere."""
+def turning_rows(tree, J, joint, out, row):
+    """Jacobian of a body's angular velocity, world, into rows row:row + 3 of out (·, nv), which are zero elsewhere."""
     i = joint
     while i > 0:
         for c in range(tree[i, 1], tree[i, 1] + tree[i, 2]):
-            for r in range(3):
-                rows[r, c] = J[3 + r, c]
+            out[row, c], out[row + 1, c], out[row + 2, c] = column(J, 3, c)
         i = tree[i, 0]
 
 
 @_compiled
 def contact_rows(tree, oMi, J, velocity, drift, contacts, frames, points):
-    """(4)(5) A (m, nv), b (m,), and J of the points (k, nv).
+    """(4)(5) A (m, nv), b (m,), and J of the points (k, nv), which is the same array as A where all contacts are points.
 
     contacts: (C, 4) joint, kind, first point, number of points. frames: (C, 16) pose in the joint, normal, radius.
     points: (P, 3) ball centres or corners in the frame.
@@ -154,37 +189,30 @@ def contact_rows(tree, oMi, J, velocity, drift, contacts, frames, points):
     nv, m = J.shape[1], 0
     for i in range(contacts.shape[0]):
         m += 3 if contacts[i, 1] == POINT else 6
-    A, b, Jp = np.zeros((m, nv)), np.empty(m), np.zeros((3 * points.shape[0], nv))
-    R, p, at, v_at, a_at, spin, twice = (
-        np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3),
-    )  # fmt: skip
+    Jp, b = np.zeros((3 * points.shape[0], nv)), np.empty(m)
+    all_points = contacts.shape[0] == points.shape[0] and m == Jp.shape[0]
+    A = Jp if all_points else np.zeros((m, nv))
     row = 0
     for i in range(contacts.shape[0]):
         joint, kind, first, count = contacts[i, 0], contacts[i, 1], contacts[i, 2], contacts[i, 3]
-        place(oMi, joint, frames[i], R, p)
-        normal, radius = frames[i, 12:15], frames[i, 15]
+        R, at = place(oMi, joint, frames, i)
+        normal, radius = xyz(frames, i, 12), frames[i, 15]
         for j in range(first, first + count):
-            for r in range(3):
-                at[r] = p[r] - radius * normal[r]
-                for c in range(3):
-                    at[r] += R[r, c] * points[j, c]
-            point_rows(tree, J, joint, at, Jp[3 * j :])
-        if kind == FLAT:
-            at[:] = p
-        point_rows(tree, J, joint, at, A[row:])
-        material(velocity[joint], drift[joint], at, v_at, a_at)
+            point = minus(plus(at, turned(R, xyz(points, j, 0))), times(radius, normal))
+            point_rows(tree, J, joint, point, Jp, 3 * j)
+            if kind == POINT:
+                at = point
+        if not all_points:
+            point_rows(tree, J, joint, at, A, row)
+        _, along = material(velocity, drift, joint, at)
         if kind == POINT:  # the ball rolls: its lowest point moves on it
-            _cross(velocity[joint, 3:], normal, spin)
-            _cross(velocity[joint, 3:], spin, twice)
-            for r in range(3):
-                b[row + r] = -a_at[r] - radius * twice[r]
-            row += 3
+            turning = xyz(velocity, joint, 3)
+            along = plus(along, times(radius, cross(turning, cross(turning, normal))))
         else:
-            turning_rows(tree, J, joint, A[row + 3 :])
-            for r in range(3):
-                b[row + r] = -a_at[r]
-                b[row + 3 + r] = -drift[joint, 3 + r]
-            row += 6
+            turning_rows(tree, J, joint, A, row + 3)
+            b[row + 3], b[row + 4], b[row + 5] = times(-1.0, xyz(drift, joint, 3))
+        b[row], b[row + 1], b[row + 2] = times(-1.0, along)
+        row += 3 if kind == POINT else 6
     return A, b, Jp
 
 
@@ -192,42 +220,47 @@ def contact_rows(tree, oMi, J, velocity, drift, contacts, frames, points):
 
 
 @_compiled
-def gauss_jordan(B, first, last, weights, pivots, sizes):
-    """Reduce rows first:last of B (m, n + 1) in place, columns chosen by weight (n,) × size, all other rows cleared.
+def gauss_jordan(B, first, last, top, n, weights, pivots, sizes):
+    """Reduce rows first:last of B (m, N + 1) in place, columns chosen among the first n by weight (n,) × size, and clear them
+    in all other rows from `top` on. Rows first:last hold nothing beyond column n but the last one, the right-hand side.
 
-    pivots: (m,) receives the column that each row is solved for. sizes: (m,) largest entry of each row before.
+    pivots: (m,) receives the column that each row is solved for. sizes: (m,) length of each row before.
     Returns the least part of a row that was left when its turn came.
     """
-    n, least = B.shape[1] - 1, 1.0
+    right, least = B.shape[1] - 1, 1.0
     for row in range(first, last):
-        best, column = 0.0, -1
+        best, pivot = 0.0, -1
         for c in range(n):
             size = weights[c] * abs(B[row, c])
             if size > best:
-                best, column = size, c
-        if column < 0 or abs(B[row, column]) <= 1e-14 * sizes[row]:
+                best, pivot = size, c
+        if pivot < 0 or abs(B[row, pivot]) <= 1e-14 * sizes[row]:
             return 0.0
-        least = min(least, abs(B[row, column]) / sizes[row])
-        pivots[row] = column
-        scale = 1.0 / B[row, column]
-        for c in range(n + 1):
+        least = min(least, abs(B[row, pivot]) / sizes[row])
+        pivots[row] = pivot
+        scale = 1.0 / B[row, pivot]
+        for c in range(n):
             B[row, c] *= scale
-        for other in range(B.shape[0]):
-            factor = B[other, column]
+        B[row, right] *= scale
+        for other in range(top, B.shape[0]):
+            factor = B[other, pivot]
             if other != row and factor != 0.0:
-                for c in range(n + 1):
+                for c in range(n):
                     B[other, c] -= factor * B[row, c]
-                B[other, column] = 0.0
+                B[other, right] -= factor * B[row, right]
+                B[other, pivot] = 0.0
     return least
 
 
 @_compiled
 def row_sizes(B):
-    """Largest entry of each row of B (m, n + 1), the last column left out."""
-    sizes = np.zeros(B.shape[0])
+    """Euclidean length of each row of B (m, n + 1), the last column left out, shape (m,)."""
+    sizes = np.empty(B.shape[0])
     for row in range(B.shape[0]):
+        square = 0.0
         for c in range(B.shape[1] - 1):
-            sizes[row] = max(sizes[row], abs(B[row, c]))
+            square += B[row, c] * B[row, c]
+        sizes[row] = np.sqrt(square)
     return sizes
 
 
@@ -289,84 +322,102 @@ def independent_rows(A, b, v):
 
 @_compiled
 def motions(A, b, v, M, h, Jp, base):
-    """(13)(17) β -> (q̈, λ) as V (nv + k, nb + 1), the free column of each β (nb,), and how well it went.
+    """(13)(17) β -> (q̈, λ) as V (nv + k, nb + 1), which β each entry is (nv + k,), -1 for none, and how well it went.
 
     Motion rows are solved for joints where that is possible, so that straight knees fall back to the base; the base rows
     for the base, and for λ where contacts already hold it.
     """
     nv, k = A.shape[1], Jp.shape[0]
     n = nv + k
-    by_motion, by_base = np.zeros(n), np.empty(n)
+    by_motion, by_base = np.empty(nv), np.empty(n)
     for c in range(n):
-        if c < nv:
-            by_motion[c] = 0.05 if c < base else 1.0
         by_base[c] = 1.0 if c < base else (0.1 if c < nv else 0.01)
+    for c in range(nv):
+        by_motion[c] = 0.05 if c < base else 1.0
     for attempt in range(2):
         m = A.shape[0]
         B = equalities(A, b, M, h, Jp, base)
         pivots = np.empty(m + base, np.int64)
         sizes = row_sizes(B)
-        least = gauss_jordan(B, 0, m, by_motion, pivots, sizes) if m else 1.0
+        least = gauss_jordan(B, 0, m, 0, nv, by_motion, pivots, sizes) if m else 1.0
         if least > _DEPENDENT or attempt == 1:
             break
         A, b, agree = independent_rows(A, b, v)
         if not agree:
-            return np.zeros((n, 1)), np.zeros(0, np.int64), False
+            return np.zeros((n, 1)), pivots, False
     if least > 1e-11:
-        least = min(least, gauss_jordan(B, m, m + base, by_base, pivots, sizes)) if base else least
+        least = min(least, gauss_jordan(B, m, m + base, m, n, by_base, pivots, sizes)) if base else least
     if least <= 1e-11:
-        return np.zeros((n, 1)), np.zeros(0, np.int64), False
-    return parametrised(B, pivots, n)
+        return np.zeros((n, 1)), pivots, False
+    V, beta_of = parametrised(B, pivots, m, n)
+    return V, beta_of, True
 
 
 @_compiled
-def parametrised(B, pivots, n):
-    """V (n, nb + 1) from reduced rows B (m, n + 1), each solved for its pivot; and the free columns (nb,)."""
-    dependent = np.zeros(n, np.bool_)
-    for row in range(pivots.size):
-        dependent[pivots[row]] = True
+def parametrised(B, pivots, m, n):
+    """V (n, nb + 1) from reduced rows B (·, n + 1), each solved for its pivot; and which β each entry is (n,), -1 for none.
+
+    The pivots of rows from m on still stand in the rows before, and are put in here.
+    """
     nb = n - pivots.size
-    free = np.empty(nb, np.int64)
-    V = np.zeros((n, nb + 1))
-    j = 0
+    beta_of, free = np.zeros(n, np.int64), np.empty(nb, np.int64)
+    for row in range(pivots.size):
+        beta_of[pivots[row]] = -1
+    V, j = np.zeros((n, nb + 1)), 0
     for c in range(n):
-        if not dependent[c]:
-            free[j] = c
-            V[c, j] = 1.0
+        if beta_of[c] == 0:
+            beta_of[c], free[j], V[c, j] = j, c, 1.0
             j += 1
     for row in range(pivots.size):
+        at = pivots[row]
         for j in range(nb):
-            V[pivots[row], j] = -B[row, free[j]]
-        V[pivots[row], nb] = B[row, n]
-    return V, free, True
-
-
-@_compiled
-def product(left, right, n):
-    """left (m, n) times the first n rows of right (·, p), shape (m, p); the left's many zeros are skipped."""
-    out = np.zeros((left.shape[0], right.shape[1]))
-    for i in range(left.shape[0]):
-        for j in range(n):
-            factor = left[i, j]
+            V[at, j] = -B[row, free[j]]
+        V[at, nb] = B[row, n]
+    for row in range(m):
+        at = pivots[row]
+        for late in range(m, pivots.size):
+            source = pivots[late]
+            factor = B[row, source]
             if factor != 0.0:
-                for c in range(right.shape[1]):
-                    out[i, c] += factor * right[j, c]
-    return out
+                for j in range(nb + 1):
+                    V[at, j] -= factor * V[source, j]
+    return V, beta_of
 
 
 @_compiled
-def torques(V, M, h, Jp, base):
+def add_product(left, V, beta_of, first, out, row):
+    """Add left (m, n) times rows first:first + n of V to rows row:row + m of out (·, nb + 1); rows of V that are a β only
+    touch one column, and the left's many zeros are skipped."""
+    for i in range(left.shape[0]):
+        for j in range(left.shape[1]):
+            factor = left[i, j]
+            if factor == 0.0:
+                continue
+            if beta_of[first + j] >= 0:
+                out[row + i, beta_of[first + j]] += factor
+            else:
+                for c in range(V.shape[1]):
+                    out[row + i, c] += factor * V[first + j, c]
+
+
+@_compiled
+def torques(V, beta_of, M, h, Jp, base):
     """(16) β -> τ = M_j q̈ + h_j - J_jᵀ λ as T (d, nb + 1), V as from `motions`."""
-    nv, k, width = M.shape[0], Jp.shape[0], V.shape[1]
-    T = product(M[base:], V, nv)
+    nv, k, nb = M.shape[0], Jp.shape[0], V.shape[1] - 1
+    T = np.zeros((nv - base, nb + 1))
+    add_product(M[base:], V, beta_of, 0, T, 0)
     for c in range(k):
         for j in range(nv - base):
             factor = Jp[c, base + j]
-            if factor != 0.0:
-                for i in range(width):
+            if factor == 0.0:
+                continue
+            if beta_of[nv + c] >= 0:
+                T[j, beta_of[nv + c]] -= factor
+            else:
+                for i in range(nb + 1):
                     T[j, i] -= factor * V[nv + c, i]
     for j in range(nv - base):
-        T[j, width - 1] += h[base + j]
+        T[j, nb] += h[base + j]
     return T
 
 
@@ -374,80 +425,59 @@ def torques(V, M, h, Jp, base):
 
 
 @_compiled
-def rotation_error(R, wanted, e):
-    """e = log(R wantedᵀ) into (3,); False where `wanted` (9,), row by row, is no rotation or the turn is near half a turn."""
-    E = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            E[i, j] = 0.0
-            gram = 0.0
-            for c in range(3):
-                E[i, j] += R[i, c] * wanted[3 * j + c]
-                gram += wanted[3 * i + c] * wanted[3 * j + c]
-            if abs(gram - (1.0 if i == j else 0.0)) > 1e-10:
-                return False
-    e[0], e[1], e[2] = 0.5 * (E[2, 1] - E[1, 2]), 0.5 * (E[0, 2] - E[2, 0]), 0.5 * (E[1, 0] - E[0, 1])
-    sine = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-    cosine = 0.5 * (E[0, 0] + E[1, 1] + E[2, 2] - 1.0)
-    if cosine < -0.9:  # a reflection, or a turn whose axis the sine no longer tells
-        return False
+def rotation_error(R, wanted):
+    """e = log(R wantedᵀ), for the three columns of each; and False where `wanted` is no rotation or the turn too far."""
+    upright = dot(cross(wanted[0], wanted[1]), wanted[2]) > 0.0
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        upright &= abs(dot(wanted[a], wanted[a]) - 1.0) <= 1e-10 and abs(dot(wanted[a], wanted[b])) <= 1e-10
+    twice = plus(plus(cross(wanted[0], R[0]), cross(wanted[1], R[1])), cross(wanted[2], R[2]))
+    e = times(0.5, twice)
+    sine = np.sqrt(dot(e, e))
+    cosine = 0.5 * (dot(wanted[0], R[0]) + dot(wanted[1], R[1]) + dot(wanted[2], R[2]) - 1.0)
     scale = 1.0 + sine * sine / 6.0 if sine < 1e-4 else np.arctan2(sine, cosine) / sine
-    for i in range(3):
-        e[i] *= scale
-    return True
+    return times(scale, e), upright and cosine > -0.9  # beyond that the sine no longer tells the axis
 
 
 @_compiled
 def centre_of_mass(oMi, links, velocity, drift):
-    """Position, velocity and J̇ v of the centre of mass, each (3,), world. links: (n, 4) mass and its place in the joint."""
-    com, com_v, com_a, mass = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
-    at, v_at, a_at = np.empty(3), np.empty(3), np.empty(3)
+    """Position, velocity and J̇ v of the centre of mass, world, and the mass. links: (n, 4) mass and its place in the joint."""
+    com, moving, along, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
     for i in range(1, links.shape[0]):
-        for r in range(3):
-            at[r] = oMi[i, 9 + r]
-            for c in range(3):
-                at[r] += oMi[i, 3 * c + r] * links[i, 1 + c]
-        material(velocity[i], drift[i], at, v_at, a_at)
+        at = plus(xyz(oMi, i, 9), turned(rotation_of(oMi, i), xyz(links, i, 1)))
+        v_at, a_at = material(velocity, drift, i, at)
+        com = plus(com, times(links[i, 0], at))
+        moving, along = plus(moving, times(links[i, 0], v_at)), plus(along, times(links[i, 0], a_at))
         mass += links[i, 0]
-        for r in range(3):
-            com[r] += links[i, 0] * at[r]
-            com_v[r] += links[i, 0] * v_at[r]
-            com_a[r] += links[i, 0] * a_at[r]
-    return com / mass, com_v / mass, com_a / mass, mass
+    return times(1.0 / mass, com), times(1.0 / mass, moving), times(1.0 / mass, along), mass
 
 
 @_compiled
-def motion_task(kind, joint, frame, target, tree, oMi, J, Ag, links, velocity, drift, rows, e, e_dot, bias):
-    """Rows (3, nv), e, ė and J̇ v - a_ff, each (3,), of a task on the CoM, an orientation or a frame; False if it has none.
+def motion_task(kind, joint, frames, i, targets, first, tree, oMi, J, Ag, links, velocity, drift, rows):
+    """Rows (3, nv), e, ė, J̇ v - a_ff of task i on the CoM, an orientation or a frame; False if its target is no rotation.
 
-    target: position or rotation, velocity, acceleration, one after the other.
+    targets: from `first` on the position (3) or the rotation (9), row by row, the velocity (3) and the acceleration (3).
     """
     rows[:] = 0.0
-    size = 9 if kind == ORIENTATION else 3
+    wanted = targets.reshape(1, targets.size)
+    after, valid = first + (9 if kind == ORIENTATION else 3), True
     if kind == COM:
-        com, com_v, com_a, mass = centre_of_mass(oMi, links, velocity, drift)
+        at, e_dot, bias, mass = centre_of_mass(oMi, links, velocity, drift)
+        e = minus(at, xyz(wanted, 0, first))
         for r in range(3):
-            e[r], e_dot[r], bias[r] = com[r] - target[r], com_v[r], com_a[r]
             for c in range(J.shape[1]):
                 rows[r, c] = Ag[r, c] / mass
     else:
-        R, p = np.empty((3, 3)), np.empty(3)
-        place(oMi, joint, frame, R, p)
+        R, at = place(oMi, joint, frames, i)
         if kind == ORIENTATION:
-            turning_rows(tree, J, joint, rows)
-            for r in range(3):
-                e_dot[r], bias[r] = velocity[joint, 3 + r], drift[joint, 3 + r]
-            if not rotation_error(R, target, e):
-                return False
+            turning_rows(tree, J, joint, rows, 0)
+            e_dot, bias = xyz(velocity, joint, 3), xyz(drift, joint, 3)
+            by_rows = targets[first:after].reshape(3, 3)
+            e, valid = rotation_error(R, (column(by_rows, 0, 0), column(by_rows, 0, 1), column(by_rows, 0, 2)))
         else:
-            point_rows(tree, J, joint, p, rows)
-            material(velocity[joint], drift[joint], p, e_dot, bias)
-            for r in range(3):
-                e[r] = p[r] - target[r]
-    for r in range(3):
-        e_dot[r] -= target[size + r]
-        bias[r] -= target[size + 3 + r]
-    return True
+            point_rows(tree, J, joint, at, rows, 0)
+            e_dot, bias = material(velocity, drift, joint, at)
+            e = minus(at, xyz(wanted, 0, first))
+    return e, minus(e_dot, xyz(wanted, 0, after)), minus(bias, xyz(wanted, 0, after + 3)), valid
 
 
 @_compiled
@@ -466,32 +496,33 @@ def posture_task(tree, q, v, target, base, e, e_dot):
 
 
 @_compiled
-def objective(q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, free, T, base):
+def objective(q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, beta_of, T, base):
     """(18)(26) ½ Σ weight ‖residual‖² in β as R (rows, nb + 1), diagonal (nb,), aim (nb,), and whether all tasks could be read.
 
-    It is ½ ‖R (β, 1)‖² + ½ Σ diagonal β² - aimᵀ β.
+    It is ½ ‖R (β, 1)‖² + ½ Σ diagonal β² - aimᵀ β. R has a multiple of four rows, the last of them zero.
 
     tasks: (N, 3) kind, joint, first target. gains: (N, 3) weight, kp, kd. frames: (N, 12). V, T: β -> (q̈, λ), τ.
-    Rows of V that are rows of the unit matrix only touch the diagonal.
+    Entries of (q̈, λ) that are a β only touch the diagonal.
     """
     nv, d, nb = J.shape[1], T.shape[0], V.shape[1] - 1
     k = V.shape[0] - nv
-    R = np.zeros((3 * tasks.shape[0] + 2 * d + k, nb + 1))
+    R = np.zeros((3 * tasks.shape[0] + 2 * d + k + 3, nb + 1))
     used, rows = 0, np.empty((3, nv))
-    e, e_dot, bias, ej, ej_dot = np.empty(3), np.empty(3), np.empty(3), np.empty(d), np.empty(d)
+    ej, ej_dot = np.empty(d), np.empty(d)
     weight, wanted = np.zeros(nv + k + d), np.zeros(nv + k + d)  # of the terms w/2 (x_i - wanted_i)² on single entries
     for i in range(tasks.shape[0]):
         kind, at, w, kp, kd = tasks[i, 0], tasks[i, 2], gains[i, 0], gains[i, 1], gains[i, 2]
         if kind <= FRAME:
-            if not motion_task(
-                kind, tasks[i, 1], frames[i], targets[at:], tree, oMi, J, Ag, links, velocity, drift, rows, e, e_dot, bias
-            ):
+            e, e_dot, bias, valid = motion_task(
+                kind, tasks[i, 1], frames, i, targets, at, tree, oMi, J, Ag, links, velocity, drift, rows
+            )
+            if not valid:
                 return R, weight, wanted, False
-            root, part = np.sqrt(w), product(rows, V, nv)
-            for r in range(3):
-                for c in range(nb + 1):
-                    R[used + r, c] = root * part[r, c]
-                R[used + r, nb] += root * (bias[r] + kp * e[r] + kd * e_dot[r])
+            root = np.sqrt(w)
+            rows *= root
+            add_product(rows, V, beta_of, 0, R, used)
+            pull = times(root, plus(bias, plus(times(kp, e), times(kd, e_dot))))
+            R[used, nb], R[used + 1, nb], R[used + 2, nb] = plus(column(R, used, nb), pull)
             used += 3
         else:
             first = nv + k if kind == TORQUE else (nv if kind == FORCE else base)
@@ -501,23 +532,21 @@ def objective(q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velo
                 goal = -kp * ej[j] - kd * ej_dot[j] if kind == POSTURE else targets[at + j]
                 weight[first + j] += w
                 wanted[first + j] += w * goal
-    diagonal, aim, used = single_entries(R, used, V, free, T, weight, wanted)
-    return R[:used], diagonal, aim, True
+    diagonal, aim, used = single_entries(R, used, V, beta_of, T, weight, wanted)
+    return R[: 4 * ((used + 3) // 4)], diagonal, aim, True
 
 
 @_compiled
-def single_entries(R, used, V, free, T, weight, wanted):
+def single_entries(R, used, V, beta_of, T, weight, wanted):
     """Add Σ (weight / 2) (x - wanted / weight)² over single entries x of (q̈, λ, τ) to R, or to the diagonal where x is a β.
 
     Returns the diagonal and the aim, each (nb,), and the number of rows of R in use.
     """
     nb, n = V.shape[1] - 1, V.shape[0]
     diagonal, aim = np.zeros(nb), np.zeros(nb)
-    column = 0
     for i in range(n + T.shape[0]):
-        if column < nb and free[column] == i:
-            diagonal[column], aim[column] = weight[i], wanted[i]
-            column += 1
+        if i < n and beta_of[i] >= 0:
+            diagonal[beta_of[i]], aim[beta_of[i]] = weight[i], wanted[i]
         elif weight[i] > 0.0:
             row = V[i] if i < n else T[i - n]
             root = np.sqrt(weight[i])
@@ -530,13 +559,18 @@ def single_entries(R, used, V, free, T, weight, wanted):
 
 @_compiled
 def normal_equations(R, diagonal, aim):
-    """Hessian (nb, nb) and slope (nb,) at β = 0 of an objective as `objective` gives it."""
+    """Hessian (nb, nb), of which only the lower triangle is filled, and slope (nb,) at β = 0, of what `objective` gives."""
     nb = diagonal.size
-    both = np.dot(R.T, R)
-    slope = -aim
-    for c in range(nb):
-        slope[c] += both[c, nb]
-        both[c, c] += diagonal[c]
+    both = np.zeros((nb + 1, nb + 1))
+    for i in range(0, R.shape[0], 4):  # four rows at a time: each sum is fetched and stored once for all of them
+        for r in range(nb + 1):
+            a, b, c, d = R[i, r], R[i + 1, r], R[i + 2, r], R[i + 3, r]
+            for s in range(r + 1):
+                both[r, s] += a * R[i, s] + b * R[i + 1, s] + c * R[i + 2, s] + d * R[i + 3, s]
+    slope = np.empty(nb)
+    for r in range(nb):
+        both[r, r] += diagonal[r]
+        slope[r] = both[nb, r] - aim[r]
     return both[:nb, :nb], slope
 
 
@@ -561,7 +595,7 @@ def gradient(R, diagonal, aim, beta):
 
 @_compiled
 def cholesky(H):
-    """L (nb, nb) with L Lᵀ = H, and whether every direction is curved."""
+    """L (nb, nb) with L Lᵀ = H, of which the lower triangle is read; and whether every direction is curved."""
     n = H.shape[0]
     L = np.zeros((n, n))
     for j in range(n):
@@ -611,21 +645,33 @@ def inverse(L):
 
 
 @_compiled
-def image(V, beta, out):
-    """out = V (β, 1), for V (n, nb + 1)."""
+def image(V, beta, first, last, out):
+    """out (last - first,) = rows first:last of V (·, nb + 1) times (β, 1)."""
     nb = beta.size
-    for i in range(V.shape[0]):
+    for i in range(first, last):
         total = V[i, nb]
         for c in range(nb):
             total += V[i, c] * beta[c]
-        out[i] = total
+        out[i - first] = total
 
 
 @_compiled
-def worst_facet(cone, f):
-    """(28) The facet that a force f (3,) is furthest beyond, or -1 where it is beyond none; cone: (F + 1, 3), last -normal.
+def forces_of(V, beta_of, beta, forces):
+    """forces (k,) = the last k rows of V times (β, 1); most of them are a β."""
+    first = V.shape[0] - forces.size
+    for i in range(forces.size):
+        if beta_of[first + i] >= 0:
+            forces[i] = beta[beta_of[first + i]]
+        else:
+            image(V, beta, first + i, first + i + 1, forces[i:])
 
-    Facets look along evenly turned tangents, the first along t1, so the tangential force itself points at the worst one.
+
+@_compiled
+def worst_facet(cone, f, least):
+    """(28) The facet that a force f (3,) is furthest beyond, or -1 where it is beyond none by more than `least`.
+
+    cone: (F + 1, 3) rows, the last -normal. Facets look along evenly turned tangents, the first along t1, so the tangential
+    force itself points at the worst one.
     """
     facets = cone.shape[0] - 1
     nx, ny, nz = -cone[facets, 0], -cone[facets, 1], -cone[facets, 2]
@@ -633,24 +679,23 @@ def worst_facet(cone, f):
     x, y, z = cone[0, 0] + mu * nx, cone[0, 1] + mu * ny, cone[0, 2] + mu * nz
     along = x * f[0] + y * f[1] + z * f[2]
     across = (ny * z - nz * y) * f[0] + (nz * x - nx * z) * f[1] + (nx * y - ny * x) * f[2]
-    room = mu * (nx * f[0] + ny * f[1] + nz * f[2])
+    room = mu * (nx * f[0] + ny * f[1] + nz * f[2]) + least
     if room >= 0.0 and along * along + across * across <= room * room:
         return -1
     return int(np.rint(np.arctan2(across, along) * facets / (2.0 * np.pi))) % facets
 
 
 @_compiled
-def most_violated(forces, tau, cones, lengths, least_normal, limits):
-    """The row of (27)(28) that is furthest beyond its bound, in unit length; -1 where none is.
+def violated_force_row(forces, cones, lengths, least_normal):
+    """The row of (28) or of least normal force that is furthest beyond its bound, in unit length; -1 where none is.
 
     cones: (P, F + 1, 3) rows of G for one point's force, the last -normal. lengths: (P, F + 1) of those rows.
-    Rows are counted as P (F + 1) force rows, then d upper and d lower torque limits.
     """
     worst, found = _VIOLATED, -1
     per_point = cones.shape[1]
     for i in range(cones.shape[0]):
         f = forces[3 * i : 3 * i + 3]
-        for j in (worst_facet(cones[i], f), per_point - 1):
+        for j in (worst_facet(cones[i], f, worst * lengths[i, 0]), per_point - 1):
             if j < 0:
                 continue
             excess = cones[i, j, 0] * f[0] + cones[i, j, 1] * f[1] + cones[i, j, 2] * f[2]
@@ -658,13 +703,34 @@ def most_violated(forces, tau, cones, lengths, least_normal, limits):
                 excess += least_normal
             if excess > worst * lengths[i, j]:
                 worst, found = excess / lengths[i, j], i * per_point + j
-    first = cones.shape[0] * per_point
+    return found
+
+
+@_compiled
+def violated_torque_row(tau, limits):
+    """The torque limit that is furthest exceeded, counted as d upper ones, then d lower ones; -1 where none is."""
+    worst, found = _VIOLATED, -1
     for j in range(tau.size):
         if tau[j] - limits[j] > worst:
-            worst, found = tau[j] - limits[j], first + j
+            worst, found = tau[j] - limits[j], j
         if -tau[j] - limits[j] > worst:
-            worst, found = -tau[j] - limits[j], first + tau.size + j
+            worst, found = -tau[j] - limits[j], tau.size + j
     return found
+
+
+@_compiled
+def violated_row(V, beta_of, T, beta, cones, lengths, least_normal, limits, forces, tau):
+    """A row of (27)(28) that β violates, -1 for none: P (F + 1) force rows, then d upper and d lower torque limits.
+
+    Torques are looked at when all forces are where they should be: they cost more to compute. forces (k,), tau (d,): room.
+    """
+    forces_of(V, beta_of, beta, forces)
+    found = violated_force_row(forces, cones, lengths, least_normal)
+    if found >= 0:
+        return found
+    image(T, beta, 0, tau.size, tau)
+    found = violated_torque_row(tau, limits)
+    return found if found < 0 else cones.shape[0] * cones.shape[1] + found
 
 
 @_compiled
@@ -731,19 +797,34 @@ def drop_row(W, U, active, mu, at, q):
 
 
 @_compiled
-def directions(W, U, row, q, d, z, r):
-    """Goldfarb-Idnani: d = W row, the step z in β and r in the q multipliers, as the new row's multiplier grows by 1."""
-    n = row.size
+def in_factor(W, row, d):
+    """d (nb,) = W row; most rows are of one force whose entries are three of the β, and have no other entries."""
+    n, count, i, j, k = row.size, 0, 0, 0, 0
+    for c in range(n):
+        if row[c] != 0.0:
+            i, j, k = j, k, c
+            count += 1
+    if count > 3:
+        for r in range(n):
+            d[r] = 0.0
+            for c in range(n):
+                d[r] += W[r, c] * row[c]
+        return
+    a, b = row[i] if count > 2 else 0.0, row[j] if count > 1 else 0.0
+    for r in range(n):
+        d[r] = a * W[r, i] + b * W[r, j] + row[k] * W[r, k]
+
+
+@_compiled
+def directions(W, U, d, q, z, r):
+    """Goldfarb-Idnani: the step z in β and r in the q multipliers as the new row's multiplier grows by 1; d (nb,) = W row."""
+    n = d.size
     for i in range(n):
         z[i] = 0.0
-    for j in range(n):
-        total = 0.0
+    for j in range(q, n):
+        factor = d[j]
         for i in range(n):
-            total += W[j, i] * row[i]
-        d[j] = total
-        if j >= q:
-            for i in range(n):
-                z[i] -= total * W[j, i]
+            z[i] -= factor * W[j, i]
     for i in range(q - 1, -1, -1):
         total = d[i]
         for j in range(i + 1, q):
@@ -757,7 +838,8 @@ def enforce(row, bound, beta, W, U, active, mu, q, number):
     n = beta.size
     d, z, r, push = np.empty(n), np.empty(n), np.empty(n), 0.0
     for _ in range(2 * n + 2):
-        directions(W, U, row, q, d, z, r)
+        in_factor(W, row, d)
+        directions(W, U, d, q, z, r)
         curve, size, over = 0.0, 0.0, -bound
         for j in range(n):
             size += d[j] * d[j]
@@ -823,26 +905,23 @@ def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
 
 
 @_compiled
-def dual_search(R, diagonal, aim, V, T, cones, lengths, least_normal, limits):
+def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, limits):
     """(27) β (nb,) with the least objective that keeps all rows; the active rows, their multipliers, and a status.
 
     The dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): start at the optimum without rows,
-    bring the most violated one to its bound, again and again. Rows that are never violated are only looked at.
+    bring a violated one to its bound, again and again. Rows that are never violated are only looked at.
     """
     H, slope = normal_equations(R, diagonal, aim)
-    nb, k, q = slope.size, 3 * cones.shape[0], 0
+    nb, q = slope.size, 0
     active, mu, bounds, rows = np.empty(nb, np.int64), np.empty(nb), np.empty(nb), np.empty((nb, nb))
     L, curved = cholesky(H)
     if not curved:
         return slope, active[:0], mu[:0], DOUBTFUL
     beta = minimum(L, slope)
-    forces, tau = np.empty(k), np.empty(T.shape[0])
+    forces, tau = np.empty(3 * cones.shape[0]), np.empty(T.shape[0])
     W, U = L, L  # made when the first row is violated
-    polish(beta, mu, active, q, gradient(R, diagonal, aim, beta), L, W, U, rows, bounds)
     for count in range(100 + 10 * nb):
-        image(V[V.shape[0] - k :], beta, forces)
-        image(T, beta, tau)
-        number = most_violated(forces, tau, cones, lengths, least_normal, limits)
+        number = violated_row(V, beta_of, T, beta, cones, lengths, least_normal, limits, forces, tau)
         if number < 0:
             break
         if count == 0:
@@ -853,23 +932,48 @@ def dual_search(R, diagonal, aim, V, T, cones, lengths, least_normal, limits):
             return beta, active[:0], mu[:0], status
     if number >= 0:
         return beta, active[:0], mu[:0], DOUBTFUL
-    if q > 0:
-        for a in range(q):
-            bounds[a] = row_in_beta(active[a], V, T, cones, least_normal, limits, rows[a])
-        polish(beta, mu, active, q, gradient(R, diagonal, aim, beta), L, W, U, rows, bounds)
+    for a in range(q):
+        bounds[a] = row_in_beta(active[a], V, T, cones, least_normal, limits, rows[a])
+    polish(beta, mu, active, q, gradient(R, diagonal, aim, beta), L, W, U, rows, bounds)
     return beta, active[:q], mu[:q], SOLVED
 
 
 @_compiled
-def tick(
-    q, v, targets, M, h, J, Ag, oMi, tree, links, contacts, contact_frames, points, cones, lengths, tasks, gains, frames,
-    limits, least_normal,
-):  # fmt: skip
+def unpacked(sizes, indices, numbers):
+    """The tables of robot, contacts and tasks as `packed` laid them out, in the order in which `tick` takes them.
+
+    sizes: joints, contacts, points, facets + 1, tasks, driven joints. indices, numbers: whole and real numbers, row by row.
+    """
+    n, n_contacts, n_points, n_rows, n_tasks, d = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5]
+    i, j = 5 * n, 5 * n + 4 * n_contacts
+    tree, contacts = indices[:i].reshape(n, 5), indices[i:j].reshape(n_contacts, 4)
+    tasks = indices[j:].reshape(n_tasks, 3)
+    a = 4 * n
+    b = a + 16 * n_contacts
+    c = b + 3 * n_points
+    e = c + 3 * n_points * n_rows
+    f = e + n_points * n_rows
+    g = f + 3 * n_tasks
+    o = g + 12 * n_tasks
+    links, contact_frames = numbers[:a].reshape(n, 4), numbers[a:b].reshape(n_contacts, 16)
+    points, cones = numbers[b:c].reshape(n_points, 3), numbers[c:e].reshape(n_points, n_rows, 3)
+    lengths, gains, frames = (
+        numbers[e:f].reshape(n_points, n_rows), numbers[f:g].reshape(n_tasks, 3), numbers[g:o].reshape(n_tasks, 12),
+    )  # fmt: skip
+    limits, least_normal = numbers[o : o + d], numbers[o + d]
+    return tree, links, contacts, contact_frames, points, cones, lengths, tasks, gains, frames, limits, least_normal
+
+
+@_compiled
+def tick(q, v, targets, M, h, J, Ag, oMi, sizes, indices, numbers):
     """(26)(27) x = (q̈, τ, λ) of shape (nv + d + k,), the active rows (a,), their multipliers (a,), and a status.
 
     q: (nq,). v: (nv,). targets: those of all tasks, one after the other. M, h, J, Ag, oMi: Pinocchio's results for q and v.
-    The rest describes robot, contacts and tasks as the functions above take them.
+    sizes, indices, numbers: the tables of robot, contacts and tasks, as for `unpacked`; few arrays, since each costs.
     """
+    tree, links, contacts, contact_frames, points, cones, lengths, tasks, gains, frames, limits, least_normal = unpacked(
+        sizes, indices, numbers
+    )
     nv, d, k = v.size, limits.size, 3 * points.shape[0]
     base = nv - d
     x, none = np.empty(nv + d + k), np.zeros(0, np.int64)
@@ -880,20 +984,20 @@ def tick(
     velocity, drift = sweep(tree, J, v)
     A, b, Jp = contact_rows(tree, oMi, J, velocity, drift, contacts, contact_frames, points)
     Mc = np.ascontiguousarray(M.T)  # symmetric; Pinocchio's is stored by columns
-    V, free, regular = motions(A, b, v, Mc, h, Jp, base)
+    V, beta_of, regular = motions(A, b, v, Mc, h, Jp, base)
     if not regular:
         return x, none, x[:0], DOUBTFUL
-    T = torques(V, Mc, h, Jp, base)
+    T = torques(V, beta_of, Mc, h, Jp, base)
     R, diagonal, aim, readable = objective(
-        q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, free, T, base
+        q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, beta_of, T, base
     )
     if not readable:
         return x, none, x[:0], REFUSED
-    beta, active, mu, status = dual_search(R, diagonal, aim, V, T, cones, lengths, least_normal, limits)
+    beta, active, mu, status = dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, limits)
     if status == SOLVED:
-        image(V[:nv], beta, x[:nv])
-        image(T, beta, x[nv : nv + d])
-        image(V[nv:], beta, x[nv + d :])
+        image(V, beta, 0, nv, x[:nv])
+        image(T, beta, 0, d, x[nv : nv + d])
+        image(V, beta, nv, nv + k, x[nv + d :])
         if not finite(x):
             status = DOUBTFUL
     return x, active, mu, status
