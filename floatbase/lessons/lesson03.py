@@ -61,33 +61,49 @@ def standing_still(space: FeasibleSpace) -> Array:
 
 
 def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike) -> str:
-    """Draw (q̈, τ, λ) of a β: forces as arrows, where q̈ leads as a veil; return all the numbers as bars, SVG."""
+    """Draw (q̈, τ, λ) of a β: forces as arrows, where q̈ leads from rest as a veil; return all the numbers as bars, SVG."""
     qdd, tau, forces = space(beta)
     state = space.eom.state
     ghost = state.at(q=state.integrate(0.5 * GHOST_TIME**2 * qdd), v=np.zeros(space.eom.nv))
-    view.show(state, contacts=space.eom.contacts, planned=forces, ghost=ghost)
+    veiled = view.painter.picture(state, com=False, ghost=ghost)  # under another name: it is not a posture that anyone wants
+    veil = {path.replace("ghost/", "veil/"): item for path, item in veiled.items() if path.startswith("ghost/")}
+    view.show(state, contacts=space.eom.contacts, planned=forces, extra=veil)
     return bars(qdd, tau, forces)
 
 
 def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tuple[float, float, float] = FULL) -> str:
-    """All numbers of a motion as bars, SVG. full: what a bar of full length means in each group; longer ones get a dark end."""
-    groups = (("q̈", "m/s², rad/s²", "#7A86A8"), ("τ", "N·m", "#E69F00"), ("λ", "N", "#0072B2"))
+    """All numbers of a quadruped's motion as bars, SVG, leg by leg.
+
+    full: what a bar of full length means in each group; longer ones get a dark end.
+    """
+    legs = ("front left", "front right", "rear left", "rear right")
+    groups = (
+        ("q̈", "m/s², rad/s²", "#7A86A8", ("base x y z", "turning", *legs)),
+        ("τ", "N·m", "#E69F00", legs),
+        ("λ", "N", "#0072B2", legs),
+    )
     parts, x = [], 10
-    for (name, unit, colour), values, most in zip(groups, (qdd, tau, forces), full, strict=True):
+    for (name, unit, colour, blocks), values, most in zip(groups, (qdd, tau, forces), full, strict=True):
         parts.append(f'<text x="{x}" y="12" font-size="11" fill="#222">{name}, ± {most:g} {unit}</text>')
-        parts.append(f'<line x1="{x}" y1="60" x2="{x + 12 * np.size(values) - 3}" y2="60" stroke="#888"/>')
-        for value in np.ravel(values):
-            length = min(abs(value) / most, 1.0) * 40
-            parts.append(_bar(x, 60 - length if value > 0 else 60, length, colour))
-            if length == 40:
-                parts.append(_bar(x, 20 if value > 0 else 97, 3, "#222"))
-            x += 12
-        x += 24
-    return f'<svg width="{1.6 * x:.0f}" style="max-width: 100%" viewBox="0 0 {x} 106">{"".join(parts)}</svg>'
+        parts.append(f'<line x1="{x}" y1="60" x2="{x + 12 * np.size(values) + 5 * len(blocks) - 8}" y2="60" stroke="#888"/>')
+        for block, three in zip(blocks, np.reshape(values, (-1, 3)), strict=True):
+            parts.append(f'<text x="{x + 17}" y="112" font-size="7" fill="#444" text-anchor="middle">{block}</text>')
+            for value in three:
+                parts += _bar(x, float(value) / most, colour)
+                x += 12
+            x += 5
+        x += 20
+    return f'<svg width="{1.45 * x:.0f}" style="max-width: 100%" viewBox="0 0 {x} 118">{"".join(parts)}</svg>'
 
 
-def _bar(x: float, top: float, length: float, colour: str) -> str:
-    return f'<rect x="{x}" y="{top:.1f}" width="9" height="{length:.1f}" fill="{colour}"/>'
+def _bar(x: float, part: float, colour: str) -> list[str]:
+    """A bar at x, up or down from the middle; part: of the full length."""
+    length = min(abs(part), 1.0) * 40
+    top = 60 - length if part > 0 else 60
+    drawn = [f'<rect x="{x}" y="{top:.1f}" width="9" height="{length:.1f}" fill="{colour}"/>']
+    if length == 40:
+        drawn.append(f'<rect x="{x}" y="{20 if part > 0 else 97}" width="9" height="3" fill="#222"/>')
+    return drawn
 
 
 def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[str, int]) -> Figure:
@@ -95,7 +111,8 @@ def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[s
     A = np.asarray(A)
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained", width_ratios=[3, 2])
     size = np.log10(np.maximum(np.abs(A), 1e-12))
-    left.imshow(np.where(np.abs(A) > 1e-9, size, np.nan), cmap="viridis", aspect="auto", vmin=-3, vmax=1.5)
+    shown = left.imshow(np.where(np.abs(A) > 1e-9, size, np.nan), cmap="viridis", aspect="auto", vmin=-3, vmax=1.5)
+    figure.colorbar(shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="size, as a power of ten", shrink=0.8)
     _name_blocks(left, rows, columns)
     values = np.linalg.svd(A, compute_uv=False)
     right.semilogy(np.arange(1, len(values) + 1), values, "o", color="#0072B2")
@@ -224,6 +241,9 @@ def _wrong_squeezes() -> dict[str, Any]:
         ),
         "The frame: the forces are given in world axes already; the base's rotation takes them out of it.": torques(
             lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation)
+        ),
+        "This is the J of the standing robot; `tilted` has another posture, so another J.": (
+            lambda: -standing_go2().J[:, 6:].T @ tilted_squeeze()[1]
         ),
         "h is in it: that would hold the robot up as well. Asked for is only what the squeeze adds.": torques(
             after=lambda eom, tau: tau + eom.h[6:]

@@ -169,6 +169,23 @@ def test_the_pictures_are_drawn() -> None:
     finally:
         view.close()
     assert "rank J = <b>11</b>" in text
-    assert "#222" in bars([100.0], [0.0], [-200.0])
-    assert len(matrix_picture(np.eye(4), {"a": 1, "b": 3}, {"c": 2, "d": 2}).axes) == 2
+    assert bars(np.full(18, 19.0), np.zeros(12), np.zeros(12)).count("#222") == 3  # the names of the groups
+    assert bars(np.full(18, 21.0), np.zeros(12), np.full(12, -200.0)).count("#222") == 33  # and a dark end for each
+    assert len(matrix_picture(np.eye(4), {"a": 1, "b": 3}, {"c": 2, "d": 2}).axes) == 3  # with the colour bar
     assert ConstantTorques([1.0])(np.zeros(1), np.zeros(1), 0.0).tau == [1.0]
+
+
+def test_03_2_knows_the_jacobian_of_another_posture() -> None:
+    answer = verdict("03.2", -standing_go2().J[:, 6:].T @ tilted_squeeze()[1])
+    assert not answer.right and "another posture" in answer.text
+
+
+def test_the_veil_of_a_motion_is_not_called_a_wanted_posture() -> None:
+    space = space_of(GO2)
+    view = fb.Viewer(GO2)
+    try:
+        show_beta(view, space, standing_still(space) + 5.0)
+        drawn = str(view.window.scene.lasting())
+    finally:
+        view.close()
+    assert "veil" in drawn and "wanted posture" not in drawn
