@@ -20,12 +20,13 @@ from floatbase.lessons.lesson03 import ConstantTorques, Shaped, standing_go2, ti
 from floatbase.robots.robot import Robot
 from floatbase.simulation.rollout import Rollout
 from floatbase.viewer import shapes
-from floatbase.viewer.colours import COM
+from floatbase.viewer.colours import ALARM, COM, hexadecimal
 from floatbase.viewer.scene import Viewer
 
 WANTED = np.array([0.0, 0.5, 0.0])  # m/s², world: to the left
 ARROW = 0.5  # m drawn for 1 m/s²
 LEVELS = (0.02, 0.125, 0.4, 1.0, 2.0)  # of a cost above its least value
+VALLEY = 0.02  # a direction that is so many times less curved than another counts as the floor of a valley
 RISE_TIME = 0.02  # s in which the engine's soft contact settles
 
 
@@ -63,7 +64,10 @@ def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, lengt
 
 
 def slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
-    """Level curves of costs over two numbers: title=(cost, name of x, name of y, half the width of the picture)."""
+    """Level curves of costs over two numbers: title=(cost, name of x, name of y, half the width of the picture).
+
+    Yellow is cheap. A dot marks the least point of a cost that has one, and no valley.
+    """
     figure, axes = plt.subplots(1, len(costs), figsize=(3.6 * len(costs), 3.5), layout="constrained", squeeze=False)
     for ax, (title, (cost, x_name, y_name, half)) in zip(axes[0], costs.items(), strict=True):
         x, y = np.meshgrid(np.linspace(-half, half, 80), np.linspace(-half, half, 80))
@@ -72,6 +76,9 @@ def slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
         height = (height - height.min()).reshape(x.shape)
         ax.contourf(x, y, np.sqrt(height), levels=14, cmap="viridis_r")
         ax.contour(x, y, height, levels=LEVELS, colors="white", linewidths=0.8)
+        flat, curved = np.linalg.eigvalsh(cost.H)
+        if flat > VALLEY * curved:
+            ax.plot(*cost.minimiser(), "o", color=hexadecimal(ALARM), markeredgecolor="white", markersize=8)
         ax.set(xlabel=x_name, ylabel=y_name, title=title.replace("_", " "), aspect="equal")
     plt.close(figure)
     return figure

@@ -149,6 +149,8 @@ def test_the_pictures_are_drawn() -> None:
     bowl = fb.Quadratic.from_residual([[2.0, 0.0], [0.0, 1.0]], [2.0, 1.0])
     valley = fb.Quadratic.from_residual([[1.0, 1.0]], [1.0])
     assert len(slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes) == 2
+    dots = [len(axis.lines) for axis in slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes]
+    assert dots == [1, 0]  # a valley has no least point
     drawn = level_curves(bowl, [1.0, 1.0], 2.0, "x", "y")
     assert "translate(195.0 65.0)" in drawn and 'cx="195.0" cy="65.0"' in drawn  # both at (1, 1): right of and above the middle
     assert "nan" not in level_curves(valley, [0.0, 0.0], 2.0, "x", "y")
