@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from floatbase._arrays import Array
 from floatbase.errors import unknown_name
 from floatbase.lessons import progress
 
@@ -30,6 +31,34 @@ class Verdict:
 
     def __repr__(self) -> str:
         return f"{'✓ Right.' if self.right else '✗ Not yet.'} {self.text}"
+
+
+def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
+    """The answer as an array of one of these shapes, finite; or what is wrong with it, whatever it is."""
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
+    try:
+        plain = np.asarray(answer)
+        given = np.asarray(plain, dtype=np.float64) if not np.iscomplexobj(plain) else None
+    except (TypeError, ValueError):
+        given = None
+    if given is None:
+        return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.")
+    if given.shape not in shapes:
+        return Verdict(False, _wrong_shape(given.shape, shapes[0]))
+    if not np.all(np.isfinite(given)):
+        return Verdict(False, "The answer holds numbers that are not finite.")
+    return given
+
+
+def _wrong_shape(given: tuple[int, ...], wanted: tuple[int, ...]) -> str:
+    if not wanted:
+        return f"One number is asked for; this has shape {given}."
+    if not given:
+        return f"This is a single number; the answer should have shape {wanted}."
+    flat = sorted(given) == sorted((1, *wanted))
+    column = " This is a matrix with one row or column: `.ravel()` makes it flat." if flat else ""
+    return f"The answer has shape {given}; it should have shape {wanted}.{column}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,16 +89,9 @@ class Numeric:
 
     def __call__(self, answer: Any) -> Verdict:
         right = np.asarray(self.right(), dtype=np.float64)
-        if answer is None or answer is Ellipsis:
-            return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
-        try:
-            given = np.asarray(answer, dtype=np.float64)
-        except (TypeError, ValueError):
-            return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.")
-        if given.shape != right.shape:
-            return Verdict(False, f"The answer has shape {given.shape}; it should have shape {right.shape}.")
-        if not np.all(np.isfinite(given)):
-            return Verdict(False, "The answer holds numbers that are not finite.")
+        given = numbers(answer, right.shape)
+        if isinstance(given, Verdict):
+            return given
         if self._equal(given, right):
             return Verdict(True, self.praise)
         for hint, wrong in self.mistakes.items():
@@ -84,6 +106,22 @@ class Numeric:
     def _equal(self, a: Any, b: Any) -> bool:
         b = np.asarray(b, dtype=np.float64)
         return a.shape == b.shape and bool(np.max(np.abs(a - b)) <= self.tolerance * (1e-9 + np.max(np.abs(b))))
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped:
+    """A judge that knows what a wrong shape means before it asks another one. shapes: for each, the hint."""
+
+    judge: Callable[[Any], Verdict]
+    shapes: Mapping[tuple[int, ...], str]
+
+    def __call__(self, answer: Any) -> Verdict:
+        try:
+            shape = np.shape(answer)
+        except ValueError:  # rows of different lengths
+            return self.judge(answer)
+        hint = self.shapes.get(shape) if answer is not None else None
+        return Verdict(False, hint) if hint else self.judge(answer)
 
 
 def exercises() -> dict[str, Exercise]:

@@ -19,7 +19,7 @@ import floatbase as fb
 from floatbase._arrays import Array, read_only
 from floatbase.dynamics.constraints import fixed_frame
 from floatbase.lessons.controls import slider_panel
-from floatbase.lessons.exercises import Exercise, Numeric, Verdict
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.objectives.tasks import Task
 from floatbase.robots.robot import Robot
 from floatbase.simulation.rollout import Rollout
@@ -307,18 +307,6 @@ def _play(view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Pict
 # exercises --------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """A judge that first names the mistake behind a shape, then asks another judge."""
-
-    hints: dict[tuple[int, ...], str]
-    judge: Callable[[Any], Verdict]
-
-    def __call__(self, answer: Any) -> Verdict:
-        shape = getattr(answer, "shape", None)
-        return Verdict(False, self.hints[shape]) if shape in self.hints else self.judge(answer)
-
-
 @cache
 def _pressed() -> tuple[fb.State, Array, Array]:
     """The pressing arm without bolts, the tool's position seen from the base, and f_r."""
@@ -362,19 +350,10 @@ def _carried_by_friction() -> float:
 
 def _judge_thrust(answer: Any) -> Verdict:
     """Thrusts at the four feet of a standing go2: 200 N straight up in all, and no moment about the centre of mass."""
-    if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
-    try:
-        f = np.asarray(answer, dtype=np.float64)
-    except (TypeError, ValueError):
-        return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.")
-    if f.shape == (3, 4):
-        return Verdict(False, "This is the transpose: one row for each foot, three columns.")
-    if f.shape not in ((4, 3), (12,)):
-        return Verdict(False, f"The answer has shape {f.shape}; it should have shape (4, 3), a row for each foot.")
+    f = numbers(answer, (4, 3), (12,))
+    if isinstance(f, Verdict):
+        return f
     f = f.reshape(4, 3)
-    if not np.all(np.isfinite(f)):
-        return Verdict(False, "The answer holds numbers that are not finite.")
     state = fb.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     # by the momentum that (4) brings about, not by sums of forces and levers
@@ -416,14 +395,14 @@ EXERCISES = (
         statement="solo8 has two joints in each of its four legs. Write its actuation matrix S of (3).",
         stub="S_solo8 = np.eye(8)  # replace this: stack what is missing",
         solution="S_solo8 = np.vstack([np.zeros((6, 8)), np.eye(8)])",
-        judge=Shapes(
-            {
+        judge=Shaped(
+            shapes={
                 (8, 8): "S maps 8 torques into all rows of the equations of motion. How many rows does a base add, and where?",
                 (8, 14): "This is the transpose of the answer: S takes 8 torques to 14 rows.",
                 (9, 8): "A base adds more than one row: three for its position, three for its orientation.",
                 (15, 8): "15 counts the quaternion's four numbers. Rows of (4) go with velocities, and a rotation has three.",
             },
-            Numeric(
+            judge=Numeric(
                 right=_actuation_of_solo8,
                 praise="Six rows that no motor reaches, then one row for each motor.",
                 mistakes={
@@ -470,7 +449,7 @@ EXERCISES = (
         solution="lever = contacts.positions(state) - state.com\n"
         "G = np.vstack([np.tile(np.eye(3), 4), np.hstack([np.cross(np.eye(3), -r).T for r in lever])])\n"
         "thrust = np.linalg.lstsq(G, [0, 0, 200, 0, 0, 0], rcond=None)[0].reshape(4, 3)",
-        judge=_judge_thrust,
+        judge=Shaped(_judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}),
         explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; least squares gives the "
         "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, (20) and (21).",
     ),

@@ -23,8 +23,7 @@ from floatbase.dynamics import PointContact
 from floatbase.dynamics.constraints import RollingWheel
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.lessons.controls import slider_panel
-from floatbase.lessons.exercises import Exercise, Numeric, Verdict
-from floatbase.lessons.lesson01 import Shapes
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
 from floatbase.robots.robot import Robot
 from floatbase.simulation.rollout import Rollout
 from floatbase.viewer import geometry, marks, props, shapes
@@ -456,13 +455,13 @@ EXERCISES = (
         "Which generalised force, shape (18,), enters (4)?",
         stub="generalised = np.zeros(18)  # replace this, using moving.frame_jacobian and push",
         solution='generalised = moving.frame_jacobian("FL_foot")[:3].T @ push',
-        judge=Shapes(
-            {
+        judge=Shaped(
+            shapes={
                 (3,): "(4) has a row for each direction of velocity: J takes 18 numbers to 3, its transpose goes back.",
                 (12,): "These are the joints alone. The force also pushes the base: its six rows are missing.",
                 (6,): "frame_jacobian has six rows, three linear and three angular; a force at a point takes the first three.",
             },
-            Numeric(
+            judge=Numeric(
                 right=_generalised,
                 praise="The same matrix that turns velocities into the foot's velocity turns its force into all rows.",
                 mistakes={

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -16,7 +15,7 @@ import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.dynamics.subspace import FeasibleSpace, rank
-from floatbase.lessons.exercises import Exercise, Numeric, Verdict
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.robots.robot import Robot
 from floatbase.viewer.scene import Viewer
 
@@ -169,23 +168,6 @@ def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Shaped:
-    """A judge that knows what a wrong shape means before it asks another one. shapes: for each, the hint."""
-
-    judge: Numeric
-    shapes: Mapping[tuple[int, ...], str]
-
-    def __call__(self, answer: Any) -> Verdict:
-        try:
-            shape = np.shape(answer)
-        except ValueError:  # rows of different lengths
-            shape = ()
-        if answer is not None and shape in self.shapes:
-            return Verdict(False, self.shapes[shape])
-        return self.judge(answer)
-
-
 @cache
 def _go2() -> Robot:
     return fb.load("go2")
@@ -253,11 +235,10 @@ def _wrong_squeezes() -> dict[str, Any]:
 
 def _judge_unloading(answer: Any) -> Verdict:
     """Any forces will do that balance the standing robot and give FL its 20 N."""
+    forces = numbers(answer, (12,))
+    if isinstance(forces, Verdict):
+        return forces
     eom = standing_go2()
-    plain = Numeric(right=lambda: np.full(12, np.inf), praise="")
-    if answer is None or answer is Ellipsis or np.shape(answer) != (12,) or not np.all(np.isfinite(answer)):
-        return plain(answer)
-    forces = np.asarray(answer, dtype=np.float64)
     before = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0]
     if np.allclose(forces, before, atol=1e-3):
         return Verdict(False, f"Nothing has changed yet: the front left foot still carries {forces[2]:.0f} N.")

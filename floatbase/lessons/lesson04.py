@@ -15,8 +15,8 @@ import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.dynamics.subspace import FeasibleSpace, rank
-from floatbase.lessons.exercises import Exercise, Numeric, Verdict
-from floatbase.lessons.lesson03 import ConstantTorques, Shaped, standing_go2, tilted_squeeze
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
+from floatbase.lessons.lesson03 import ConstantTorques, standing_go2, tilted_squeeze
 from floatbase.robots.robot import Robot
 from floatbase.simulation.rollout import Rollout
 from floatbase.viewer import shapes

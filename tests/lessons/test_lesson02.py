@@ -117,7 +117,7 @@ def hint(name: str, answer: Any) -> str:
         ((14, 9), "transpose"),
         ((3, 14), "three feet touch"),
         ((12, 14), "not four"),
-        (9, "shape ()"),
+        (9, "a single number"),
         (None, "no answer yet"),
         ("nine", "should be numbers"),
     ],
