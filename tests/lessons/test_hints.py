@@ -174,9 +174,9 @@ def test_a_wrong_answer_gets_the_hint_that_fits(name: str, kind: str) -> None:
 
 ODD = {
     "nothing": None, "Ellipsis": ..., "text": "a", "texts": ["a"] * 12, "nothings": [None] * 12, "ragged": [[1.0], [1.0, 2.0]],
-    "object": object(),
+    "object": object(), "three": (1, 2, 3),
     "dictionary": {}, "not a number": np.nan, "not numbers": np.full(12, np.nan), "endless": np.full((4, 3), np.inf),
-    "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs, "pair": ("a", "b"), "three": (1, 2, 3),
+    "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs, "pair": ("a", "b"),
 }  # fmt: skip
 
 
