@@ -66,6 +66,7 @@ $(VENV)/locked-$(KEY): environment.txt | python
 
 $(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 	@$(PIP) install -q --no-deps --no-build-isolation -e .
+	@$(BIN)/python -m floatbase compile
 	@touch $@
 
 python:

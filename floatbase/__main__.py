@@ -201,9 +201,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     view.add_argument("--background", default="light", help="white, light or dark (light)")
     view.add_argument("--port", type=int, default=0, help="port of the page (a free one)")
     view.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
+    commands.add_parser("compile", help="compile the controller's tick, so that the first controller need not")
     asked = parser.parse_args(arguments)
     if asked.command == "robots":
         print("\n".join(f"{name:14} {text}" for name, text in fb.robots().items()))
+        return 0
+    if asked.command == "compile":
+        go2 = fb.load("go2")
+        controller = fb.WholeBodyController(go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing()))
+        print(f"The controller takes its {controller.path} path: {controller.path_reason}.")
         return 0
     try:
         return _view(asked)

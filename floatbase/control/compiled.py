@@ -6,11 +6,13 @@ tables that belong to one robot or one contact are made once and kept, so that a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
-from threading import Lock
+from threading import Lock, Timer
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +32,18 @@ _MOTION = {CoMTask: 0, OrientationTask: 1, FrameTask: 2}
 _KINDS: dict[type, int] = {**_MOTION, PostureTask: 3, ForceTask: 4, TorqueTask: 5}
 _JOINTS = ("JointModelR", "JointModelP", "JointModelFreeFlyer")  # their axes stand still in the joint's own frame
 _POSE = 12  # numbers of a pose: rotation column by column, then the place
+
+
+@contextmanager
+def told_when_slow(text: str, after: float = 3.0) -> Iterator[None]:
+    """Say on the error stream why it takes so long when the work inside takes more than `after` s."""
+    timer = Timer(after, lambda: print(text, file=sys.stderr, flush=True))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def obstacle(robot: Robot, contacts: Contacts, tasks: Sequence[Task], solver: str) -> str:

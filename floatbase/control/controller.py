@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
-from floatbase.control.compiled import Program, obstacle
+from floatbase.control.compiled import Program, obstacle, told_when_slow
 from floatbase.control.friction import FrictionPolyhedron
 from floatbase.control.qp import QP, Solution, check_solver, finished, solve
 from floatbase.dynamics.contacts import Contacts
@@ -192,9 +192,10 @@ class WholeBodyController:
 
     path: "readable" assembles and solves the QP as it is written; "compiled" solves the same problem in `kernel.py`, many
     times faster, where numba is installed and the problem is one of the package's own tasks and contacts; "auto" takes
-    compiled where it can. The first controller ever compiles for some twenty seconds, later ones load what was compiled.
-    The attribute `path` says which it is, `path_reason` why. A tick that the kernel cannot answer to its last digits, or
-    that has no answer, is answered by the readable path, and its `Command.path` says so.
+    compiled where it can. The attribute `path` says which it is, `path_reason` why. The first controller ever compiles for
+    some twenty seconds, unless the set-up did (`python -m floatbase compile`); later ones load what was compiled.
+    A tick that the kernel cannot answer to its last digits, or that has no answer, is answered by the readable path, and
+    its `Command.path` says so.
 
     Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError` with the rows in conflict.
     """
@@ -210,7 +211,7 @@ class WholeBodyController:
         min_normal_force: float = 0.0,
         torque_limits: npt.ArrayLike | None = None,
         solver: str = "daqp",
-        path: Path = "readable",
+        path: Path = "auto",
     ):
         check_solver(solver)
         if path not in get_args(Path):
@@ -232,7 +233,8 @@ class WholeBodyController:
         self.qp(standing, 0.0)  # names that do not exist and shapes that do not fit show now, not in the loop
         self._choose_path()
         if self._program is not None:
-            self._program(np.array(standing.q), np.array(standing.v), 0.0)  # compiles, or loads what was compiled
+            with told_when_slow("floatbase compiles its controller, once: about 20 s."):
+                self._program(np.array(standing.q), np.array(standing.v), 0.0)  # compiles, or loads what was compiled
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The problem of one tick, to look at."""

@@ -667,19 +667,23 @@ def forces_of(V, beta_of, beta, forces):
 
 
 @_compiled
-def worst_facet(cone, f, least):
-    """(28) The facet that a force f (3,) is furthest beyond, or -1 where it is beyond none by more than `least`.
+def row_of(cones, i, j):
+    """Three numbers of row j of point i of cones (P, F + 1, 3)."""
+    return cones[i, j, 0], cones[i, j, 1], cones[i, j, 2]
 
-    cone: (F + 1, 3) rows, the last -normal. Facets look along evenly turned tangents, the first along t1, so the tangential
-    force itself points at the worst one.
+
+@_compiled
+def worst_facet(cones, i, f, least):
+    """(28) The facet that the force f of point i is furthest beyond, or -1 where it is beyond none by more than `least`.
+
+    cones: (P, F + 1, 3) rows, the last -normal. Facets look along evenly turned tangents, the first along t1, so the
+    tangential force itself points at the worst one.
     """
-    facets = cone.shape[0] - 1
-    nx, ny, nz = -cone[facets, 0], -cone[facets, 1], -cone[facets, 2]
-    mu = -(cone[0, 0] * nx + cone[0, 1] * ny + cone[0, 2] * nz)
-    x, y, z = cone[0, 0] + mu * nx, cone[0, 1] + mu * ny, cone[0, 2] + mu * nz
-    along = x * f[0] + y * f[1] + z * f[2]
-    across = (ny * z - nz * y) * f[0] + (nz * x - nx * z) * f[1] + (nx * y - ny * x) * f[2]
-    room = mu * (nx * f[0] + ny * f[1] + nz * f[2]) + least
+    facets = cones.shape[1] - 1
+    first, normal = row_of(cones, i, 0), times(-1.0, row_of(cones, i, facets))
+    mu = -dot(first, normal)
+    t1 = plus(first, times(mu, normal))
+    along, across, room = dot(t1, f), dot(cross(normal, t1), f), mu * dot(normal, f) + least
     if room >= 0.0 and along * along + across * across <= room * room:
         return -1
     return int(np.rint(np.arctan2(across, along) * facets / (2.0 * np.pi))) % facets
@@ -692,17 +696,17 @@ def violated_force_row(forces, cones, lengths, least_normal):
     cones: (P, F + 1, 3) rows of G for one point's force, the last -normal. lengths: (P, F + 1) of those rows.
     """
     worst, found = _VIOLATED, -1
-    per_point = cones.shape[1]
+    facets = cones.shape[1] - 1
     for i in range(cones.shape[0]):
-        f = forces[3 * i : 3 * i + 3]
-        for j in (worst_facet(cones[i], f, worst * lengths[i, 0]), per_point - 1):
-            if j < 0:
-                continue
-            excess = cones[i, j, 0] * f[0] + cones[i, j, 1] * f[1] + cones[i, j, 2] * f[2]
-            if j == per_point - 1:
-                excess += least_normal
-            if excess > worst * lengths[i, j]:
-                worst, found = excess / lengths[i, j], i * per_point + j
+        f = forces[3 * i], forces[3 * i + 1], forces[3 * i + 2]
+        facet = worst_facet(cones, i, f, worst * lengths[i, 0])
+        if facet >= 0:
+            excess = dot(row_of(cones, i, facet), f)
+            if excess > worst * lengths[i, facet]:
+                worst, found = excess / lengths[i, facet], i * (facets + 1) + facet
+        excess = dot(row_of(cones, i, facets), f) + least_normal
+        if excess > worst * lengths[i, facets]:
+            worst, found = excess / lengths[i, facets], i * (facets + 1) + facets
     return found
 
 
@@ -833,10 +837,12 @@ def directions(W, U, d, q, z, r):
 
 
 @_compiled
-def enforce(row, bound, beta, W, U, active, mu, q, number):
-    """Bring one violated row (nb,) of G β ≤ h to its bound, dropping active rows that pull; returns q and a status."""
-    n = beta.size
-    d, z, r, push = np.empty(n), np.empty(n), np.empty(n), 0.0
+def enforce(row, bound, beta, W, U, active, mu, q, number, d, z, r):
+    """Bring one violated row (nb,) of G β ≤ h to its bound, dropping active rows that pull; returns q and a status.
+
+    d, z, r: room for `directions`, each (nb,).
+    """
+    n, push = beta.size, 0.0
     for _ in range(2 * n + 2):
         in_factor(W, row, d)
         directions(W, U, d, q, z, r)
@@ -919,6 +925,7 @@ def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, l
         return slope, active[:0], mu[:0], DOUBTFUL
     beta = minimum(L, slope)
     forces, tau = np.empty(3 * cones.shape[0]), np.empty(T.shape[0])
+    row, d, z, r = np.empty(nb), np.empty(nb), np.empty(nb), np.empty(nb)
     W, U = L, L  # made when the first row is violated
     for count in range(100 + 10 * nb):
         number = violated_row(V, beta_of, T, beta, cones, lengths, least_normal, limits, forces, tau)
@@ -926,8 +933,8 @@ def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, l
             break
         if count == 0:
             W, U = inverse(L), np.zeros((nb, nb))
-        bound = row_in_beta(number, V, T, cones, least_normal, limits, rows[nb - 1])
-        q, status = enforce(rows[nb - 1].copy(), bound, beta, W, U, active, mu, q, number)
+        bound = row_in_beta(number, V, T, cones, least_normal, limits, row)
+        q, status = enforce(row, bound, beta, W, U, active, mu, q, number, d, z, r)
         if status != SOLVED:
             return beta, active[:0], mu[:0], status
     if number >= 0:

@@ -30,25 +30,28 @@ class Conversion:
         self._q = np.array([robot.model.idx_qs[j] for j in joints], dtype=int)
         # joints without limits are stored as (cos, sin) by Pinocchio
         self._turning = np.array([robot.model.nqs[j] == 2 for j in joints], dtype=bool)
+        self._cos = self._q[self._turning]
+        base = [0, 1, 2, 4, 5, 6, 3] if self._floating else []
+        self._q_from = np.array(base + [0] * (robot.nq - len(base)), dtype=int)  # where each entry of q stands in qpos
+        self._q_from[self._q] = self._qpos
+        self._q_from[self._cos + 1] = self._qpos[self._turning]
+        self._v_from = np.concatenate([np.arange(self._floating), self._qvel])
+        self._inverse = np.zeros(4)
 
     def q(self, qpos: Array) -> Array:
         """Our q, shape (nq,), of MuJoCo's qpos."""
-        q = np.empty(self._robot.nq)
-        angles = qpos[self._qpos]
-        if self._floating:
-            q[:3] = qpos[:3]
-            q[3:6], q[6] = qpos[4:7], qpos[3]
-        q[self._q] = np.where(self._turning, np.cos(angles), angles)
-        q[self._q[self._turning] + 1] = np.sin(angles[self._turning])
+        q = qpos[self._q_from]
+        if self._cos.size:
+            q[self._cos] = np.cos(q[self._cos])
+            q[self._cos + 1] = np.sin(q[self._cos + 1])
         return q
 
     def v(self, qpos: Array, qvel: Array) -> Array:
         """Our v, shape (nv,), of MuJoCo's qpos and qvel."""
-        v = np.empty(self._robot.nv)
+        v = qvel[self._v_from]
         if self._floating:
-            v[:3] = _rotation(qpos[3:7]).T @ qvel[:3]
-            v[3:6] = qvel[3:6]
-        v[self._floating :] = qvel[self._qvel]
+            mujoco.mju_negQuat(self._inverse, qpos[3:7])
+            mujoco.mju_rotVecQuat(v[:3], qvel[:3], self._inverse)
         return v
 
     def to_mujoco(self, q: Array, v: Array) -> tuple[Array, Array]:

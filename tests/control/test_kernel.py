@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,6 +14,7 @@ import pytest
 import scipy.linalg
 
 import floatbase as fb
+from floatbase.__main__ import main
 from floatbase.control import compiled
 from floatbase.control.qp import QP, Solution
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
@@ -371,3 +373,34 @@ def test_the_kernel_compiles_where_no_cache_can_be_kept(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(numba, "njit", njit)
     assert kernel._compiled(lambda: None) == ("compiled without a cache", "numpy")
+
+
+def test_the_compiled_path_is_the_default_where_it_fits() -> None:
+    robot = judges.load("go2")
+    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+    assert controller.path == "compiled"
+    assert controller(robot.posture, np.zeros(robot.nv)).path == "compiled"
+
+
+def test_a_target_that_turns_into_a_reflection_is_left_to_the_readable_path_which_refuses_it() -> None:
+    robot = judges.load("go2")
+    state = robot.standing()
+    mirrored = fb.OrientationTask("base", rotation=lambda t: np.diag([1.0, 1.0, 1.0 if t < 1.0 else -1.0]))
+    controller = fb.WholeBodyController(robot, judges.stance(robot), [mirrored], path="compiled")
+    assert controller(state.q, state.v, 0.0).path == "compiled"
+    with pytest.raises(InputError, match="rotation"):
+        controller(state.q, state.v, 2.0)
+
+
+def test_a_long_compilation_is_announced_and_a_short_one_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    with compiled.told_when_slow("this takes long", after=0.02):
+        time.sleep(0.2)
+    assert capsys.readouterr().err == "this takes long\n"
+    with compiled.told_when_slow("this takes long", after=5.0):
+        pass
+    assert capsys.readouterr().err == ""
+
+
+def test_the_tick_can_be_compiled_before_it_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compile"]) == 0
+    assert "compiled path" in capsys.readouterr().out
