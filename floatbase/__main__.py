@@ -34,7 +34,7 @@ class Playground:
         self.stance = {foot.frame: True for foot in robot.feet}
         self.shift = [0.0, 0.0, 0.0]  # m, of the centre of mass
         self.force = 0.1 * robot.weight  # N, of a push
-        self.towards = 90.0  # degrees, of a push: 0 forwards, 90 to the left
+        self.towards = 0.0  # degrees, of a push: 0 forwards, 90 to the left
         self.pushed = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
         self.note = self.outcome = ""
         self.last: fb.Rollout | None = None

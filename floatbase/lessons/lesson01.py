@@ -288,11 +288,8 @@ def _plate(state: fb.State) -> Item:
 
 
 def _free_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> Picture:
-    """The arm; its base's mesh is one of the fixed robot, so it is put where the base is now. first: a veil, with axes."""
+    """The arm. first: where it was at first, as a veil, with axes."""
     drawn = view.painter.picture(state, com=first is not None, ghost=first)
-    for path, at in (("robot/universe", state), ("ghost/universe", first)):
-        if at is not None:
-            drawn[path] = Item(drawn[path].shape, at.frame_pose("base_link").homogeneous)
     if first is not None:
         drawn |= below("axes", marks.frame_axes(state.frame_pose("base_link").homogeneous, 0.25))
     return {path.replace("ghost/", "veil/"): item for path, item in drawn.items()}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.window import Window
@@ -47,8 +45,8 @@ def _changes(path: str, old: Item | None, new: Item) -> list[wire.Update]:
     updates = []
     anew = old is None or old.shape is not new.shape
     if anew:
-        updates.append(wire.set_object(path, new.shape.lowered))
-    if old is None or (old.matrix is not new.matrix and not np.array_equal(old.matrix, new.matrix)):
+        updates.append(wire.set_object(path, new.shape.packed))
+    if old is None or (old.matrix is not new.matrix and old.matrix.tobytes() != new.matrix.tobytes()):
         updates.append(wire.set_transform(path, new.matrix))
     if new.colour is not None and (anew or old is None or old.colour != new.colour):
         updates.append(wire.set_property(path, "color", list(new.colour)))

@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
+from floatbase._arrays import checked, positive
 from floatbase.viewer import geometry, three
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.ground import LEVEL, Plane
-from floatbase.viewer.shapes import Item, Picture, arrow, flat_polygon, label, placed
+from floatbase.viewer.shapes import Item, Picture, arrow, directed, flat_polygon, label, placed
 from floatbase.viewer.three import Shape
 
 
@@ -31,8 +32,7 @@ def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike,
 
 def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM) -> Item:
     """An arrow that turns around `moment`'s direction by the right-hand rule, its radius as long as `moment`, m."""
-    moment = np.asarray(moment, dtype=np.float64)
-    radius = float(np.linalg.norm(moment))
+    moment, radius = directed("a curled arrow", moment)
     return Item(_unit_curl(colour), placed(position, geometry.frame_along(moment / radius), radius))
 
 
@@ -59,8 +59,8 @@ def support_region(positions: npt.ArrayLike, lift: float, ground: Plane = LEVEL)
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
     """A frame, shape (4, 4), as three rods: x vermilion, y green, z blue; with its name when given."""
-    matrix = np.array(pose, dtype=np.float64)
-    matrix[:3, :3] *= length
+    matrix = np.array(checked("pose of a frame", pose, (4, 4)))
+    matrix[:3, :3] *= positive("length of a frame's axes", length, "m")
     picture = {"/axes": Item(_axes(), matrix)}
     if name:
         picture["/name"] = label(matrix[:3, 3] + [0.0, 0.0, 0.35 * length], name, 0.3 * length)

@@ -34,7 +34,7 @@ def robot_meshes(robot: Robot) -> list[JointMesh]:
     """The meshes of a robot, one for each joint that moves something visible; fixed parts belong to joint 0, the world."""
     asset = assets_root() / "meshes" / f"{robot.name}.npz"
     if asset.is_file():
-        return [mesh for part in _parts(asset) for mesh in _placed(robot, *part)]
+        return _by_joint([mesh for part in _parts(asset) for mesh in _placed(robot, *part)])
     try:
         meshes = _from_urdf(robot)
     except (ImportError, ValueError, OSError):  # no trimesh, or files that it or Pinocchio cannot read
@@ -67,8 +67,13 @@ def _placed(
     faces: npt.NDArray[np.uint32],
     colours: npt.NDArray[np.uint8],
 ) -> list[JointMesh]:
-    """The part on its joint; on the joint above when this one was locked; nowhere when the model lacks it."""
+    """The part on its joint; on the joint above when this one was locked; nowhere when the model lacks it.
+
+    What is bolted to the world moves with the base when the bolts are cut, and the base of a robot that is bolted stays.
+    """
     model = robot.model
+    if joint in ("universe", "root_joint"):
+        return [JointMesh(1 if robot.is_floating else 0, vertices, faces, colours)]
     if model.existJointName(joint):
         return [JointMesh(int(model.getJointId(joint)), vertices, faces, colours)]
     if model.existFrame(joint):
@@ -76,6 +81,18 @@ def _placed(
         moved = vertices @ frame.placement.rotation.T + frame.placement.translation
         return [JointMesh(int(frame.parentJoint), moved.astype(np.float32), faces, colours)]
     return []
+
+
+def _by_joint(meshes: list[JointMesh]) -> list[JointMesh]:
+    """One mesh for each joint: what hangs on the same joint made one."""
+    together = []
+    for joint in dict.fromkeys(mesh.joint for mesh in meshes):
+        own = [mesh for mesh in meshes if mesh.joint == joint]
+        if len(own) > 1:
+            vertices, faces = geometry.merged([(mesh.vertices, mesh.faces) for mesh in own])
+            own = [JointMesh(joint, vertices, faces, np.vstack([mesh.colours for mesh in own]))]
+        together += own
+    return together
 
 
 def _from_urdf(robot: Robot) -> list[JointMesh]:

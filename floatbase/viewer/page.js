@@ -16,7 +16,7 @@ function startViewer() {
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
     set_theme: (command) => { document.body.className = command.name; },
     set_animation: (command) => { meshcat(command); player.load(command); },
-    set_control: (command) => { meshcat(command); viewer.gui.open(); },
+    set_control: (command) => { meshcat(command); viewer.gui.open(); camera.makeRoom(); },
   };
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
@@ -35,7 +35,7 @@ function legendLine([colour, text]) {
 
 // Where the page looks from. meshcat's camera node cannot move the point that the mouse turns around.
 function startCamera(viewer) {
-  let followed = null, last = null;
+  let followed = null, last = null, room = false;
   const where = () => followed.getWorldPosition(new MeshCat.THREE.Vector3());
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
@@ -45,9 +45,13 @@ function startCamera(viewer) {
       viewer.controls.target.add(step);
       last = now;
     }
+    const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
+    if (room && !viewer.gui.closed) viewer.camera.setViewOffset(w, h, viewer.gui.width / 2, 0, w, h);
+    else viewer.camera.clearViewOffset();
     render();
   };
   return {
+    makeRoom() { room = true; },  // the picture's middle is left of the panel while that is open
     look(command) {
       viewer.camera.fov = command.fov;
       viewer.camera.position.fromArray(command.position);

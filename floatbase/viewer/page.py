@@ -21,7 +21,8 @@ from floatbase.viewer import wire
 _BODY = """
 <div><div id="meshcat-pane"></div></div>
 <div id="title"></div><div id="legend"></div>
-<div id="notice">The viewer is closed. This page comes back when it is opened again.</div>
+<div id="notice">The viewer is closed, or its kernel was restarted: run its cell again. A page with the same address comes back
+by itself.</div>
 <div id="kept" title="This viewer is displayed again further down and live there.">kept picture ·
 <button>make live</button></div>
 <div id="player"><button title="play or pause">▶</button><input type="range" min="0" step="0.001" title="time">

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -81,14 +81,15 @@ class Painter:
         """Everything that was asked for, as path -> item; the arguments are those of `Viewer.show`."""
         self._check_state(state)
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
-        ground = self._ground(state, contacts)
+        positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
+        ground = self._ground(contacts, positions)
         picture = {"ground": ground.lines(self.lines)} | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
-            picture |= self._contacts(state, contacts, both, cones)
+            picture |= self._contacts(contacts, positions, both, cones)
             if support:
-                picture |= below("support", marks.support_region(contacts.positions(state), 0.004 * self.size, ground))
+                picture |= below("support", marks.support_region(positions, 0.004 * self.size, ground))
             if labels:
-                picture |= self._labels(state, contacts)
+                picture |= self._labels(state, contacts, positions)
         if com:
             picture |= below("com", shapes.centre_of_mass(state.com, ground.height(state.com), self.size))
         if wrench is not None:
@@ -183,11 +184,11 @@ class Painter:
         poses = state.joint_transforms
         return {f"{root}/{name}": Item(look, poses[joint]) for (joint, name), look in zip(self._paths, looks, strict=True)}
 
-    def _contacts(self, state: State, contacts: Contacts, forces: Forces, cones: bool) -> Picture:
+    def _contacts(self, contacts: Contacts, positions: Array, forces: Forces, cones: bool) -> Picture:
         """Patches, cones and forces at every point."""
         picture: Picture = {}
         height = self.cone_height(contacts)
-        rows = zip(contacts.point_names, contacts.positions(state), contacts.normals, contacts.mus, strict=True)
+        rows = zip(contacts.point_names, positions, contacts.normals, contacts.mus, strict=True)
         for i, (name, position, normal, mu) in enumerate(rows):
             at = plain(name)
             picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
@@ -206,19 +207,23 @@ class Painter:
         if self.facets is None:
             status = "idle" if judged is None else cone_status(judged, normal, mu)
             return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
-        polyhedron = FrictionPolyhedron(normal, mu, self.facets, self.inside)
+        polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inside)
         status, active = ("idle", []) if judged is None else polyhedron_status(judged, polyhedron)
         status = "inside" if status == "active" else status  # the facets that are reached light up instead
         return shapes.friction_polyhedron(position, polyhedron, height, status, active)
 
     def _is_quiet(self, force: Array) -> bool:
         """Whether a force is too small to be seen or judged: below a thousandth of the weight."""
-        return float(force @ force) < (1e-3 * self.robot.weight) ** 2
+        return float(force @ force) < self._quiet
 
-    def _labels(self, state: State, contacts: Contacts) -> Picture:
+    @cached_property
+    def _quiet(self) -> float:
+        return (1e-3 * self.robot.weight) ** 2
+
+    def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
         """The name of every point, below and outside of it."""
         picture: Picture = {}
-        for name, position in zip(contacts.point_names, contacts.positions(state), strict=True):
+        for name, position in zip(contacts.point_names, positions, strict=True):
             away = (position - state.com) * [1.0, 1.0, 0.0]
             at = position + 0.12 * self.size * away / max(float(np.linalg.norm(away)), 1e-6)
             picture[f"label/{plain(name)}"] = shapes.label(at, name, 0.06 * self.size)
@@ -260,10 +265,10 @@ class Painter:
         at[2] = ground.height(at + [0.5 * length, 0.0, 0.0]) + 0.01 * self.size
         return below("scale", shapes.scale_bar(at, force, length, self.size, self.text))
 
-    def _ground(self, state: State, contacts: Contacts | None) -> Plane:
+    def _ground(self, contacts: Contacts | None, positions: Array) -> Plane:
         if self.ground is not None or contacts is None:
             return self.ground or LEVEL
-        return plane_under(contacts.normals, contacts.positions(state))
+        return plane_under(contacts.normals, positions)
 
     def _check_state(self, state: Any) -> None:
         if not isinstance(state, State):
@@ -279,6 +284,12 @@ def kinds(picture: Picture) -> set[str]:
     """What a picture shows, in the words of `LEGEND`: the first part of every path; a cone without force is an "idle cone"."""
     idle = shapes.cone_colour("idle")
     return {"idle cone" if item.colour == idle else path.split("/")[0] for path, item in picture.items()}
+
+
+@lru_cache(maxsize=256)
+def _polyhedron(normal: tuple[float, ...], mu: float, facets: int, inside: bool) -> FrictionPolyhedron:
+    """A polyhedron, once: a ground has few."""
+    return FrictionPolyhedron(np.array(normal), mu, facets, inside)
 
 
 def nice(value: float) -> float:

@@ -7,9 +7,11 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._arrays import checked, positive, unit_vector
+from floatbase.errors import InputError
 from floatbase.viewer import geometry, three
 from floatbase.viewer.colours import MEASURED, PLANNED, RGB, WARNING
-from floatbase.viewer.shapes import Item, Picture, placed
+from floatbase.viewer.shapes import Item, Picture, directed, placed
 from floatbase.viewer.three import Shape
 
 STEEL: RGB = (0.55, 0.58, 0.62)
@@ -23,7 +25,8 @@ def wheel(centre: npt.ArrayLike, axis: npt.ArrayLike, radius: float, angle: floa
     centre: (3,), m, world. axis: (3,), world, its axle. radius, width: m. angle: rad, how far it has turned about the axle, by
     the right-hand rule, from where its marked spoke points as far up as it can.
     """
-    axle = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    axle = unit_vector("axis of the wheel", axis)
+    positive("radius of the wheel", radius, "m")
     up = np.array([0.0, 0.0, 1.0]) if abs(axle[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
     x = up - axle * (axle @ up)
     x /= np.linalg.norm(x)
@@ -42,9 +45,11 @@ def hydraulic_cylinder(
     stroke: the shortest and the longest distance between the points, m. pressures: of the chamber at the base and of the one
     around the rod, from 0 (drawn pale) to 1 (drawn in full colour).
     """
-    start, tip = np.asarray(base, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    length = float(np.linalg.norm(tip - start))
-    turned = geometry.frame_along((tip - start) / length)
+    if not 0.0 < stroke[0] < stroke[1]:
+        raise InputError(f"stroke of the cylinder is {stroke}; it must be its shortest and its longest length, m, above zero.")
+    start = checked("base of the cylinder", base, (3,), "m")
+    way, length = directed("a cylinder", checked("end of the cylinder", end, (3,), "m") - start)
+    turned = geometry.frame_along(way / length)
     barrel = 0.92 * stroke[0]
     piston = min(max(length - 0.95 * stroke[0], 0.06 * barrel), 0.94 * barrel)
     radius = 0.10 * stroke[0]
@@ -63,9 +68,13 @@ def hydraulic_cylinder(
 
 def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: float) -> Item:
     """A wall: a slab whose face through `position` looks along `normal`, both (3,), world, m."""
-    n = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
+    n = unit_vector("normal of the wall", normal)
     side = np.cross([0.0, 0.0, 1.0], n)
+    if np.linalg.norm(side) < 1e-6:
+        raise InputError("normal of the wall is vertical; a wall stands, so its normal has a horizontal part.")
     side /= np.linalg.norm(side)
+    positive("width of the wall", width, "m")
+    positive("height of the wall", height, "m")
     turned = np.stack([n, side, np.cross(n, side)], axis=1)
     thick = 0.05 * height
     return Item(_unit_box(WALL), placed(np.asarray(position) - n * thick / 2, turned, (thick, width, height)))
@@ -73,6 +82,7 @@ def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: f
 
 def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
     """Bolts on a circle around a base on the ground, radius in m."""
+    positive("radius of the bolts' circle", radius, "m")
     picture: Picture = {}
     for i in range(count):
         angle = 2.0 * np.pi * (i + 0.5) / count

@@ -33,9 +33,9 @@ UP = (0.0, 0.0, 1.0)
 # the browser finds out whether it reaches the live page; the signs in the kernel's environment may have missed something
 _PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
   const frame = document.querySelector('iframe[src="URL"]');
-  if (frame) frame.srcdoc = "<p style='font-family: sans-serif'>This browser does not reach the viewer of the kernel. " +
-    "If the kernel runs on another machine, show a still picture: import os; os.environ['FLOATBASE_VIEWER'] = 'static', " +
-    "and run this cell again. If it was restarted, run the notebook again.</p>";
+  if (frame) frame.srcdoc = "<p style='font-family: sans-serif'>The viewer that drew this is gone: its kernel was restarted " +
+    "or has stopped. Run the notebook again. If this is a fresh picture, the kernel runs on another machine: for still ones, " +
+    "import os; os.environ['FLOATBASE_VIEWER'] = 'static', and run this cell again.</p>";
 });</script>"""
 
 
@@ -217,8 +217,13 @@ class Viewer:
         return self
 
     def save(self, path: str | Path, title: str | None = None) -> Path:
-        """Write the scene, still or moving, as one HTML file that needs neither server nor network; return its path."""
+        """Write the scene, still or moving, as one HTML file that needs neither server nor network; return its path.
+
+        Raises `ViewerError` when nothing is drawn yet, for a name that is not one of a web page, and when it cannot be written.
+        """
         target = Path(path)
+        if self.window.scene.is_empty:
+            raise ViewerError("nothing is drawn yet, so there is nothing to save; call show(state) or play(rollout) first.")
         if target.suffix.lower() not in (".html", ".htm"):
             raise ViewerError(f"cannot save {target.name!r}: the scene is saved as a web page; end the name in .html.")
         try:

@@ -6,14 +6,16 @@ one matrix, and the scene itself says how long an arrow is and how wide a cone o
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.control.friction import FrictionPolyhedron, tangents
+from floatbase.errors import InputError
 from floatbase.viewer import geometry, three
 from floatbase.viewer.colours import COM, CONE, CONE_ALPHA, PATCH, RGB, RGBA, WARNING, with_alpha
 from floatbase.viewer.three import Shape
@@ -31,16 +33,39 @@ class Item(NamedTuple):
     colour: RGBA | None = None
 
 
+_EYE = read_only(np.eye(3))
+
 # path below the scene's root -> item; no path may lie below another, because a pose moves all that is below it
 Picture = dict[str, Item]
 
 
 def placed(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0) -> Array:
-    """The matrix that scales along a shape's own axes, turns it, and puts it at `position`."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = (np.eye(3) if rotation is None else np.asarray(rotation)) * np.asarray(scale)
-    matrix[:3, 3] = position
+    """The matrix that scales along a shape's own axes, turns it, and puts it at `position`.
+
+    Raises `InputError` for a position that is no point, and for numbers that are not finite.
+    """
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3] = (_EYE if rotation is None else np.asarray(rotation)) * np.asarray(scale)
+    matrix[3, 3] = 1.0
+    try:
+        matrix[:3, 3] = position
+    except (TypeError, ValueError):
+        checked("position in the picture", position, (3,), "m")
+        raise
+    if not math.isfinite(matrix.sum()):
+        checked("position in the picture", position, (3,), "m")
+        raise InputError(f"axes or size of a shape at {position!r} are not finite numbers: {matrix[:3, :3].tolist()}.")
     return matrix
+
+
+def directed(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
+    """A vector, shape (3,), and its length; `InputError` when it has none, for what has no length has no direction."""
+    array = np.asarray(vector, dtype=np.float64)
+    length = math.sqrt(array @ array) if array.shape == (3,) else 0.0
+    if not 1e-12 < length < math.inf:
+        checked(f"the vector of {what}", vector, (3,), "m")
+        raise InputError(f"{what} of no length points nowhere: leave it out of the picture.")
+    return array, length
 
 
 def arrow(
@@ -51,10 +76,9 @@ def arrow(
     size: of the robot, m; the shaft is wide enough to be seen beside it, and wider the longer the arrow, by the square root.
     halo: wider and translucent, so that it shows around another arrow at the same place. through: seen through the robot.
     """
-    vector = np.asarray(vector, dtype=np.float64)
-    length = float(np.linalg.norm(vector))
+    vector, length = directed("an arrow", vector)
     reference = ARROW_LENGTH * size
-    width = min(ARROW_SLENDERNESS * float(np.sqrt(length * reference)), 0.35 * length) * (1.8 if halo else 1.0)
+    width = min(ARROW_SLENDERNESS * math.sqrt(length * reference), 0.35 * length) * (1.8 if halo else 1.0)
     rotation = geometry.frame_along(vector / length)
     return Item(_unit_arrow(colour, 0.6 if halo else 1.0, through), placed(start, rotation, (width / 2, width / 2, length)))
 
@@ -64,6 +88,8 @@ def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, hei
 
     status: "idle" (no force), "inside", "active" or "outside", which gives the colour.
     """
+    positive("mu of a friction cone", mu)
+    positive("height of a friction cone", height, "m")
     matrix = placed(position, _surface_frame(normal), (mu * height, mu * height, height))
     return Item(_unit_cone(), matrix, cone_colour(status))
 
@@ -81,6 +107,7 @@ def friction_polyhedron(
     active: npt.ArrayLike = (),
 ) -> Picture:
     """The polyhedron that stands in for the cone, as the cone of its rays; facets in `active` (numbers) light up."""
+    positive("height of a friction polyhedron", height, "m")
     matrix = placed(position, _surface_frame(polyhedron.normal), height)
     key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside))
     picture = {"/sides": Item(_unit_polyhedron(*key), matrix, cone_colour(status))}
@@ -91,6 +118,7 @@ def friction_polyhedron(
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
     """A disc on the ground where a contact is."""
+    positive("radius of a contact patch", radius, "m")
     return Item(_unit_disc(PATCH), placed(position, _surface_frame(normal), (radius, radius, 0.12 * radius)))
 
 
@@ -108,7 +136,7 @@ def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Pictu
 
 def label(position: npt.ArrayLike, text: str, height: float, colour: RGB = (0.13, 0.13, 0.13), plate: bool = True) -> Item:
     """Text that faces the reader, letters `height` m high, centred on `position`."""
-    return Item(_label(text, height, plate, colour), placed(position))
+    return Item(_label(text, positive("height of a label's letters", height, "m"), plate, colour), placed(position))
 
 
 def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB) -> Picture:
@@ -126,12 +154,16 @@ def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float,
 
 def rod(start: npt.ArrayLike, turned: npt.ArrayLike, length: float, radius: float, colour: RGB) -> Item:
     """A rod from `start` along the z axis of the rotation `turned`, shape (3, 3), m, world."""
+    positive("length of a rod", length, "m")
     return Item(_unit_rod(colour), placed(start, turned, (radius, radius, length)))
 
 
 def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
     """A flat convex polygon with corners, shape (n, 3), m, seen from both sides."""
-    return _polygon(tuple(tuple(float(x) for x in corner) for corner in np.asarray(corners)), colour, opacity)
+    points = checked("corners of a polygon", corners, (None, 3), "m")
+    if len(points) < 3:
+        raise InputError(f"a polygon needs three corners or more, not {len(points)}.")
+    return _polygon(tuple(tuple(corner) for corner in points.tolist()), colour, opacity)
 
 
 def ground(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:

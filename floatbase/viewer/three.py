@@ -6,6 +6,7 @@ A `Shape` is a value: what is equal is the same object, so a picture that shows 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,11 @@ class Shape:
 
     lowered: dict[str, Any]
     name: str = ""
+
+    @cached_property
+    def packed(self) -> bytes:
+        """The object as it goes over the wire, packed once for all that show it."""
+        return umsgpack.packb(self.lowered)
 
 
 def _array(kind: str, values: npt.ArrayLike, size: int, normalized: bool = False) -> dict[str, Any]:

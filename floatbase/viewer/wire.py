@@ -46,8 +46,7 @@ def set_transform(path: str, matrix: Array) -> Update:
     numbers = np.empty(16, _FLOAT32)
     numbers["code"] = 0xCA
     numbers["value"] = matrix.T.ravel()
-    name = path.encode()
-    head = b"\x83\xa4type\xadset_transform\xa4path\xda" + struct.pack(">H", len(name)) + name
+    head = b"\x83\xa4type\xadset_transform\xa4path" + _text(path)
     return (path, "set_transform", ""), head + b"\xa6matrix\xdc\x00\x10" + numbers.tobytes()
 
 
@@ -56,9 +55,15 @@ def set_property(path: str, name: str, value: Any) -> Update:
     return encode({"type": "set_property", "path": path, "property": name, "value": value})
 
 
-def set_object(path: str, lowered: Mapping[str, Any]) -> Update:
-    """Put a lowered three.js object at `path`."""
-    return encode({"type": "set_object", "path": path, "object": lowered})
+def set_object(path: str, packed: bytes) -> Update:
+    """Put a lowered three.js object, packed already, at `path`."""
+    return (path, "set_object", ""), b"\x83\xa4type\xaaset_object\xa4path" + _text(path) + b"\xa6object" + packed
+
+
+def _text(text: str) -> bytes:
+    """MessagePack of a text below 64 KB."""
+    data = text.encode()
+    return b"\xda" + struct.pack(">H", len(data)) + data
 
 
 def delete(path: str) -> Update:
@@ -186,6 +191,12 @@ class Scene:
 
     def __len__(self) -> int:
         return len(self._entries)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is drawn; the page's settings do not count."""
+        with self._lock:
+            return not any(kind == "set_object" for _, kind, _ in self._entries)
 
     def _forget_below(self, path: str, number: int) -> None:
         """Drop what a delete has overtaken, and the deletes that every viewer has carried out."""

@@ -18,6 +18,7 @@ import numpy as np
 import psutil
 import pytest
 from browsers import CHROMIUM, FLAGS
+import umsgpack
 from jupyter_client.manager import start_new_kernel
 
 from floatbase.dynamics.contacts import Contacts
@@ -97,7 +98,7 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
 
 
 def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(window: Window, sleeper: socket.socket) -> None:
-    (_, command) = wire.set_object("/meshcat/a", {"data": "x" * 20_000})
+    (_, command) = wire.set_object("/meshcat/a", umsgpack.packb({"data": "x" * 20_000}))
 
     def draw(n: int) -> None:
         for i in range(n):

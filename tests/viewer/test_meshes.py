@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from floatbase._assets import assets_root
-from floatbase.robots import load, robots
+from floatbase.robots import load, load_urdf, robots
 from floatbase.viewer.meshes import robot_meshes
 
 
@@ -51,3 +53,28 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
     calf = meshes[-1].vertices
     foot = robot.model.frames[robot.model.getFrameId("RR_foot")].placement.translation
     assert np.linalg.norm(calf - foot, axis=1).min() < 0.03
+
+
+def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut(tmp_path: Path) -> None:
+    arm = load("ur5")
+    bolted = {mesh.joint: mesh for mesh in robot_meshes(arm)}
+    loose = load_urdf(arm.urdf, name="ur5", package_dirs=arm.package_dirs, torque_limits=arm.torque_limits, feet=["base_link"])
+    free = {mesh.joint: mesh for mesh in robot_meshes(loose)}
+    assert set(free) == {joint + 1 for joint in bolted}
+    for joint, mesh in bolted.items():
+        np.testing.assert_array_equal(free[joint + 1].vertices, mesh.vertices)
+
+
+def test_what_a_locked_joint_moved_hangs_on_the_joint_above() -> None:
+    arm = load("ur5")
+    locked = [arm.model.getJointId(name) for name in ("wrist_1_joint", "wrist_2_joint", "wrist_3_joint")]
+    model = pin.buildReducedModel(arm.model, locked, arm.standing().q)
+    stiff = dataclasses.replace(arm, model=model, posture=arm.posture[:3], torque_limits=arm.torque_limits[:3])
+    meshes = robot_meshes(stiff)
+    assert [mesh.joint for mesh in meshes] == [0, 1, 2, 3]
+    assert sum(len(mesh.faces) for mesh in meshes) == sum(len(mesh.faces) for mesh in robot_meshes(arm))
+    data, home = model.createData(), arm.standing()
+    pin.forwardKinematics(model, data, home.q[:3])
+    tip = data.oMi[3].act(meshes[-1].vertices[-1].astype(float))
+    whole = robot_meshes(arm)[-1]
+    np.testing.assert_allclose(tip, home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3), atol=1e-5)

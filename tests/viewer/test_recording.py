@@ -147,6 +147,9 @@ def test_wrong_records_and_file_names_are_explained(viewer: Viewer, go2: Robot, 
         viewer.play(record(go2, duration=0.0))
     with pytest.raises(InputError, match="speed is 0; it must be > 0"):
         viewer.play(record(go2), speed=0)
+    with pytest.raises(ViewerError, match=r"nothing is drawn yet.*call show\(state\) or play\(rollout\) first"):
+        viewer.save(tmp_path / "x.html")
+    assert not (tmp_path / "x.html").exists()
     viewer.show(standing)
     with pytest.raises(ViewerError, match=r"cannot save 'x.png': .* end the name in .html"):
         viewer.save(tmp_path / "x.png")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from floatbase.dynamics.contacts import Contacts
+from floatbase.errors import InputError
 from floatbase.robots import Robot, State
 from floatbase.viewer import geometry, marks, props, shapes
 from floatbase.viewer.camera import View
@@ -69,6 +72,42 @@ def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
     assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
     np.testing.assert_allclose(item.matrix[:3, 2], moment)
     assert np.linalg.det(item.matrix[:3, :3]) > 0
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [
+        (lambda: shapes.arrow([0, 0, 0], [0, 0, 0], MEASURED), "an arrow of no length points nowhere: leave it out"),
+        (lambda: shapes.arrow([0, 0, 0], [0, NAN, 1], MEASURED), r"vector of an arrow holds nan at index \[1\]"),
+        (lambda: shapes.arrow([0, 0, 0], [0, 1], MEASURED), r"vector of an arrow has shape \(2,\); it must have shape \(3,\)"),
+        (lambda: shapes.arrow([NAN, 0, 0], [0, 0, 1], MEASURED), r"position in the picture holds nan at index \[0\]"),
+        (lambda: shapes.arrow([0, 0], [0, 0, 1], MEASURED), r"position in the picture has shape \(2,\)"),
+        (lambda: shapes.friction_cone([0, 0, 0], [0, 0, 1], 0.0, 1.0, "inside"), "mu of a friction cone is 0; it must be > 0"),
+        (lambda: shapes.friction_cone([0, 0, 0], [0, 0, 1], 0.5, NAN, "inside"), "height of a friction cone is nan"),
+        (lambda: shapes.contact_patch([0, 0, 0], [0, 0, 1], -1.0), "radius of a contact patch is -1; it must be > 0 m"),
+        (lambda: shapes.label([0, 0, 0], "x", 0.0), "height of a label's letters is 0"),
+        (lambda: shapes.label([0, 0, NAN], "x", 0.1), "position in the picture holds nan"),
+        (lambda: shapes.rod([0, 0, 0], np.eye(3), 0.0, 0.1, MEASURED), "length of a rod is 0"),
+        (lambda: shapes.placed([0, 0, 0], np.eye(3) * NAN), "axes or size of a shape .* are not finite"),
+        (lambda: shapes.flat_polygon([[0, 0, 0], [1, 0, 0]], MEASURED, 0.5), "a polygon needs three corners or more, not 2"),
+        (lambda: marks.curled_arrow([0, 0, 0], [0, 0, 0]), "a curled arrow of no length points nowhere"),
+        (lambda: marks.frame_axes(np.eye(3), 0.1), r"pose of a frame has shape \(3, 3\); it must have shape \(4, 4\)"),
+        (lambda: marks.frame_axes(np.eye(4), 0.0), "length of a frame's axes is 0"),
+        (lambda: props.wheel([0, 0, 0], [0, 0, 0], 0.1, 0.0), "axis of the wheel is the zero vector"),
+        (lambda: props.wheel([0, 0, 0], [0, 1, 0], 0.0, 0.0), "radius of the wheel is 0"),
+        (lambda: props.hydraulic_cylinder([0, 0, 0], [0, 0, 0], (0.1, 0.2)), "a cylinder of no length points nowhere"),
+        (lambda: props.hydraulic_cylinder([0, 0, 0], [0, 0, 1], (0.2, 0.1)), r"stroke of the cylinder is \(0.2, 0.1\)"),
+        (lambda: props.wall([0, 0, 0], [0, 0, 1], 1, 1), "normal of the wall is vertical; a wall stands"),
+        (lambda: props.wall([0, 0, 0], [1, 0, 0], 0, 1), "width of the wall is 0"),
+        (lambda: props.bolts([0, 0, 0], 0.0), "radius of the bolts' circle is 0"),
+    ],
+)
+def test_what_cannot_be_drawn_is_explained(draw: Callable[[], object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        draw()
 
 
 def test_a_push_ends_where_it_acts() -> None:

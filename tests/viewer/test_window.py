@@ -232,11 +232,11 @@ def test_a_page_that_does_not_read_costs_nothing_and_gets_the_newest_values(wind
 def test_deletes_and_objects_keep_their_order_on_the_way_to_a_busy_page(window: Window) -> None:
     async def sleepy() -> list[str]:
         client = await connect(window)
-        window.put([wire.set_object("/meshcat/a", {"n": 1})])
+        window.put([wire.set_object("/meshcat/a", umsgpack.packb({"n": 1}))])
         await asyncio.wait_for(client.read_message(), 5)
         for n in range(5):
             window.put([wire.delete("/meshcat/a")])
-            window.put([wire.set_object("/meshcat/a", {"n": n})])
+            window.put([wire.set_object("/meshcat/a", umsgpack.packb({"n": n}))])
         await asyncio.sleep(0.1)
         await client.write_message(json.dumps({"type": "done"}))
         return [command["type"] for command in commands_in(await asyncio.wait_for(client.read_message(), 5))]
