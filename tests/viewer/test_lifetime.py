@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-from browsers import CHROMIUM, FLAGS
 import umsgpack
+from browsers import CHROMIUM, FLAGS
 from jupyter_client.manager import start_new_kernel
 
 from floatbase.dynamics.contacts import Contacts
