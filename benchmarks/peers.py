@@ -27,21 +27,28 @@ from tick import machine
 from floatbase.control import controller
 
 HERE = Path(__file__).parent
-TOLERANCE = 1e-4  # N·m, by which torques may differ for the optimum to count as one; the peers' solvers leave some 1e-5
+TOLERANCE = 1e-6  # of the strongest motor's limit, by which torques may differ for the optimum to count as one
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
-SIDES = {"tsid": "peer_tsid.py", "placo": "peer_placo.py", "placo planar": "peer_placo.py"}
+PLANAR = "placo planar"  # placo's own flat foot, an easier problem
+SIDES = {"tsid": "peer_tsid.py", "placo": "peer_placo.py", PLANAR: "peer_placo.py"}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One robot, one peer, one kind of states: differences of the torques in N·m for each state, times in µs."""
+    """One robot, one peer, one kind of states.
+
+    differences: of the torques, for each state, N·m; those up to tolerance count as none. within: the largest between
+    floatbase's own two paths, N·m. ours, theirs: times, µs. ratios: of the medians of each block.
+    """
 
     robot: str
     peer: str
     label: str
     states: int
     unanswered: tuple[int, int]
+    tolerance: float
     differences: np.ndarray
+    within: float
     ours: np.ndarray
     theirs: np.ndarray
     ratios: np.ndarray
@@ -55,7 +62,7 @@ class Row:
     @property
     def is_same(self) -> bool:
         """Whether the torques agree, so that times can be compared."""
-        return self.difference <= TOLERANCE
+        return self.difference <= self.tolerance
 
     @property
     def ratio(self) -> float:
@@ -85,12 +92,27 @@ def compare(pair: Sequence[Process], robot: str, peer: str, n: int, rounds: int)
             label,
             len(kept[label]),
             unanswered,
-            np.array([np.max(np.abs(one - other)) for one, other in zip(ours, theirs, strict=True)]),
+            TOLERANCE * float(np.max(problem.robot.torque_limits)),
+            _differences(ours, theirs),
+            _within(problem, ours, [everything[label][i] for i in kept[label]]),
             times[:, 0].ravel(),
             times[:, 1].ravel(),
             medians[:, 0] / medians[:, 1],
             pair[1].ask("stages", label),
         )
+
+
+def _differences(ours: Sequence[np.ndarray], theirs: Sequence[np.ndarray]) -> np.ndarray:
+    """The largest of each state's torques, N·m."""
+    return np.array([np.max(np.abs(one - other)) for one, other in zip(ours, theirs, strict=True)])
+
+
+def _within(problem: peer_problems.Problem, ours: Sequence[np.ndarray], states: Sequence) -> float:
+    """The largest difference between floatbase's two paths, N·m, where that says who rounds."""
+    if problem.peer == PLANAR or not states:
+        return np.nan
+    readable = problem.controller("readable")
+    return float(np.max(_differences(ours, [readable(q, v).tau for q, v in states])))
 
 
 def ours(path: str) -> Process:
@@ -123,15 +145,15 @@ def without_numba(python: Path, n: int) -> Iterator[tuple[str, Row]]:
 
 
 def torque_table(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| robot | peer | states | compared | without answer: floatbase, peer | largest difference of a torque |"
-    yield "|---|---|---|---|---|---|"
+    yield "| robot | peer | states | compared | no answer: floatbase, peer | largest difference | of floatbase's two paths |"
+    yield "|---|---|---|---|---|---|---|"
     for row in rows:
-        missing = " and ".join(map(str, row.unanswered))
-        yield f"| {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | {row.difference:.1e} N·m |"
+        missing, size = " and ".join(map(str, row.unanswered)), f"{row.difference:.1e} N·m | {row.within:.1e} N·m"
+        yield f"| {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | {size} |"
 
 
 def time_table(rows: Sequence[Row], name: str = "floatbase") -> Iterator[str]:
-    yield f"| robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio of medians | of blocks |"
+    yield f"| robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio | 10 to 90 % of blocks |"
     yield "|---|---|---|---|---|---|---|---|---|"
     for row in rows:
         numbers = " | ".join(f"{x:.1f} µs" for x in (*np.percentile(row.ours, [50, 99]), *np.percentile(row.theirs, [50, 99])))
@@ -148,24 +170,28 @@ def stage_table(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def plot(rows: Sequence[Row]) -> None:
-    """Median ticks side by side."""
+    """Median ticks side by side, a row of pictures for each peer."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     peers = list(dict.fromkeys(row.peer for row in rows))
-    figure, axes = plt.subplots(1, len(peers), figsize=(5.5 * len(peers), 3.6), constrained_layout=True, squeeze=False)
-    for ax, peer in zip(axes[0], peers, strict=True):
-        mine = [row for row in rows if row.peer == peer]
-        at = np.arange(len(mine))
-        ax.bar(at - 0.2, [np.median(row.theirs) for row in mine], 0.4, label=peer, color="0.65")
-        bars = ax.bar(at + 0.2, [np.median(row.ours) for row in mine], 0.4, label="floatbase", color="tab:blue")
-        ax.bar_label(bars, [f"{row.ratio:.2f} ×" for row in mine], fontsize=8, padding=2)
-        ax.set_xticks(at, [f"{row.robot}\n{row.label}" for row in mine], fontsize=8)
-        ax.set(ylabel="median tick, µs", title=f"same torques, against {peer}")
-        ax.legend(frameon=False)
+    size = (9.0, 2.6 * len(peers))
+    figure, axes = plt.subplots(len(peers), len(ROBOTS), figsize=size, constrained_layout=True, squeeze=False)
+    for ax, (peer, robot) in zip(axes.flat, [(peer, robot) for peer in peers for robot in ROBOTS], strict=True):
+        chosen = [row for row in rows if (row.peer, row.robot) == (peer, robot)]
+        for shift, times, label, color in ((-0.2, "theirs", peer, "0.65"), (0.2, "ours", "floatbase", "tab:blue")):
+            heights = [float(np.median(getattr(row, times))) for row in chosen]
+            ax.bar(np.arange(len(chosen)) + shift, heights, 0.4, label=label, color=color)
+        for x, row in enumerate(chosen):
+            ax.annotate(f"{row.ratio:.2f} ×", (x, np.median(row.theirs)), (0, 3), textcoords="offset points", ha="center")
+        ax.set_xticks(range(len(chosen)), [row.label for row in chosen])
+        ax.set(title=f"{robot}, {peer}", ylabel="median tick, µs")
+        ax.margins(y=0.15)
         ax.spines[["top", "right"]].set_visible(False)
+    for ax in axes[:, 0]:
+        ax.legend(frameon=False, loc="lower right", facecolor="white", framealpha=0.8)
     figure.savefig(HERE / "peers.png", dpi=120)
 
 
@@ -176,22 +202,27 @@ placo, `controller(q, v)` for floatbase. The peers are the packages of PyPI, com
 compiles floatbase's kernel for this one."""
 
 
+SAMENESS = """\
+Torques are compared before times are: they count as the same up to a millionth of the strongest motor's limit. What is left is
+rounding in the peers' solver, as floatbase's two paths, which share no solver, agree more closely."""
+
+
 def report(rows: list[Row], plain: list[tuple[str, Row]], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
     """The text of peers.md."""
-    equal = [row for row in rows if row.peer != "placo planar"]
+    equal = [row for row in rows if row.peer != PLANAR]
     same, other = [row for row in equal if row.is_same], [row for row in equal if not row.is_same]
     peers = "; ".join(f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items())
     lines = ["# The tick against C++ peers, measured", "", f"`python benchmarks/peers.py` on {machine()}. {peers}.", ""]
     lines += [f"**Not measured: {why}**\n" for why in lacking]
     lines += [INTRODUCTION, ""]
-    lines += ["## The same optimum", "", (peer_problems.__doc__ or "").strip(), "", *torque_table(equal), ""]
+    lines += ["## The same optimum", "", (peer_problems.__doc__ or "").strip(), "", SAMENESS, "", *torque_table(equal), ""]
     lines += [f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}.\n" for row in other]
     lines += ["## Times", "", *time_table(same), ""]
     for path in dict.fromkeys(path for path, _ in plain):
         chosen = [row for which, row in plain if which == path and row.is_same]
         lines += [f"Without numba, `path={path!r}`:", "", *time_table(chosen, path), ""]
     lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(same), ""]
-    planar = [row for row in rows if row.peer == "placo planar"]
+    planar = [row for row in rows if row.peer == PLANAR]
     if planar:
         lines += ["## An easier problem", "", *planar_section(planar), ""]
     return "\n".join(lines)
@@ -205,7 +236,7 @@ def planar_section(rows: Sequence[Row]) -> Iterator[str]:
     )
     yield ""
     for row in rows:
-        agree, largest = int(np.sum(row.differences <= TOLERANCE)), f"the largest difference is {row.difference:.1f} N·m"
+        agree, largest = int(np.sum(row.differences <= row.tolerance)), f"the largest difference is {row.difference:.1f} N·m"
         yield f"- {row.label}: {agree} of {row.states} states have the same torques; {largest}."
     yield ""
     yield from time_table(rows)
