@@ -1,8 +1,8 @@
 """An environment for each peer that floatbase is compared with, made once and kept: `python_of` gives its Python.
 
-TSID's wheel was built against an older Pinocchio than the current one and crashes with it, so its library and bindings are
-compiled from their source packages, which takes some minutes, a C++ compiler and make. placo comes as a wheel that needs
-Pinocchio 3.8.
+TSID's wheel was built against an older Pinocchio than the current one and fails with it (in `RobotWrapper`), so its library
+and bindings are compiled from their source packages, which takes some minutes, a C++ compiler and make. placo comes as a wheel
+that needs Pinocchio 3.8.
 """
 
 from __future__ import annotations
@@ -16,7 +16,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 TSID, PLACO = "1.10.0", "0.10.2"
-CHECKS = {"tsid": "import tsid; tsid.SolverHQuadProgFast('test')", "placo": "import pinocchio, placo; placo.DynamicsSolver"}
+CHECKS = {
+    "tsid": "import pinocchio, tsid; model = pinocchio.buildSampleModelHumanoid(); "
+    "tsid.RobotWrapper(model, tsid.RootJointType.FLOATING_BASE_SYSTEM, False)",
+    "placo": "import pinocchio, placo; placo.DynamicsSolver",
+}
 
 
 class MissingError(Exception):

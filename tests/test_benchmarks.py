@@ -80,7 +80,7 @@ def test_a_missing_compiler_is_said_before_anything_is_made(tmp_path, monkeypatc
 def row(difference: float) -> peers.Row:
     times = np.array([1.0, 2.0, 3.0])
     size = np.array([difference])
-    return peers.Row("go2", "tsid", "easy", 3, (0, 0), 1e-4, size, 1e-9, times, 4 * times, times / 4, {"solve": 2.0})
+    return peers.Row("go2", "tsid", "easy", 3, (0, 0), 1e-4, size, 1e-9, times, 4 * times, np.full(2, 0.25), {"solve": 2.0})
 
 
 def test_times_are_given_for_equal_torques_alone():
