@@ -292,12 +292,13 @@ def _free_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> P
     drawn = view.painter.picture(state, com=first is not None, ghost=first)
     if first is not None:
         drawn |= below("axes", marks.frame_axes(state.frame_pose("base_link").homogeneous, 0.25))
-    return {path.replace("ghost/", "veil/"): item for path, item in drawn.items()}
+    return drawn
 
 
 def _play(view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Picture], look: View, speed: float = 1.0) -> Viewer:
     rows = recording.thinned(record.time, 30.0)
-    view.play_pictures(record.time[rows], [picture(record.state(int(i)), int(i)) for i in rows], speed=speed)
+    pictures = [picture(record.state(int(i)), int(i)) for i in rows]
+    view.play_pictures(record.time[rows], pictures, speed=speed, ghost_name="where it was first")
     return view.camera(look)
 
 

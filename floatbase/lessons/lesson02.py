@@ -214,8 +214,8 @@ def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
         length = float(np.linalg.norm(way))
         if length > 2e-3:
             drawn["way"] = shapes.rod(home, geometry.frame_along(way / length), length, 0.012, ALARM)
-        pictures.append({path.replace("ghost/", "veil/"): item for path, item in drawn.items()})
-    view.play_pictures(forgotten.time[rows], pictures, speed=0.1)
+        pictures.append(drawn)
+    view.play_pictures(forgotten.time[rows], pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))
 
 
@@ -234,11 +234,11 @@ def play_collapse(
             if length > 2e-3:  # beside the foot, where it is seen
                 start = a + [0.0, 0.06 * np.sign(a[1]), 0.0]
                 drawn[f"way/{i}"] = shapes.rod(start, geometry.frame_along(way / length), length, 0.006, ALARM)
-        return {path.replace("ghost/", "veil/"): item for path, item in drawn.items()}
+        return drawn
 
     rows = np.linspace(0, len(kept) - 1, 30).astype(int)
     pictures = [picture(forgotten[i], kept[i]) for i in rows]
-    view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1)
+    view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(72.0, 10.0, 1.0, around=((0.0, 0.0, 0.16), 0.36)))
 
 

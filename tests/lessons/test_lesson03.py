@@ -188,4 +188,4 @@ def test_the_veil_of_a_motion_is_not_called_a_wanted_posture() -> None:
         drawn = str(view.window.scene.lasting())
     finally:
         view.close()
-    assert "veil" in drawn and "wanted posture" not in drawn
+    assert "leads in a quarter" in drawn and "wanted posture" not in drawn
