@@ -17,12 +17,12 @@ from floatbase.control.friction import FrictionPolyhedron
 from floatbase.control.qp import QP, Solution, check_solver, finished, solve
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
+from floatbase.dynamics.subspace import resolved_motion
 from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
 from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
 
-MOTION_TOLERANCE = 1e-4  # part of the largest singular value of A below which b is measurement noise
 MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
@@ -93,7 +93,7 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
 
     Where A of (5) loses rank, or nearly (solo8 on four feet), its rows repeat each other, and a measured velocity that is not
     quite one the contacts allow makes them contradict each other: met to the letter they would ask for any acceleration.
-    So b counts only along the directions that A resolves better than `MOTION_TOLERANCE`; along the others it is zero.
+    So the rows count along the directions that A resolves well, as everywhere (`floatbase.dynamics.subspace.resolved_motion`).
     """
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
@@ -108,8 +108,8 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
             )
         H[part, part] += task.weight * residual.A.T @ residual.A
         g[part] += task.weight * residual.A.T @ residual.b
-    A = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), d + k))]])
-    b = _reachable_rows(eom)
+    motion, b = _resolved_rows(eom)
+    A = np.block([[eom.M, -eom.S, -eom.J.T], [motion, np.zeros((len(motion), d + k))]])
     G_force, h_force, force_names = _force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = _torque_rows(eom.robot, limits)
     G = np.zeros((len(G_force) + len(G_torque), n))
@@ -128,12 +128,12 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     )
 
 
-def _reachable_rows(eom: EquationsOfMotion) -> Array:
-    """b of (5) without what is measurement noise along directions that A does not resolve, shape (m,).
+def _resolved_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
+    """(5) A (m, nv) and b (m,) along the directions that A resolves.
 
     Raises `InfeasibleError` with the rows where they contradict each other by more than the contacts' own motion explains.
     """
-    b = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=MOTION_TOLERANCE)[0]
+    A, b = resolved_motion(eom)
     gap = np.abs(eom.b - b)
     motion = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
     if np.max(gap, initial=0.0) > 1e-6 + MOTION_NOISE * motion:
@@ -142,7 +142,7 @@ def _reachable_rows(eom: EquationsOfMotion) -> Array:
         raise InfeasibleError(
             f"these motions cannot be kept together: {', '.join(rows)}. At least one of their constraints has to go.", rows
         )
-    return read_only(b)
+    return A, b
 
 
 # what does not depend on the state is built once for each contacts, robot and limits (all immutable)

@@ -32,8 +32,7 @@ POINT, FLAT = 0, 1  # kinds of contact
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = 0, 1, 2, 3, 4, 5  # kinds of task
 
 _DEPENDENT = 2e-2  # a row of which elimination leaves less than this part may nearly depend on the others
-_RANK = 1e-10  # as RANK_TOLERANCE of the readable path
-_MOTION = 1e-4  # as MOTION_TOLERANCE of the readable path
+_MOTION = 1e-4  # as MOTION_TOLERANCE of `floatbase.dynamics.subspace`
 _NOISE = 100.0  # as MOTION_NOISE of the readable path
 _CURVED = 1e-13  # least pivot of the objective's Cholesky factor, squared, relative to its diagonal
 _VIOLATED = 1e-9  # as FEASIBILITY_TOLERANCE of the readable path, on rows of unit length
@@ -283,41 +282,24 @@ def equalities(A, b, M, h, Jp, base):
 
 
 @_compiled
-def contradict(A, v, U, s, b):
-    """Whether rows of A q̈ = b contradict each other by more than the contacts' own motion A v explains; U, s: of A's SVD."""
-    gap, motion = b.copy(), 0.0
-    for i in range(s.size):
-        if s[i] > _MOTION * s[0]:
-            along = 0.0
-            for j in range(b.size):
-                along += U[j, i] * b[j]
-            for j in range(b.size):
-                gap[j] -= along * U[j, i]
-    for j in range(b.size):
-        moved = 0.0
-        for c in range(v.size):
-            moved += A[j, c] * v[c]
-        motion = max(motion, abs(moved))
-    return np.max(np.abs(gap)) > 1e-6 + _NOISE * motion
+def contradict(A, v, U, b):
+    """Whether rows of A q̈ = b contradict each other by more than the contacts' own motion A v explains; U (m, r): of A's SVD."""
+    gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
+    return np.max(np.abs(gap)) > 1e-6 + _NOISE * np.max(np.abs(motion))
 
 
 @_compiled
 def independent_rows(A, b, v):
     """(5) Orthonormal rows (r, nv) and right-hand sides (r,) that say what A q̈ = b says along the directions A resolves.
 
-    Along those that it hardly resolves b is measurement noise, and zero stands in its place, as in `build_qp`. The last
-    answer is False where it is more than that, v (nv,) being the velocity.
+    The others are left out, as in `build_qp`. The last answer is False where b contradicts itself, v (nv,) being the velocity.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
-    while r < s.size and s[r] > _RANK * s[0]:
+    while r < s.size and s[r] > _MOTION * s[0]:
         r += 1
-    right = np.zeros(r)
-    for i in range(r):
-        if s[i] > _MOTION * s[0]:
-            for j in range(b.size):
-                right[i] += U[j, i] * b[j] / s[i]
-    return np.ascontiguousarray(Vt[:r]), right, not contradict(A, v, U, s, b)
+    U = np.ascontiguousarray(U[:, :r])
+    return np.ascontiguousarray(Vt[:r]), np.dot(U.T, b) / s[:r], not contradict(A, v, U, b)
 
 
 @_compiled

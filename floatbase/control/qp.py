@@ -27,12 +27,12 @@ import numpy as np
 from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine, Quadratic
 from floatbase.control.conflicts import conflicting_rows, contradicting_equalities, contradiction
+from floatbase.dynamics.subspace import RANK_TOLERANCE
 from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_name
 
 if TYPE_CHECKING:
     from floatbase.control.backends import BackEnd
 
-RANK_TOLERANCE = 1e-10  # singular values of equality rows of unit length below this part of the largest count as zero
 FEASIBILITY_TOLERANCE = 1e-9  # what a solver may leave of an inequality of unit length
 _ROUNDING = 1e-14  # part of a sum's terms that may be rounding
 

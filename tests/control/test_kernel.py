@@ -349,10 +349,10 @@ def test_a_replaced_controller_is_like_a_new_one_and_compiles_nothing() -> None:
 
 def test_both_paths_keep_the_same_tolerances() -> None:
     from floatbase.control import controller, kernel, qp
+    from floatbase.dynamics import subspace
 
-    assert controller.MOTION_TOLERANCE == kernel._MOTION
+    assert subspace.MOTION_TOLERANCE == kernel._MOTION
     assert controller.MOTION_NOISE == kernel._NOISE
-    assert qp.RANK_TOLERANCE == kernel._RANK
     assert qp.FEASIBILITY_TOLERANCE == kernel._VIOLATED
 
 
