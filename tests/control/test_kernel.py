@@ -99,7 +99,7 @@ def test_on_dependent_contact_rows_the_compiled_tick_is_the_nearer_to_the_optimu
 
 @pytest.mark.parametrize("seed", [33, 45, 46, 135, 195, 1819, 1932])
 def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(seed: int) -> None:
-    """solo8 on three feet, singular values about MOTION_TOLERANCE: b counts along the same directions on both paths."""
+    """solo8 on three feet, singular values about MOTION_TOLERANCE: both paths keep the same directions."""
     robot = judges.load("solo8")
     both = pair(robot, fb.Contacts.points(robot).without(robot.feet[3].frame))
     state = robot.random_state(seed, (0.02, 0.1, 0.3)[seed % 3])
