@@ -283,7 +283,7 @@ def equalities(A, b, M, h, Jp, base):
 
 @_compiled
 def contradict(A, v, U, b):
-    """Whether rows of A q̈ = b contradict each other by more than the contacts' own motion A v explains; U (m, r): of A's SVD."""
+    """Whether rows of A q̈ = b contradict each other by more than the contacts' motion A v explains; U (m, r): of A's SVD."""
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
     return np.max(np.abs(gap)) > 1e-6 + _NOISE * np.max(np.abs(motion))
 
