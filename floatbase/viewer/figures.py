@@ -57,14 +57,15 @@ def figure_1_right(background: str = "white") -> Viewer:
     positions = contacts.positions(state)
     wrench = np.concatenate([forces.sum(axis=0), np.cross(positions - state.com, forces).sum(axis=0)])
     tips = positions + scale * forces
-    labels = {f"f{{{i + 1}}}": tip + [0.0, 0.0, 0.035] for i, tip in enumerate(tips)}
+    labels = {f"f{{{i + 1}}}": tip + [0.045, -0.03, 0.0] for i, tip in enumerate(tips)}
+    labels["f{4}"] = tips[3] + [-0.06, 0.04, 0.0]
     labels["f{c}"] = state.com + scale * wrench[:3] + [0.0, 0.0, 0.04]
-    labels["τ{c}"] = state.com + [0.0, 0.0, 0.17] + 0.12 * np.array([1.0, 0.0, 0.0])
+    labels["τ{c}"] = state.com + [0.11, -0.07, 0.17]
     view.show(
         state, contacts, forces, wrench=wrench, cones=False, extra=_labels(view, labels),
         title="Figure 1, right: the base floats",
     )  # fmt: skip
-    return view.camera(View(40.0, 12.0, 1.0, around=((0.0, 0.0, 0.45), 0.62)))
+    return view.camera(View(58.0, 16.0, 1.0, around=((0.0, 0.0, 0.45), 0.62)))
 
 
 def figure_2(background: str = "white") -> Viewer:
@@ -75,13 +76,17 @@ def figure_2(background: str = "white") -> Viewer:
     contacts = Contacts.points(robot, MU)
     positions = contacts.positions(state)
     labels = {f"x{{{i + 1}}}": _outside(position, state.com) for i, position in enumerate(positions)}
-    labels["x{c}"] = state.com + [0.0, 0.06, -0.06]
+    labels["x{4}"] = positions[3] + [-0.06, 0.04, 0.01]  # behind the robot: outside would be hidden by its own foot
+    labels["x{c}"] = state.com + [0.05, -0.03, 0.035]
+    pose = state.frame_pose(robot.base).homogeneous
+    labels["base"] = pose[:3, 3] + [0.0, 0.0, 0.24]
+    axes = below("base", marks.frame_axes(pose, 0.2))
     rods = {f"lever/{i}": _rod(state.com, position, COM) for i, position in enumerate(positions)}
     view.show(
-        state, contacts, cones=False, support=True, frames=[robot.base], extra=_labels(view, labels) | rods,
+        state, contacts, cones=False, support=True, extra=_labels(view, labels) | rods | axes,
         title="Figure 2: quadrupedal robot",
     )  # fmt: skip
-    return view.camera(View(38.0, 16.0, 1.05))
+    return view.camera(View(62.0, 18.0, 1.05))
 
 
 def figure_3_left(background: str = "white") -> Viewer:
@@ -116,7 +121,7 @@ def figure_3_right(background: str = "white") -> Viewer:
         "surface": _rod(np.array([0.0, -0.6, 0.0]), np.array([0.0, 0.6, 0.0]), PATCH),
     }
     labels = {
-        "f": (along + across) / 2 + [0, 0.09, 0],
+        "f": 0.7 * along + [0, 0.08, 0],
         "α{⊥}": [0.0, -0.06, height / 2],
         "α{∥}": along + across / 2 + [0, 0, 0.05],
         "μ α{⊥}": along + [0.0, most + 0.08, 0.0],
@@ -136,9 +141,9 @@ FIGURES: dict[str, Callable[..., Viewer]] = {
 
 
 def _example_forces(weight: float) -> Array:
-    """Forces at four feet, (4, 3), N, inside their cones, that lean inwards and carry the weight unevenly."""
-    shares = np.array([0.42, 0.12, 0.34, 0.12])
-    lean = np.array([[-0.25, -0.15, 1.0], [-0.15, 0.30, 1.0], [0.30, -0.10, 1.0], [0.20, 0.25, 1.0]])
+    """Forces at four feet, (4, 3), N, inside their cones, that lean and carry the weight unevenly."""
+    shares = np.array([0.32, 0.21, 0.27, 0.20])
+    lean = np.array([[-0.25, 0.15, 1.0], [0.30, 0.20, 1.0], [0.10, 0.35, 1.0], [-0.35, 0.20, 1.0]])
     return weight * shares[:, None] * lean
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from floatbase.dynamics.contacts import Contacts
-from floatbase.robots import Robot, State
+from floatbase.robots import Robot, State, load, robots
 from floatbase.viewer import wire
 from floatbase.viewer.colours import ALARM, CALM, COM, MEASURED, WARNING
 from floatbase.viewer.scene import Viewer
@@ -87,4 +87,18 @@ def test_backgrounds(page, go2: Robot, standing: State, background: str) -> None
     settle(page, viewer)
     corner = picture(page, f"background_{background}")[590, 5]
     assert (corner.mean() > 200) == (background != "dark")
+    viewer.close()
+
+
+@pytest.mark.parametrize("name", robots())
+def test_every_robot_is_in_the_page(page, name: str) -> None:
+    robot = load(name)
+    viewer = Viewer(robot, background="white")
+    viewer.show(robot.standing(), com=False)
+    page.goto(viewer.url)
+    settle(page, viewer)
+    parts = page.evaluate("Object.keys(viewer.scene_tree.children.meshcat.children.robot.children).length")
+    assert parts == len([path for path in viewer.canvas.picture if path.startswith("robot/")])
+    rows, columns = np.nonzero(np.abs(picture(page, f"robot_{name}") - 255).sum(axis=2) > 150)
+    assert np.ptp(rows) > 0.45 * 600 or np.ptp(columns) > 0.45 * 900
     viewer.close()

@@ -27,7 +27,7 @@ matplotlib.use("agg")
 
 def record(robot: Robot, duration: float = 2.0, walk: float = 0.0) -> Rollout:
     """The robot sways and leans harder on its front left foot, at 1 kHz; that foot slips in the middle and is pushed."""
-    state, contacts = robot.standing(), Contacts.points(robot, mu=0.6)
+    state, contacts = robot.standing(), on_its_feet(robot)
     time = np.arange(0.0, duration, 1e-3)
     q = np.tile(state.q, (time.size, 1))
     q[:, 1] += 0.03 * np.sin(2 * np.pi * time)
@@ -125,19 +125,29 @@ def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(viewer: Vi
     assert {key: value for key, value in after.items() if key[0].startswith("/meshcat")} == before
 
 
+def on_its_feet(robot: Robot) -> Contacts:
+    make = Contacts.flat_feet if robot.feet and robot.feet[0].is_flat else Contacts.points
+    return make(robot, mu=0.6) if robot.feet else Contacts.none()
+
+
 @pytest.mark.parametrize("name", robots())
-def test_every_robot_saves_to_less_than_a_megabyte(name: str, tmp_path: Path) -> None:
-    viewer = Viewer(load(name))
-    viewer.show(viewer.robot.standing())
+def test_every_robot_saves_to_less_than_a_megabyte_with_forces_and_cones(name: str, tmp_path: Path) -> None:
+    robot = load(name)
+    viewer, contacts = Viewer(robot), on_its_feet(robot)
+    forces = np.tile([0.0, 0.0, robot.weight / max(contacts.n_points, 1)], (contacts.n_points, 1))
+    viewer.show(robot.standing(), contacts, forces, forces, support=contacts.n_points > 2, title=name)
     saved = viewer.save(tmp_path / "still.html")
     assert saved.stat().st_size < 1_000_000
     assert not re.search(r"(src|href)=\"(?!data:)", saved.read_text())
     viewer.close()
 
 
-def test_ten_seconds_with_forces_are_less_than_two_megabytes(viewer: Viewer, go2: Robot, tmp_path: Path) -> None:
-    viewer.play(record(go2, duration=10.0))
+@pytest.mark.parametrize("name", [name for name in robots() if load(name).feet])
+def test_ten_seconds_with_forces_are_less_than_two_megabytes(name: str, tmp_path: Path) -> None:
+    viewer = Viewer(load(name))
+    viewer.play(record(viewer.robot, duration=10.0), support=True)
     assert viewer.save(tmp_path / "moving.html").stat().st_size < 2_000_000
+    viewer.close()
 
 
 def test_wrong_records_and_file_names_are_explained(viewer: Viewer, go2: Robot, standing: State, tmp_path: Path) -> None:
