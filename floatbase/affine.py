@@ -30,6 +30,7 @@ class Affine:
     A: Array
     b: Array
     blocks: Mapping[str, slice] = field(default_factory=dict)
+    __array_ufunc__ = None  # array + map is ours to add up, and so are array * map and array @ map
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "A", checked("A", self.A, (None, None)))
@@ -93,7 +94,7 @@ class Affine:
     def __matmul__(self, inner: Affine) -> Affine:
         """Composition: (f @ g)(x) = f(g(x)). Keeps the block names of f."""
         if not isinstance(inner, Affine):
-            return NotImplemented
+            raise InputError("only maps can be composed; the value of f at x is f(x), and Affine.linear(B) is a matrix's map.")
         if inner.n_out != self.n_in:
             raise InputError(f"cannot compose: the inner map gives {inner.n_out} numbers, the outer takes {self.n_in}.")
         return Affine(self.A @ inner.A, self.A @ inner.b + self.b, self.blocks)
@@ -109,11 +110,26 @@ class Affine:
     def __sub__(self, other: Affine | npt.ArrayLike) -> Affine:
         return self + (-1.0 * other if isinstance(other, Affine) else -np.asarray(other, dtype=np.float64))
 
+    def __radd__(self, other: npt.ArrayLike) -> Affine:
+        """constant + map, the same as map + constant."""
+        return self + other
+
+    def __rsub__(self, other: npt.ArrayLike) -> Affine:
+        """The map x -> other - (A x + b)."""
+        return -self + other
+
     def __rmul__(self, scale: float) -> Affine:
         """The map x -> scale (A x + b)."""
-        if not isinstance(scale, (int, float)):
-            return NotImplemented
-        return Affine(float(scale) * self.A, float(scale) * self.b, self.blocks)
+        scale = _scale("map", scale)
+        return Affine(scale * self.A, scale * self.b, self.blocks)
+
+    def __mul__(self, scale: float) -> Affine:
+        """The same as scale * map."""
+        return self.__rmul__(scale)
+
+    def __rmatmul__(self, outer: npt.ArrayLike) -> Affine:
+        """matrix @ map: the map x -> outer (A x + b), outer of shape (p, m)."""
+        return Affine.linear(checked("the matrix", outer, (None, self.n_out))) @ self
 
     def __neg__(self) -> Affine:
         return -1.0 * self
@@ -133,6 +149,7 @@ class Quadratic:
     H: Array
     g: Array
     c: float = 0.0
+    __array_ufunc__ = None  # array * cost is ours to refuse
 
     def __post_init__(self) -> None:
         g = checked("g", self.g, (None,))
@@ -216,6 +233,17 @@ class Quadratic:
         return Quadratic(self.H + other.H, self.g + other.g, self.c + other.c)
 
     def __rmul__(self, scale: float) -> Quadratic:
-        if not isinstance(scale, (int, float)):
-            return NotImplemented
-        return Quadratic(float(scale) * self.H, float(scale) * self.g, float(scale) * self.c)
+        scale = _scale("cost", scale)
+        return Quadratic(scale * self.H, scale * self.g, scale * self.c)
+
+    def __mul__(self, scale: float) -> Quadratic:
+        """The same as scale * cost."""
+        return self.__rmul__(scale)
+
+
+def _scale(kind: str, scale: object) -> float:
+    """The number that a map or cost is multiplied by; `InputError` with advice for anything else."""
+    if isinstance(scale, (int, float, np.number)) and np.isfinite(scale):
+        return float(scale)
+    what = f"an array of shape {scale.shape}" if isinstance(scale, np.ndarray) else repr(scale)
+    raise InputError(f"a {kind} can be multiplied by a finite number, not by {what}; to compose maps write f @ g.")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -155,6 +157,40 @@ def test_a_partial_minimum_is_the_least_of_all_points_that_keep_the_rest() -> No
     assert np.allclose(N @ (N.T @ (best(x) - x)), best(x) - x)
     assert all(cost(x + N @ z) >= cost(best(x)) for z in rng.normal(size=(20, 2)))
     assert np.allclose(best(best(x)), best(x))
+
+
+@given(seeds, sizes, sizes)
+def test_constants_and_numbers_may_stand_on_either_side_of_a_map(seed: int, m: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    f = fb.Affine(rng.normal(size=(m, n)), rng.normal(size=m), {"all": slice(0, m)})
+    x, b, B = rng.normal(size=n), rng.normal(size=m), rng.normal(size=(2, m))
+    assert np.allclose((f * 2.0)(x), 2.0 * f(x))
+    assert np.allclose((np.float64(3.0) * f)(x), 3.0 * f(x))
+    assert np.allclose((b + f)(x), b + f(x))
+    assert np.allclose((b - f)(x), b - f(x))
+    assert np.allclose((list(b) + f)(x), b + f(x))
+    assert np.allclose((B @ f)(x), B @ f(x))
+    assert (b + f).blocks == (f * 2).blocks == f.blocks
+    cost = quadratic(rng, n)
+    assert (cost * 2.0)(x) == pytest.approx(2.0 * cost(x))
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda f: f * np.ones(2), r"a map can be multiplied by a finite number, not by an array of shape \(2,\); .* f @ g"),
+        (lambda f: np.ones(2) * f, "a map can be multiplied by a finite number"),
+        (lambda f: f * f, "a map can be multiplied by a finite number, not by Affine"),
+        (lambda f: np.nan * f, "a map can be multiplied by a finite number, not by nan"),
+        (lambda f: np.ones(3) + f, r"the constant has shape \(3,\); it must have shape \(2,\)"),
+        (lambda f: f @ np.ones(2), r"the value of f at x is f\(x\)"),
+        (lambda f: np.ones((2, 3)) @ f, r"the matrix has shape \(2, 3\); it must have shape \(any, 2\)"),
+        (lambda f: "2" * fb.Quadratic.zero(2), "a cost can be multiplied by a finite number, not by '2'"),
+    ],
+)
+def test_sums_and_products_that_mean_nothing_are_answered_with_advice(make: Callable[[fb.Affine], object], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        make(fb.Affine.identity(2))
 
 
 def test_a_cost_that_falls_for_ever_has_no_minimum() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive
+from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Quadratic
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
@@ -22,11 +22,14 @@ from floatbase.robots.state import State
 
 @dataclass(frozen=True, eq=False)
 class AnalyticCommand:
-    """tau: (d,) N·m to apply; forces: (k,) N, world, and qdd: (nv,) planned with them."""
+    """tau: (d,) N·m to apply; forces: (k,) N, world, and qdd: (nv,) planned with them. Read-only."""
 
     tau: Array
     forces: Array
     qdd: Array
+
+    def __repr__(self) -> str:
+        return f"AnalyticCommand(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N)"
 
 
 class AnalyticController:
@@ -55,8 +58,15 @@ class AnalyticController:
         posture: float = 1e-3,
         torque: float = 1e-6,
     ):
+        if not isinstance(robot, Robot):
+            raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
+        if not isinstance(contacts, Contacts):
+            raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(contacts).__name__}.")
+        if not isinstance(state, State):
+            raise InputError(f"the state to hold must be a State, as robot.standing(), not {type(state).__name__}.")
         if state.robot is not robot:
             raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
+        equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
         self.robot, self.contacts, self._held = robot, contacts, state
         self.com = checked("com", state.com if com is None else com, (3,), "m")
         share = robot.weight / max(contacts.n_points, 1)
@@ -83,4 +93,4 @@ class AnalyticController:
         on_qdd, on_tau, on_forces = self.objective(eom)
         beta = cost_on_space(space, on_qdd, on_tau, on_forces).minimiser()
         qdd, tau, forces = space(beta)
-        return AnalyticCommand(tau, forces, qdd)
+        return AnalyticCommand(read_only(tau), read_only(forces), read_only(qdd))

@@ -1,7 +1,11 @@
-"""Which rows of an infeasible problem contradict each other: a smallest such set."""
+"""Which rows of an infeasible problem contradict each other: a smallest such set.
+
+In optimisation such a set is an irreducible infeasible subsystem (IIS): infeasible as it is, feasible without any one row.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import numpy as np
@@ -13,17 +17,39 @@ from floatbase.errors import InfeasibleError, SolverError
 _TOLERANCE = 1e-9  # a violation below this counts as none
 _ROUNDING = 1e-12  # part of the largest |h| that a linear program may leave as a violation
 _HIGHS = 1e-10  # the most exact that HiGHS can be asked to be
+_FEW = 4  # rows that are listed in one line
+# rows by the names that the controller gives them; whose they are is in the group
+_KINDS = {
+    "normal force": re.compile("(.+) normal force"),
+    "friction": re.compile(r"(.+ facet \d+)"),
+    "upper torque limit": re.compile("torque limit (.+) upper"),
+    "lower torque limit": re.compile("torque limit (.+) lower"),
+}
 
 
 def contradiction(rows: Iterable[str]) -> InfeasibleError:
-    """The error that names the inequality rows in conflict."""
+    """The error that names the inequality rows in conflict; more than a few are grouped by kind and counted."""
     rows = tuple(rows)
+    text = f" {', '.join(rows)}. " if len(rows) <= _FEW else "\n" + "\n".join(_grouped(rows)) + "\n"
     return InfeasibleError(
-        "no point satisfies all rows. Given the equalities, these contradict each other: "
-        + ", ".join(rows)
-        + ". Loosen or drop any one of them.",
+        f"no point satisfies all rows. Given the equalities, these contradict each other:{text}"
+        "Loosen or drop any one of them: at least one has to go.",
         rows,
     )
+
+
+def _grouped(rows: tuple[str, ...]) -> list[str]:
+    """One line for each kind of row: how many, and whose."""
+    kinds: dict[str, list[str]] = {}
+    for row in rows:
+        for kind, pattern in _KINDS.items():
+            owner = pattern.fullmatch(row)
+            if owner:
+                kinds.setdefault(kind, []).append(owner[1])
+                break
+        else:
+            kinds.setdefault("other rows", []).append(row)
+    return [f"  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()]
 
 
 def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,8 @@ from floatbase.robots.robot import Foot, Robot, spread_corners
 from floatbase.robots.state import State
 
 UP = read_only([0.0, 0.0, 1.0])
+_MU = 0.7
+PerFoot: TypeAlias = float | Sequence[float] | Array | Mapping[str, float]
 
 
 @runtime_checkable
@@ -221,28 +223,29 @@ class Contacts:
     @staticmethod
     def points(
         robot: Robot,
-        mu: float = 0.7,
+        mu: PerFoot = 0.7,
         frames: Sequence[str] | None = None,
         normals: npt.ArrayLike | Mapping[str, npt.ArrayLike] | None = None,
     ) -> Contacts:
         """Point contacts at the robot's feet.
 
-        mu: coefficient of friction. frames: which frames; all feet by default. normals: shape (3,) for all, (n, 3) in
-        the order of the frames, or a mapping from frame to (3,); straight up by default. A flat foot touches at the
-        middle of its corners here; `Contacts.flat_feet` uses its area.
+        mu: coefficient of friction, one number for all, (n,) in the order of the frames, or a mapping from frame to number,
+        0.7 where it has none. frames: which frames; all feet by default. normals: shape (3,) for all, (n, 3) in the order of
+        the frames, or a mapping from frame to (3,); straight up by default. A flat foot touches at the middle of its corners
+        here; `Contacts.flat_feet` uses its area.
         """
         feet = _feet(robot, frames)
         return Contacts(
             [
-                PointContact(foot.frame, n, mu, foot.radius, foot.centre if foot.corners is None else foot.corners.mean(axis=0))
-                for foot, n in zip(feet, _normals(feet, normals), strict=True)
+                PointContact(foot.frame, n, m, foot.radius, foot.centre if foot.corners is None else foot.corners.mean(axis=0))
+                for foot, n, m in zip(feet, _normals(feet, normals), _mus(feet, mu), strict=True)
             ]
         )
 
     @staticmethod
     def flat_feet(
         robot: Robot,
-        mu: float = 0.7,
+        mu: PerFoot = 0.7,
         frames: Sequence[str] | None = None,
         normals: npt.ArrayLike | Mapping[str, npt.ArrayLike] | None = None,
     ) -> Contacts:
@@ -256,11 +259,20 @@ class Contacts:
                 )
         return Contacts(
             [
-                FlatFootContact(foot.frame, foot.corners, n, mu)
-                for foot, n in zip(feet, _normals(feet, normals), strict=True)
+                FlatFootContact(foot.frame, foot.corners, n, m)
+                for foot, n, m in zip(feet, _normals(feet, normals), _mus(feet, mu), strict=True)
                 if foot.corners is not None
             ]
         )
+
+    @staticmethod
+    def feet(robot: Robot, mu: float = 0.7) -> Contacts:
+        """All feet of the robot as they are, flat ones with their corners, the others as points; none where it has none."""
+        contacts = Contacts.none()
+        for foot in robot.feet:
+            make = Contacts.flat_feet if foot.is_flat else Contacts.points
+            contacts = contacts + make(robot, mu, [foot.frame])
+        return contacts
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -300,7 +312,10 @@ class Contacts:
         return np.concatenate([np.zeros(0, dtype=np.intp), *entries])
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m."""
+        """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one radius below its centre.
+
+        A `FrameTask` follows the frame's origin instead, which for most ball feet is the ball's centre.
+        """
         return read_only(np.vstack([np.zeros((0, 3))] + [contact.positions(state) for contact in self._contacts]))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
@@ -322,6 +337,20 @@ class Contacts:
                 return slice(start, start + contact.k)
             start += contact.k
         raise unknown_name("contact", name, self.names)
+
+    def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
+        """The force of one contact among λ, shape (3,), N, world: for a flat foot the resultant of its corners.
+
+        forces: λ, shape (k,), or (n, k) for n of them, which gives (n, 3). Raises `UnknownNameError` for a name that is no
+        contact's, `InputError` for a contact whose forces do not act at points.
+        """
+        part, contact = self.force_slice(name), self[name]
+        if contact.k != 3 * len(contact.point_names):
+            raise InputError(f"the forces of {name} do not act at points, so they add up to no force; see force_slice.")
+        stacked = np.asarray(forces, dtype=np.float64)
+        if stacked.ndim not in (1, 2) or stacked.shape[-1] != self.k:
+            raise InputError(f"forces has shape {stacked.shape}; {self!r} takes ({self.k},) or (n, {self.k}) (N).")
+        return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
 
     def only(self, *names: str) -> Contacts:
         """The contacts of these names, in the order they have here."""
@@ -345,7 +374,8 @@ class Contacts:
     def __add__(self, other: Contacts) -> Contacts:
         if not isinstance(other, Contacts):
             raise InputError(f"only Contacts can be added to Contacts, not {type(other).__name__}.")
-        return Contacts([*self._contacts, *other])
+        both = (*self._contacts, *other)
+        return Contacts(both) if both else Contacts.none()
 
     def __iter__(self) -> Iterator[Contact]:
         return iter(self._contacts)
@@ -366,6 +396,17 @@ def _feet(robot: Robot, frames: Sequence[str] | None) -> tuple[Foot, ...]:
     if not feet:
         raise InputError(f'{robot.name} has no feet; name the frames that touch: frames=["…"] (robot.frames lists them).')
     return feet
+
+
+def _mus(feet: Sequence[Foot], mu: PerFoot) -> list[float]:
+    """One coefficient of friction for each foot."""
+    names = [foot.frame for foot in feet]
+    if isinstance(mu, Mapping):
+        for frame in mu:
+            if frame not in names:
+                raise unknown_name("contact frame in mu", frame, names)
+        return [mu.get(name, _MU) for name in names]
+    return [mu] * len(feet) if np.ndim(mu) == 0 else list(checked("mu", mu, (len(feet),)))  # type: ignore[list-item]
 
 
 def _normals(feet: Sequence[Foot], normals: npt.ArrayLike | Mapping[str, npt.ArrayLike] | None) -> list[Array]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive, read_only, unit_quaternion
-from floatbase.errors import InputError, unknown_name
+from floatbase.errors import InputError, UnknownNameError, unknown_name
 from floatbase.robots.robot import Foot, Robot, torque_limits_of
 
 
@@ -187,6 +187,11 @@ def _loader(name: str) -> _Loader:
     import example_robot_data as data
 
     known = data.robots_loader.ROBOTS
+    if str(name).endswith((".urdf", ".xml", ".xacro")) or "/" in str(name):
+        raise UnknownNameError(
+            f"{str(name)!r} is no robot's name but a file's; fb.load_urdf({str(name)!r}, feet=[…]) loads a URDF of your own. "
+            f"Names that fb.load knows: {', '.join(CATALOGUE)}, and the others of example-robot-data."
+        )
     if name not in known:
         raise unknown_name("robot", name, known, "fb.robots() says what the catalogue's robots are for.")
     loader: Any = known[name]

@@ -14,6 +14,11 @@ from floatbase.errors import SimulationError
 from floatbase.robots.robot import Robot
 
 
+def body_name(link: str) -> str:
+    """Name in MuJoCo of a floating robot's link: its own, but for "world", which is what MuJoCo calls the ground."""
+    return "world of the robot" if link == "world" else link
+
+
 class Conversion:
     """Index tables between a robot and a MuJoCo model of it, and the maps made of them."""
 

@@ -16,7 +16,7 @@ from floatbase.dynamics.contacts import UP
 from floatbase.errors import InputError, SimulationError
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
-from floatbase.simulation.conversion import Conversion
+from floatbase.simulation.conversion import Conversion, body_name
 
 _CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
 _GROUND = "ground"
@@ -82,7 +82,7 @@ class Simulation:
         self._point_of_geom = {self.model.geom(name).id: i for name, i in self._points.items()}
         self._wrench = np.zeros(6)
         self._pushed = self.data.xfrc_applied
-        self._base = self.model.body(robot.base).id if robot.is_floating else 0
+        self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self.reset()
 
     @property
@@ -198,11 +198,26 @@ class Simulation:
         height = self._upright[0]
         return height if height > 1e-3 else float(np.linalg.norm(state.com - self.data.xpos[self._base]))
 
-    def _apply(self, push: Push) -> None:
-        """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""
+    def pushed_body(self, push: Push) -> int:
+        """MuJoCo's number of the body that a push acts on.
+
+        Raises `UnknownNameError` for a frame that the robot lacks, `InputError` for one that is bolted to the ground.
+        """
         frame = self.robot.model.frames[self.robot.frame_id(push.frame)]
         joint = self.robot.model.names[frame.parentJoint]
-        body = int(self.model.joint(joint).bodyid[0]) if joint in self.robot.joint_names else self._base
+        if joint in self.robot.joint_names:
+            return int(self.model.joint(joint).bodyid[0])
+        if self.robot.is_floating:
+            return self._base
+        moving = [f.name for f in self.robot.model.frames if f.parentJoint > 0 and f.type == pin.FrameType.BODY]
+        raise InputError(
+            f"a push at {push.frame!r} moves nothing: {self.robot.name} is bolted to the ground there. "
+            f"Push a link that moves: {', '.join(moving)}."
+        )
+
+    def _apply(self, push: Push) -> None:
+        """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""
+        frame, body = self.robot.model.frames[self.robot.frame_id(push.frame)], self.pushed_body(push)
         at = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ frame.placement.translation
         self._pushed[body, :3] += push.force
         self._pushed[body, 3:] += np.cross(at - self.data.xipos[body], push.force)
@@ -219,7 +234,7 @@ def _build(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
     spec.option.impratio = 100.0  # friction as stiff as the normal: feet creep less
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if robot.is_floating:
-        spec.body(robot.base).add_freejoint()
+        spec.body(body_name(robot.base)).add_freejoint()
     for joint in spec.joints:
         if joint.name in robot.joint_names:
             at = robot.model.idx_vs[robot.model.getJointId(joint.name)]
@@ -246,6 +261,8 @@ def _build(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
 def _spec(robot: Robot) -> mujoco.MjSpec:
     """The URDF without its shapes: they are the viewer's business, and feet are added as balls."""
     root = ElementTree.parse(robot.urdf).getroot()
+    if robot.is_floating:
+        _rename_links(root)
     for link in root.findall("link"):
         for shape in link.findall("visual") + link.findall("collision"):
             link.remove(shape)
@@ -258,6 +275,14 @@ def _spec(robot: Robot) -> mujoco.MjSpec:
         if not _is_possible(body):
             _hand_inertia_on(body)
     return spec
+
+
+def _rename_links(root: ElementTree.Element) -> None:
+    """Give every link the name that it has as a body: MuJoCo welds a link called world to its own world."""
+    for link in root.findall("link"):
+        link.set("name", body_name(link.get("name", "")))
+    for end in (*root.findall("joint/parent"), *root.findall("joint/child")):
+        end.set("link", body_name(end.get("link", "")))
 
 
 def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
@@ -306,7 +331,7 @@ def _add_ground(spec: mujoco.MjSpec, ground: Ground) -> None:
 
 
 def _add_foot(spec: mujoco.MjSpec, foot: Foot, mu: float) -> None:
-    body = spec.body(foot.frame)
+    body = spec.body(body_name(foot.frame))
     if body is None:
         raise SimulationError(f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links.")
     for name, centre, radius in _balls(foot):

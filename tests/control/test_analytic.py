@@ -310,3 +310,29 @@ def test_a_state_of_another_robot_is_refused() -> None:
     go2, solo = judges.load("go2"), judges.load("solo12")
     with pytest.raises(fb.FloatbaseError, match="the state to hold belongs to another robot than go2"):
         AnalyticController(go2, fb.Contacts.points(go2), solo.standing())
+
+
+@pytest.mark.parametrize(
+    ("swap", "text"),
+    [
+        ({"robot": "go2"}, "the controller needs a Robot first, as from fb.load, not str"),
+        ({"contacts": ["FL_foot"]}, r"contacts must be Contacts, as fb\.Contacts\.points\(robot\), not list"),
+        ({"state": np.zeros(19)}, r"the state to hold must be a State, as robot\.standing\(\), not ndarray"),
+        ({"contacts": fb.Contacts.points(judges.load("solo12"))}, "unknown frame of go2 'FL_FOOT'"),
+    ],
+)
+def test_values_of_another_kind_are_refused_when_it_is_made(swap: dict[str, object], text: str) -> None:
+    robot = judges.load("go2")
+    fitting = {"robot": robot, "contacts": fb.Contacts.points(robot), "state": robot.standing()}
+    with pytest.raises(fb.FloatbaseError, match=text):
+        AnalyticController(**(fitting | swap))
+
+
+def test_its_answer_cannot_be_written_to_and_prints_in_a_line() -> None:
+    state = judges.load("go2").standing()
+    command = controller_of("go2")(state.q, state.v)
+    for array in (command.tau, command.forces, command.qdd):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+    assert repr(command).startswith("AnalyticCommand(|tau|=")
+    assert len(repr(command)) < 80

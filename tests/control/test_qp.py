@@ -12,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
+import floatbase as fb
+from floatbase.control import conflicts
 from floatbase.control.conflicts import conflicting_rows
 from floatbase.control.qp import QP, Residuals, Solution, solve, solvers
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
@@ -187,6 +189,27 @@ def test_the_error_of_an_infeasible_problem_names_its_rows_and_says_what_to_do(s
     assert "no point satisfies all rows" in str(caught.value)
     assert "these contradict each other: x ≤ 1, x ≥ 2." in str(caught.value)
     assert "Loosen or drop any one of them" in str(caught.value)
+
+
+def test_many_rows_in_conflict_are_grouped_by_kind_and_counted() -> None:
+    robot = judges.load("go2")
+    standing, contacts = robot.standing(), fb.Contacts.points(robot)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing), min_normal_force=2000.0)
+    with pytest.raises(InfeasibleError) as caught:
+        controller(standing.q, standing.v)
+    lines = str(caught.value).splitlines()
+    assert lines[0] == "no point satisfies all rows. Given the equalities, these contradict each other:"
+    assert lines[1] == "  4 × normal force: FL_foot, FR_foot, RL_foot, RR_foot"
+    assert lines[-1] == "Loosen or drop any one of them: at least one has to go."
+    counted = [line.split(" × ") for line in lines[1:-1]]
+    assert sum(int(count) for count, _ in counted) == len(caught.value.rows) == sum(line.count(",") + 1 for line in lines[1:-1])
+    upper = [name for name in robot.joint_names if f"torque limit {name} upper" in caught.value.rows]
+    assert f"  {len(upper)} × upper torque limit: {', '.join(upper)}" in lines
+    mixed = conflicts.contradiction(["FL_foot facet 2", "x is 1", "FL_foot facet 3", "a", "b"])
+    assert str(mixed).splitlines()[1:3] == [
+        "  2 × friction: FL_foot facet 2, FL_foot facet 3",
+        "  3 × other rows: x is 1, a, b",
+    ]
 
 
 @pytest.mark.parametrize("solver", solvers())

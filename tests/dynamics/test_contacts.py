@@ -233,3 +233,48 @@ def test_contacts_can_be_made_by_hand() -> None:
     contacts = fb.Contacts([FlatFootContact("left_sole_link", square), PointContact("gripper_left_base_link")])
     assert contacts.k == 15
     assert contacts.constraint(robot.standing())[0].shape == (9, robot.nv)
+
+
+@pytest.mark.parametrize("mu", [[0.3, 0.4, 0.5, 0.6], np.array([0.3, 0.4, 0.5, 0.6]), (0.3, 0.4, 0.5, 0.6)])
+def test_each_foot_may_have_its_own_friction(mu: list[float]) -> None:
+    robot = judges.load("go2")
+    assert np.array_equal(fb.Contacts.points(robot, mu=mu).mus, [0.3, 0.4, 0.5, 0.6])
+    assert np.array_equal(fb.Contacts.points(robot, mu, frames=list(reversed(judges.stance(robot).names)))["RR_foot"].mu, 0.3)
+    assert np.array_equal(fb.Contacts.points(robot, mu={"RL_foot": 0.2}).mus, [0.7, 0.7, 0.2, 0.7])
+    talos = judges.load("talos")
+    assert np.array_equal(fb.Contacts.flat_feet(talos, mu=mu[:2]).mus, [0.3] * 4 + [0.4] * 4)
+
+
+def test_the_force_of_a_contact_is_its_own_part_of_lambda_or_the_resultant_of_its_corners() -> None:
+    rng = np.random.default_rng(0)
+    for name in judges.FLOATING:
+        contacts = judges.stance(judges.load(name))
+        forces = rng.normal(size=(5, contacts.k))
+        each = [contacts.force_of(forces, contact) for contact in contacts.names]
+        assert all(force.shape == (5, 3) for force in each)
+        assert np.allclose(sum(each), forces.reshape(5, -1, 3).sum(axis=1))
+        assert np.allclose(contacts.force_of(forces[2], contacts.names[1]), each[1][2])
+        if name in judges.BALLS:
+            assert np.array_equal(each[1], forces[:, 3:6])
+
+
+def test_feet_are_taken_as_they_are_flat_or_round() -> None:
+    for name in judges.ROBOTS:
+        robot = judges.load(name)
+        contacts = fb.Contacts.feet(robot, mu=0.4)
+        assert contacts.names == tuple(foot.frame for foot in robot.feet)
+        assert [contact.k for contact in contacts] == [12 if foot.is_flat else 3 for foot in robot.feet]
+        assert np.all(contacts.mus == 0.4)
+    mixed = fb.load("go2", feet=[fb.Foot("FL_foot", 0.02), fb.Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])])
+    assert [contact.k for contact in fb.Contacts.feet(mixed)] == [3, 9]
+
+
+def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows() -> None:
+    robot = judges.load("go2")
+    state = robot.standing()
+    sole = fb.Contacts.points(robot).positions(state)[0]
+    assert np.allclose(state.point("FL_foot") - sole, [0.0, 0.0, robot.foot("FL_foot").radius], atol=1e-12)
+    here = fb.FrameTask("FL_foot", state.point("FL_foot"))
+    eom = fb.equations_of_motion(state, fb.Contacts.none())
+    assert np.allclose(here.residual(eom).b, state.frame_drift("FL_foot")[:3])  # no error to correct
+    assert np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0  # kp times the radius, m/s²

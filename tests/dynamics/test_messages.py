@@ -10,6 +10,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.dynamics import FlatFootContact, PointContact
+from floatbase.dynamics.constraints import fixed_frame
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
 
 GO2, UR5, SOLO = judges.load("go2"), judges.load("ur5"), judges.load("solo12")
@@ -26,6 +27,20 @@ ALL = fb.Contacts.points(GO2)
         (lambda: fb.Contacts.points(GO2, mu=-0.5), InputError, "coefficient mu of FL_foot is -0.5; it must be > 0"),
         (lambda: fb.Contacts.points(GO2, mu=np.nan), InputError, "coefficient mu of FL_foot is nan; it must be > 0"),
         (lambda: fb.Contacts.points(GO2, mu=None), InputError, "mu of FL_foot must be a number, not None"),
+        (lambda: fb.Contacts.points(GO2, mu=[0.7, 0.7]), InputError, r"mu has shape \(2,\); it must have shape \(4,\)"),
+        (
+            lambda: fb.Contacts.points(GO2, mu=[0.7, 0.0, 0.7, 0.7]),
+            InputError,
+            "coefficient mu of FR_foot is 0; it must be > 0",
+        ),
+        (lambda: fb.Contacts.points(GO2, mu={"FL": 0.5}), UnknownNameError, "frame in mu 'FL'; near names: FL_foot"),
+        (lambda: ALL.force_of(np.zeros(9), "FL_foot"), InputError, r"forces has shape \(9,\); Contacts.* takes \(12,\) or"),
+        (lambda: ALL.force_of(np.zeros(12), "FL_fot"), UnknownNameError, "unknown contact 'FL_fot'; near names: FL_foot"),
+        (
+            lambda: fb.Contacts([fixed_frame("base")]).force_of(np.zeros(6), "bolts of base"),
+            InputError,
+            "the forces of bolts of base do not act at points",
+        ),
         (lambda: fb.Contacts.points(GO2, frames="FL_foot"), InputError, r'list of names, as in frames=\["FL_foot"\]'),
         (lambda: fb.Contacts.points(GO2, frames=["FL_fot"]), UnknownNameError, "'FL_fot'; near names: FL_foot"),
         (lambda: fb.Contacts.points(GO2, normals=[0, 0, 0]), InputError, "normal of FL_foot is the zero vector"),

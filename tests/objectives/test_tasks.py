@@ -165,3 +165,17 @@ def test_a_target_is_copied_when_a_task_is_made() -> None:
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     forces += 1.0
     assert np.array_equal(hold.residual(eom)(np.zeros(12)), np.zeros(12))
+
+
+def test_the_posture_of_standing_tasks_keeps_go2_12_mm_short_of_a_target_30_mm_away_and_a_lighter_one_does_not() -> None:
+    robot = judges.load("go2")
+    standing, contacts = robot.standing(), fb.Contacts.points(robot)
+    wanted = standing.com + [0.0, 0.03, 0.0]
+    _, upright, posture = fb.standing_tasks(standing)
+    left = []
+    for joints in (posture, fb.PostureTask(standing.q, weight=1e-3)):
+        controller = fb.WholeBodyController(robot, contacts, [fb.CoMTask(wanted), upright, joints])
+        run = fb.rollout(fb.Simulation(robot), controller, 3.0, control_period=2e-3)
+        left.append(1e3 * float((wanted - run.com[-1])[1]))  # mm
+    assert 11.5 < left[0] < 13.5
+    assert abs(left[1]) < 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import judges
 import numpy as np
@@ -29,6 +30,12 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: fb.load("talus"), UnknownNameError, "unknown robot 'talus'; near names: .*talos"),
         (lambda: fb.load("zzz"), UnknownNameError, "unknown robot 'zzz'; known: "),
         (lambda: fb.load(3), UnknownNameError, "unknown robot 3"),
+        (
+            lambda: fb.load("my/robot.urdf"),
+            UnknownNameError,
+            r"'my/robot.urdf' is no robot's name but a file's; fb.load_urdf\('my/robot.urdf', feet=\[…\]\).*: go2, solo12, ",
+        ),
+        (lambda: fb.load(Path("x.urdf")), UnknownNameError, r"fb.load_urdf\('x.urdf'"),
         (lambda: fb.load("anymal"), InputError, r'so its feet must be given: fb.load\("anymal", feet=\["name of a foot frame'),
         (lambda: fb.load("cassie"), InputError, "cassie comes as an SDF file; floatbase reads URDF. Choose one of go2"),
         (lambda: fb.load("go2", feet="FL_foot"), InputError, r'must be a list of frames, as in feet=\["FL_foot"\]'),

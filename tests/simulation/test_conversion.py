@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import judges
+import mujoco
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -67,3 +69,20 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
         state = fb.State(robot, q, v)
         assert judges.relative(state.M, judge.at(state).M) < 1e-9
         assert judges.relative(state.h, judge.h) < 1e-9
+
+
+def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and_flies_as_it_must() -> None:
+    """MuJoCo calls the ground "world" and would weld that link to it: ur5's own URDF, unbolted."""
+    arm = judges.load("ur5")
+    loose = fb.load_urdf(arm.urdf, package_dirs=arm.package_dirs)
+    assert loose.base == "world"
+    sim, state = fb.Simulation(loose), loose.random_state(0)
+    sim.reset(state)
+    assert np.allclose(sim.q, state.q)
+    T, M = sim._convert.velocity_map(sim.data.qpos), np.zeros((12, 12))
+    mujoco.mj_fullM(sim.model, sim.data, M)
+    assert np.allclose(T.T @ M @ T, state.M, atol=1e-9)
+    lift = fb.Push([0.0, 0.0, 2.0 * loose.weight], duration=1.0)  # it falls upwards with g
+    for _ in range(100):
+        sim.step(np.ones(6), (lift,))
+    assert sim.state.com_velocity[2] - state.com_velocity[2] == pytest.approx(0.1 * loose.gravity, rel=0.01)

@@ -55,6 +55,21 @@ def limp(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
             r"control_period 0.0015 s is not a whole multiple of the simulation's timestep 0.001 s",
         ),
         (lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0001), InputError, "is not a whole multiple"),
+        (
+            lambda: fb.rollout(SIM, limp, 0.0105),
+            InputError,
+            r"duration 0.0105 s is not a whole multiple of the control period 0.001 s; 0.01 s would be",
+        ),
+        (
+            lambda: fb.rollout(SIM, limp, 0.001, control_period=0.002),
+            InputError,
+            r"duration 0.001 s is not a whole multiple of the control period 0.002 s; 0.002 s would be",
+        ),
+        (
+            lambda: fb.rollout(fb.Simulation(judges.load("ur5")), limp, 1.0, [fb.Push(UP, start=0.9)]),
+            InputError,
+            "a push at 'base' moves nothing: ur5 is bolted to the ground there. Push a link that moves: shoulder_link, ",
+        ),
         (lambda: fb.rollout(SIM, limp, 1.0, [3]), InputError, r"pushes must hold fb\.Push values; 3 is none"),
         (lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0), InputError, r"must answer with \.tau .* got None"),
         (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), UnknownNameError, "'bse'; near names: base"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.errors import InfeasibleError
+from floatbase.errors import FloatbaseError, InfeasibleError
 from floatbase.lessons.lesson01 import unbolted
 from floatbase.robots.state import State
 
@@ -116,6 +116,40 @@ def test_a_controller_that_fails_at_once_leaves_an_empty_record(sim: fb.Simulati
     assert record.q.shape == (0, robot.nq)
     assert record.measured.shape == (0, 12)
     assert "controller failed" in repr(record)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+def test_torques_that_are_no_numbers_end_the_record_like_a_fall_and_the_rows_before_are_kept(
+    sim: fb.Simulation, number: float
+) -> None:
+    inner = standing()
+
+    def goes_wild(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
+        tau = inner(q, v, t).tau.copy()
+        tau[3] = number if t > 0.0095 else tau[3]
+        return Torques(tau)
+
+    record = fb.rollout(sim, goes_wild, 0.1)
+    assert (record.outcome, len(record)) == ("controller failed", 10)
+    assert isinstance(record.error, FloatbaseError)
+    assert f"the controller's torques hold {number} at {sim.robot.joint_names[3]} at 0.010 s" in str(record.error)
+    assert np.all(np.isfinite(record.tau))
+
+
+def test_actuators_whose_torques_are_no_numbers_end_the_record_too(sim: fb.Simulation) -> None:
+    class Broken:
+        def step(self, tau: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+            return tau / 0.0 if sim.time > 0.0095 else tau
+
+    with np.errstate(all="ignore"):
+        record = fb.rollout(sim, standing(), 0.1, actuators=Broken())
+    assert (record.outcome, len(record)) == ("controller failed", 10)
+    assert "the actuators' torques hold" in str(record.error)
+
+
+def test_torques_of_a_wrong_length_are_a_mistake_and_raised(sim: fb.Simulation) -> None:
+    with pytest.raises(FloatbaseError, match=r"the controller's torques has shape \(3,\); it must have shape \(12,\)"):
+        fb.rollout(sim, lambda q, v, t: Torques(np.full(3, np.nan)), 0.1)
 
 
 def test_mistakes_in_a_controller_are_not_swallowed(sim: fb.Simulation) -> None:
@@ -322,3 +356,97 @@ def test_a_robot_starts_with_every_foot_on_a_slope(normal: tuple[float, float, f
     sim = fb.Simulation(judges.load("go2"), ground=fb.Ground(normal=np.array(normal)))
     heights = sim.contact_positions() @ sim.ground.normal
     assert np.max(np.abs(heights)) < 1e-9
+
+
+# a stance that changes ---------------------------------------------------------------------------------------------------
+
+
+class Switching:
+    """Stands on four feet, from 0.1 s to 0.2 s with one foot up, then on four again."""
+
+    def __init__(self, lifted: str = "FL_foot"):
+        robot = judges.load("go2")
+        state, every = robot.standing(), fb.Contacts.points(robot)
+        com = np.array(state.com)
+        com[:2] = every.without(lifted).positions(state)[:, :2].mean(axis=0)
+        shift = fb.CoMTask(lambda t: state.com + min(1.0, t / 0.1) * 0.6 * (com - state.com))
+        up = fb.FrameTask(lifted, state.point(lifted) + [0.0, 0.0, 0.03])
+        tasks = (shift, *fb.standing_tasks(state)[1:])
+        self.four = fb.WholeBodyController(robot, every, tasks)
+        self.three = fb.WholeBodyController(robot, every.without(lifted), (*tasks, up))
+        self.robot, self.now = robot, self.four
+
+    @property
+    def contacts(self) -> fb.Contacts:
+        return self.now.contacts
+
+    def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
+        self.now = self.three if 0.1 <= t < 0.2 - 1e-9 else self.four
+        return self.now(q, v, t)
+
+
+def test_a_record_follows_a_stance_that_changes(sim: fb.Simulation) -> None:
+    """Planned forces are 0 where the stance has no contact, measured ones are what the physics has there."""
+    record = fb.rollout(sim, Switching(), 0.3, control_period=0.002)
+    assert record.outcome == "completed"
+    assert record.contacts.names == ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
+    assert record.planned.shape == record.measured.shape == (150, 12)
+    sizes = [len(record.contacts_at(i)) for i in range(150)]
+    assert sizes == [4] * 50 + [3] * 50 + [4] * 50
+    up = np.array(sizes) == 3
+    assert np.all(record.planned[up, :3] == 0.0)
+    assert np.all(np.abs(record.force("FL_foot", "planned")[~up, 2]) > 0.0)
+    assert np.all(record.force("FL_foot")[60:95] == 0.0)  # in the air
+    assert record.foot_positions[95, 0, 2] > 0.002
+    for i in (20, 70):  # each row's plan is the plan of its own stance
+        command = Switching()(record.q[i], record.v[i], float(record.time[i]))
+        assert np.allclose(record.planned[i][record.planned[i] != 0.0], command.forces, atol=1e-9)
+
+
+def test_a_foot_that_joins_the_stance_later_joins_the_record(sim: fb.Simulation) -> None:
+    controller = Switching()
+
+    class Late:
+        contacts = controller.three.contacts
+
+        def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
+            inner = controller.three if t < 0.0095 else controller.four
+            self.contacts = inner.contacts
+            return inner(q, v, t)
+
+    record = fb.rollout(sim, Late(), 0.02)
+    assert record.contacts.names == ("FR_foot", "RL_foot", "RR_foot", "FL_foot")
+    assert np.all(record.planned[:10, 9:] == 0.0)
+    assert np.all(record.planned[10:, 11] > 0.0)
+    assert np.allclose(record.measured.reshape(20, 4, 3)[:, 3], record.force("FL_foot"))
+    assert [len(record.contacts_at(i)) for i in (0, 9, 10, 19)] == [3, 3, 4, 4]
+
+
+def test_a_contact_that_changes_its_kind_within_a_rollout_is_refused() -> None:
+    robot = judges.load("talos")
+    flat, point = (make(robot, frames=["left_sole_link"]) for make in (fb.Contacts.flat_feet, fb.Contacts.points))
+
+    class Shifty:
+        contacts = flat
+
+        def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> Torques:
+            self.contacts = flat if t < 0.001 else point
+            return Torques(np.zeros(robot.d))
+
+    with pytest.raises(FloatbaseError, match="left_sole_link had 12 force numbers at first and now has 3"):
+        fb.rollout(fb.Simulation(robot), Shifty(), 0.01)
+
+
+def test_the_force_of_a_foot_is_asked_for_by_name_and_of_a_flat_foot_is_the_resultant() -> None:
+    robot = judges.load("talos")
+    record = fb.rollout(fb.Simulation(robot), standing("talos"), 0.02)
+    for kind in ("measured", "planned"):
+        forces = getattr(record, kind)
+        left, right = (record.force(name, kind) for name in ("left_sole_link", "right_sole_link"))
+        assert left.shape == (20, 3)
+        assert np.allclose(left, forces.reshape(20, 8, 3)[:, :4].sum(axis=1))
+        assert np.allclose(left + right, forces.reshape(20, 8, 3).sum(axis=1))
+    with pytest.raises(FloatbaseError, match="unknown contact 'left_sole'; near names: left_sole_link"):
+        record.force("left_sole")
+    with pytest.raises(FloatbaseError, match="unknown kind of force 'wished'"):
+        record.force("left_sole_link", "wished")
