@@ -81,7 +81,7 @@ def _outputs(outputs: Sequence[Any], widgets: dict[str, Any], pictures: Pictures
     printed = ""
     for output in outputs:
         if output.output_type == "stream":
-            printed += output.text
+            printed += output.text if output.name == "stdout" else ""  # what else was said is about this run, not the lesson
         else:
             shown += [_text(printed), _data(output, widgets, pictures)]
             printed = ""
