@@ -382,6 +382,12 @@ EXERCISES = (
                 "The moment is taken about the centre of mass; the bolts sit at the base.": _about_the_centre_of_mass,
                 "This holds the weight's moment as well; asked is the answer to the wall alone.": _with_the_weight,
                 "Zero would mean that nobody answers the wall. Which lever, and which force?": lambda: np.zeros(3),
+                "Only the height of the tool counts here; it is also 11 cm to the side, and that is a lever too.": (
+                    lambda: np.array([0.0, 60.0 * _pressed()[1][2], 0.0])
+                ),
+                "* multiplies number by number; a moment is the cross product of lever and force.": (
+                    lambda: _pressed()[1] * _pressed()[2]
+                ),
                 "This is a force; a moment needs a lever: how far from the base does the force act?": lambda: -_pressed()[2],
                 "This is f_r itself; a moment needs a lever, and the bolts answer the other way round.": lambda: _pressed()[2],
             },
@@ -398,6 +404,7 @@ EXERCISES = (
                 (8, 8): "S maps 8 torques into all rows of the equations of motion. How many rows does a base add, and where?",
                 (8, 14): "This is the transpose of the answer: S takes 8 torques to 14 rows.",
                 (9, 8): "A base adds more than one row: three for its position, three for its orientation.",
+                (18, 12): "That is the S of go2, with three joints in each leg; solo8 has two.",
                 (15, 8): "15 counts the quaternion's four numbers. Rows of (4) go with velocities, and a rotation has three.",
             },
             judge=Numeric(
@@ -407,6 +414,7 @@ EXERCISES = (
                     "The base comes first in q, as (2) has it; here its rows stand last.": lambda: np.roll(
                         _actuation_of_solo8(), -6, axis=0
                     ),
+                    "Zeros everywhere: no motor drives anything. Where does each torque act?": lambda: np.zeros((14, 8)),
                     "Is there a torque that pushes a joint backwards? One sign too many.": lambda: -_actuation_of_solo8(),
                 },
             ),

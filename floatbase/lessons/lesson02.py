@@ -445,6 +445,7 @@ EXERCISES = (
                 "Three rows would be one foot. And the base has columns too.": lambda: (3, 8),
                 "Three rows would be one foot; three feet touch.": lambda: (3, 14),
                 "Three feet touch, not four.": lambda: (12, 14),
+                "18 columns are go2's, with three joints in each leg; solo8 has two.": lambda: (9, 18),
             },
         ),
         explanation="k = 3 for each of 3 feet, d + 6 = 8 + 6 columns.",

@@ -171,8 +171,16 @@ def _gradients() -> dict[str, Callable[[], Any]]:
         "The frame: `wanted` is in world axes, as are J and the drift; do not turn it.": gradient(turned=1),
         "The frame: `wanted` is in world axes already; the base's rotation takes it out of them.": gradient(turned=2),
         "A gradient comes back by the transpose of A. A pseudo-inverse would bring back points.": gradient(back=np.linalg.pinv),
+        "This is the cost of the standing robot: J and the drift of the moving one are other numbers.": _gradient_of_standing,
         "The cost has a ½ in front, so the square's 2 cancels.": lambda: 2 * right(),
     }
+
+
+def _gradient_of_standing() -> Array:
+    """The lesson's own cost, made where the robot stands, pulled back through η of the moving robot."""
+    state = standing_go2().state
+    cost = fb.Quadratic.from_residual(state.com_jacobian, WANTED - state.com_drift)
+    return cost.pullback(fb.accelerations_from_torques(tilted())).g
 
 
 def _flat_on_three_feet() -> int:

@@ -51,7 +51,8 @@ def execute(notebook: Any, folder: Path, **settings: str) -> Any:
     from nbclient import NotebookClient
 
     quiet = ["--IPKernelApp.log_level=40"]  # its warning that this machine's loopback is not encrypted says nothing here
-    client = NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}}, extra_arguments=quiet)
+    where = {"metadata": {"path": str(folder)}}
+    client = NotebookClient(notebook, timeout=120, resources=where, extra_arguments=quiet, coalesce_streams=True)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as home:
         return client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
 

@@ -186,3 +186,11 @@ def test_a_slider_names_its_unit(arm: Robot) -> None:
         assert lesson01.pressing_panel(view, arm.standing()).children[2].description == "press [N]"
     finally:
         view.close()
+
+
+def test_half_a_lever_products_and_matrices_of_another_robot_get_their_hint(go2: Robot) -> None:
+    tool = fb.load("ur5", posture=lesson01.PRESSING).standing().point("tool0")
+    assert "to the side" in hint("01.1", [0.0, 60.0 * tool[2], 0.0])
+    assert "cross product" in hint("01.1", tool * F_R)
+    assert "S of go2" in hint("01.2", go2.S)
+    assert "no motor" in hint("01.2", np.zeros((14, 8)))

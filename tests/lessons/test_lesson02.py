@@ -241,3 +241,7 @@ def test_the_arm_without_its_drift_leaves_and_both_are_played() -> None:
         assert "way" in drawn
     finally:
         view.close()
+
+
+def test_the_columns_of_another_robot_get_their_hint() -> None:
+    assert "go2's" in hint("02.1", (9, 18))

@@ -161,3 +161,8 @@ def test_the_pictures_are_drawn() -> None:
         np.testing.assert_allclose(show_torques(view, space.eom, space(standing_still(space))[1]), 0.0, atol=1e-9)
     finally:
         view.close()
+
+
+def test_04_1_knows_the_cost_of_another_posture() -> None:
+    answer = verdict("04.1", com_cost(standing_go2()).pullback(fb.accelerations_from_torques(tilted())).g)
+    assert not answer.right and "standing robot" in answer.text
