@@ -127,14 +127,22 @@ class Robot:
         """Names of all frames that can be asked for: bodies, joints and fixed frames."""
         return tuple(str(f.name) for f in self.model.frames if f.name != "universe")
 
+    @cached_property
+    def _frame_numbers(self) -> dict[str, int]:
+        """Pinocchio's number of each frame; the first of several that share a name."""
+        return {str(frame.name): i for i, frame in reversed(list(enumerate(self.model.frames)))}
+
     def frame_id(self, frame: str) -> int:
         """Pinocchio's number of a frame; "base" stands for the base link on every robot.
 
         Raises `UnknownNameError` with the near names.
         """
-        for name in (frame, self.base if frame == "base" else None):
-            if isinstance(name, str) and self.model.existFrame(name):
-                return int(self.model.getFrameId(name))
+        if isinstance(frame, str):
+            number = self._frame_numbers.get(frame)
+            if number is not None:
+                return number
+            if frame == "base":
+                return self._frame_numbers[self.base]
         raise unknown_name(f"frame of {self.name}", frame, self.frames, "robot.frames lists them all.")
 
     def foot(self, frame: str) -> Foot:
