@@ -47,31 +47,42 @@ class Limits:
         FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets)  # says what is wrong with the number
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Command:
     """One answer of the controller.
 
-    tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the
-    contact forces planned with them. active: names of the inequality rows that push; multipliers: theirs, by name. path:
-    which of the controller's two paths answered, "compiled" or "readable". evidence: makes `solution`, the readable problem
-    with this answer to it; it is put together when first asked for, which the tick need not wait for.
+    tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the contact
+    forces planned with them, stacked as in `contacts`. active: names of the inequality rows that push; multipliers: theirs,
+    by name. path: which of the controller's two paths answered, "compiled" or "readable". evidence: makes `solution`, the
+    readable problem with this answer to it; it is put together when first asked for, which the tick need not wait for.
     """
 
     tau: Array
     qdd: Array
     forces: Array
+    contacts: Contacts
     evidence: Callable[[], Solution]
     path: str = "readable"
 
     def __init__(
-        self, tau: Array, qdd: Array, forces: Array, evidence: Callable[[], Solution], path: str = "readable"
+        self,
+        tau: Array,
+        qdd: Array,
+        forces: Array,
+        contacts: Contacts,
+        evidence: Callable[[], Solution],
+        path: str = "readable",
     ) -> None:  # a frozen dataclass would set one field after the other, a microsecond in every tick
-        self.__dict__.update(tau=tau, qdd=qdd, forces=forces, evidence=evidence, path=path)
+        self.__dict__.update(tau=tau, qdd=qdd, forces=forces, contacts=contacts, evidence=evidence, path=path)
 
     @cached_property
     def solution(self) -> Solution:
         """The QP of this tick with its optimum, multipliers and residuals."""
         return self.evidence()
+
+    def force(self, name: str) -> Array:
+        """The planned force of one contact, shape (3,), N, world: for a flat foot the resultant of its corners."""
+        return self.contacts.force_of(self.forces, name)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -82,6 +93,12 @@ class Command:
     def multipliers(self) -> dict[str, float]:
         """Multiplier of each active row, by name."""
         return self.solution.multipliers
+
+    def __repr__(self) -> str:
+        return (
+            f"Command(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N, "
+            f"{len(self.active)} rows active, {self.path})"
+        )
 
 
 def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
@@ -251,6 +268,7 @@ class WholeBodyController:
             tau=read_only(solution["tau"]),
             qdd=read_only(solution["qdd"]),
             forces=read_only(solution["forces"]),
+            contacts=self.contacts,
             evidence=lambda: solution,
         )
 
@@ -271,7 +289,7 @@ class WholeBodyController:
             qp = self.qp(State(self.robot, q, v), t)
             return finished(qp, x, program.multipliers(active, mu, len(qp.G)), "compiled", len(active))
 
-        return Command(x[nv:tail], x[:nv], x[tail:], evidence, "compiled")
+        return Command(x[nv:tail], x[:nv], x[tail:], self.contacts, evidence, "compiled")
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,6 +65,7 @@ class QP:
         values["b"], values["h"] = checked("b", self.b, (len(A),)), checked("h", self.h, (len(G),))
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
         for kind, rows in (("equality", len(A)), ("inequality", len(G))):
             names = tuple(getattr(self, f"{kind}_names")) or tuple(f"{kind} {i}" for i in range(rows))
             if len(names) != rows:

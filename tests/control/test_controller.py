@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 
 import floatbase as fb
 from floatbase.control.qp import QP, Solution, solve
-from floatbase.errors import InfeasibleError
+from floatbase.errors import InfeasibleError, UnknownNameError
 from floatbase.robots.state import State
 
 
@@ -436,3 +436,21 @@ def test_a_task_of_ones_own_is_checked(task: object, text: str) -> None:
     robot = judges.load("go2")
     with pytest.raises(fb.FloatbaseError, match=text):
         fb.WholeBodyController(robot, fb.Contacts.points(robot), [task])
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(path: str) -> None:
+    if path == "compiled":
+        pytest.importorskip("numba")
+    robot = judges.load("talos")
+    contacts, state = fb.Contacts.flat_feet(robot), robot.standing()
+    command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), path=path)(state.q, state.v)
+    left, right = (command.force(name) for name in contacts.names)
+    assert np.allclose(left + right, [0.0, 0.0, robot.weight], atol=1e-3 * robot.weight)
+    assert np.allclose(left, command.forces[:12].reshape(4, 3).sum(axis=0))
+    with pytest.raises(UnknownNameError, match="left_sole_link"):
+        command.force("left_sole_lnk")
+    assert repr(command).startswith("Command(|tau|=") and "\n" not in repr(command)
+    assert repr(command).endswith(f"0 rows active, {path})")
+    with pytest.raises(TypeError):
+        command.solution.qp.blocks["tau"] = slice(0, 1)
