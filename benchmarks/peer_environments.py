@@ -88,5 +88,5 @@ def _run(command: list[str], folder: Path) -> None:
         out.flush()
         code = subprocess.run(command, stdout=out, stderr=subprocess.STDOUT, env=os.environ | settings).returncode
     if code:
-        wrong = [line.strip() for line in log.read_text().splitlines() if "rror" in line][-3:]
+        wrong = [line.strip()[:200] for line in log.read_text().splitlines() if "error" in line.lower()][-3:]
         raise MissingError(f"`{' '.join(command)}` ended with code {code}: {' / '.join(wrong)}. All that it said is in {log}.")
