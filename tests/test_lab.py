@@ -138,7 +138,7 @@ def _after_moving(page: Any, handle: Any, look: Any) -> Any:
     before = look()
     for key in ("ArrowRight", "ArrowLeft"):  # a slider at its end goes one way only
         handle.focus()
-        for _ in range(8):
+        for _ in range(4):
             page.keyboard.press(key)
         for _ in range(30):
             time.sleep(0.1)
