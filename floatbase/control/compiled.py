@@ -166,7 +166,7 @@ class Program:
 
         q, v: writable float64 arrays.
         """
-        if q.shape != self.q_shape or v.shape != self.v_shape or not self._move(t):
+        if q.shape != self.q_shape or v.shape != self.v_shape or (self._moving and not self._move(t)):
             return None
         dynamics = self.dynamics
         with dynamics.lock:

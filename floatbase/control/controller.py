@@ -282,7 +282,7 @@ class WholeBodyController:
         if answer is None:
             return None
         x, active, mu = answer
-        x.flags.writeable = False
+        x.setflags(write=False)
         nv, tail = program.nv, program.nv + program.d
 
         def evidence() -> Solution:

@@ -763,10 +763,12 @@ def add_row(W, U, d, z, q):
 
 
 @_compiled
-def drop_row(W, U, active, mu, at, q):
-    """Goldfarb-Idnani: take row `at` of q active ones out of U (upper triangular), active and mu; W follows."""
+def drop_row(W, U, active, mu, rows, bounds, at, q):
+    """Goldfarb-Idnani: take row `at` of q active ones out of U (upper triangular) and the lists of them; W follows."""
     for j in range(at, q - 1):
-        active[j], mu[j] = active[j + 1], mu[j + 1]
+        active[j], mu[j], bounds[j] = active[j + 1], mu[j + 1], bounds[j + 1]
+        for c in range(rows.shape[1]):
+            rows[j, c] = rows[j + 1, c]
         for i in range(j + 2):
             U[i, j] = U[i, j + 1]
     for j in range(at, q - 1):
@@ -819,10 +821,10 @@ def directions(W, U, d, q, z, r):
 
 
 @_compiled
-def enforce(row, bound, beta, W, U, active, mu, q, number, d, z, r):
+def enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, d, z, r):
     """Bring one violated row (nb,) of G β ≤ h to its bound, dropping active rows that pull; returns q and a status.
 
-    d, z, r: room for `directions`, each (nb,).
+    active, mu, rows, bounds: numbers, multipliers, rows and bounds of the q active ones. d, z, r: (nb,), room for `directions`.
     """
     n, push = beta.size, 0.0
     for _ in range(2 * n + 2):
@@ -850,9 +852,10 @@ def enforce(row, bound, beta, W, U, active, mu, q, number, d, z, r):
                 beta[j] += step * z[j]
         if full <= longest:
             add_row(W, U, d, z, q)
-            active[q], mu[q] = number, push
+            active[q], mu[q], bounds[q] = number, push, bound
+            rows[q] = row
             return q + 1, SOLVED
-        drop_row(W, U, active, mu, drop, q)
+        drop_row(W, U, active, mu, rows, bounds, drop, q)
         q -= 1
     return q, DOUBTFUL
 
@@ -916,13 +919,11 @@ def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, l
         if count == 0:
             W, U = inverse(L), np.zeros((nb, nb))
         bound = row_in_beta(number, V, T, cones, least_normal, limits, row)
-        q, status = enforce(row, bound, beta, W, U, active, mu, q, number, d, z, r)
+        q, status = enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, d, z, r)
         if status != SOLVED:
             return beta, active[:0], mu[:0], status
     if number >= 0:
         return beta, active[:0], mu[:0], DOUBTFUL
-    for a in range(q):
-        bounds[a] = row_in_beta(active[a], V, T, cones, least_normal, limits, rows[a])
     polish(beta, mu, active, q, gradient(R, diagonal, aim, beta), L, W, U, rows, bounds)
     return beta, active[:q], mu[:q], SOLVED
 
