@@ -82,6 +82,11 @@ class Simulation:
         self._point_of_geom = {self.model.geom(name).id: i for name, i in self._points.items()}
         self._wrench = np.zeros(6)
         self._pushed = self.data.xfrc_applied
+        warning = mujoco.mjtWarning
+        kinds = (warning.mjWARN_BADQPOS, warning.mjWARN_BADQVEL, warning.mjWARN_BADQACC, warning.mjWARN_BADCTRL)
+        self._warnings = [self.data.warning[int(kind)] for kind in kinds]
+        self._geoms = np.array([self.model.geom(name).id for name in self._points], dtype=int)
+        self._below = self.model.geom_size[self._geoms, 0][:, None] * self.ground.normal
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self.reset()
 
@@ -113,10 +118,9 @@ class Simulation:
     @property
     def diverged(self) -> bool:
         """Whether MuJoCo met numbers it could not go on with since the last reset; it drops torques beyond 1e10."""
-        warning = mujoco.mjtWarning
-        kinds = (warning.mjWARN_BADQPOS, warning.mjWARN_BADQVEL, warning.mjWARN_BADQACC, warning.mjWARN_BADCTRL)
-        bad = any(self.data.warning[int(kind)].number for kind in kinds)
-        return bad or not np.all(np.isfinite(self.data.qpos)) or not np.all(np.isfinite(self.data.qvel))
+        bad = any(warning.number for warning in self._warnings)
+        qpos, qvel = self.data.qpos, self.data.qvel
+        return bad or not (isfinite(qpos @ qpos) and isfinite(qvel @ qvel))
 
     @property
     def fallen(self) -> bool:
@@ -174,9 +178,7 @@ class Simulation:
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the lowest point of each ball along the ground's normal."""
-        ids = [self.model.geom(name).id for name in self._points]
-        radii = self.model.geom_size[ids, 0][:, None]
-        return self.data.geom_xpos[ids] - radii * self.ground.normal
+        return self.data.geom_xpos[self._geoms] - self._below
 
     def _standing(self) -> State:
         """The robot standing on the ground; on a slope turned with it, so that every foot touches."""

@@ -134,7 +134,8 @@ class _Run:
         desired = self._desired(command)
         stance = self._stance()
         planned = self._planned(command, stance)
-        self.contacts = joined(self.contacts, stance)
+        if not self.rows or stance is not self.rows[-1].stance:
+            self.contacts = joined(self.contacts, stance)
         sim = self.sim
         time, q, v, feet = sim.time, sim.q, sim.v, sim.contact_positions()
         forces, applied = np.zeros((len(sim.point_names), 3)), np.zeros(sim.robot.d)
