@@ -97,6 +97,14 @@ def test_on_dependent_contact_rows_the_compiled_tick_is_the_nearer_to_the_optimu
         assert np.max(np.abs(found.tau - judge)) < 2e-9
 
 
+def test_weights_of_1e_8_leave_both_paths_their_digits() -> None:
+    """Talos with next to nothing that chooses between corner forces: DAQP alone ends 1e-6 N·m from the optimum."""
+    robot = judges.load("talos")
+    tasks = [*fb.standing_tasks(robot.standing()), fb.ForceTask(weight=1e-8), fb.TorqueTask(weight=0.0)]
+    both = pair(robot, fb.Contacts.flat_feet(robot), tasks, inside=False)
+    assert max(difference(both, state) for state in cases("talos", 5)) < 1e-7
+
+
 @pytest.mark.parametrize("seed", [33, 45, 46, 135, 195, 1819, 1932])
 def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(seed: int) -> None:
     """solo8 on three feet, singular values about MOTION_TOLERANCE: both paths keep the same directions."""
