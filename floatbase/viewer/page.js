@@ -35,14 +35,21 @@ function legendLine([colour, text]) {
 
 // Where the page looks from. meshcat's camera node cannot move the point that the mouse turns around.
 function startCamera(viewer) {
-  let followed = null, last = null, room = false;
-  const where = () => followed.getWorldPosition(new MeshCat.THREE.Vector3());
+  let followed = [], last = null, room = false;
+  // looked up anew each time, because another picture puts another object there, or none
+  const where = () => {
+    const node = followed.reduce((at, name) => at && at.children[name], viewer.scene_tree);
+    return node ? node.object.getWorldPosition(new MeshCat.THREE.Vector3()) : null;
+  };
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
-    if (followed !== null) {
-      const now = where(), step = now.clone().sub(last).setY(0);
-      viewer.camera.position.add(step);
-      viewer.controls.target.add(step);
+    if (followed.length) {
+      const now = where();
+      if (now && last) {
+        const step = now.clone().sub(last).setY(0);
+        viewer.camera.position.add(step);
+        viewer.controls.target.add(step);
+      }
       last = now;
     }
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
@@ -58,9 +65,8 @@ function startCamera(viewer) {
       viewer.controls.target.fromArray(command.target);
     },
     follow(command) {
-      const parts = command.node.split("/").filter((name) => name);
-      followed = parts.length ? viewer.scene_tree.find(parts).object : null;
-      last = followed && where();
+      followed = command.node.split("/").filter((name) => name);
+      last = where();
     },
   };
 }
@@ -70,8 +76,10 @@ function startPlayer(viewer) {
   const bar = part("player"), button = bar.querySelector("button"), slider = bar.querySelector("input");
   const clock = bar.querySelector("output"), speed = bar.querySelector("select");
   const animator = () => viewer.animator;
+  let ticking = false;
   function tick() {
-    if (bar.style.display == "none") return;
+    ticking = bar.style.display != "none";
+    if (!ticking) return;
     slider.value = animator().time;
     clock.textContent = `${animator().time.toFixed(2)} s`;
     button.textContent = animator().playing ? "❚❚" : "▶";
@@ -89,10 +97,12 @@ function startPlayer(viewer) {
       bar.style.display = command.animations.length ? "flex" : "none";
       if (!command.animations.length) return;
       slider.max = animator().duration;
-      speed.value = String(command.options.speed);
+      const wanted = String(command.options.speed);
+      if (![...speed.options].some((option) => option.value == wanted)) speed.add(new Option(`${wanted}×`, wanted));
+      speed.value = wanted;
       animator().mixer.timeScale = command.options.speed;
       if (command.options.paused) animator().pause();
-      tick();
+      if (!ticking) tick();
     },
   };
 }

@@ -140,7 +140,7 @@ class Viewer:
     def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
         """Draw a picture, from `painter.picture` or your own items, and nothing else."""
         if self._moving:
-            self.window.put([wire.no_animation()])
+            self.window.put(wire.end_animation())
             self._moving = False
         self.canvas.draw(picture)
         self._caption(kinds(picture), title, ghost_name)
@@ -255,7 +255,8 @@ class Viewer:
         self.window.close()
 
     def _repr_html_(self) -> str:
-        frame = f'title="{self.robot.name}" style="width: 100%; height: {self.height}px; border: 0; border-radius: 6px"'
+        name, style = html.escape(self.robot.name), f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px"
+        frame = f'title="{name}" style="{style}"'
         if kernel_is_remote() or not self.window.is_open:
             return f'<iframe srcdoc="{html.escape(self.static_html())}" {frame}></iframe>'
         address = self.window.open_display()

@@ -6,7 +6,9 @@ files are read here by trimesh, material by material. Needs trimesh, and pycolla
 
 from __future__ import annotations
 
+import io
 import warnings
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     import trimesh
 
 GREY = (0.62, 0.64, 0.67)
+DARK = (0.2, 0.2, 0.2)  # of a material whose texture cannot be found
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +54,7 @@ def _pieces(item: pin.GeometryObject) -> list[Piece]:
     if not Path(item.meshPath).is_file():
         meshes = [_primitive(item.geometry)]
     else:
-        dump = trimesh.load_scene(item.meshPath).dump()
+        dump = _scene(Path(item.meshPath)).dump()
         meshes = [mesh for mesh in dump if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
     pieces = []
     for mesh in meshes:
@@ -60,6 +63,30 @@ def _pieces(item: pin.GeometryObject) -> list[Piece]:
         plain.apply_transform(item.placement.homogeneous)
         pieces.append(Piece(int(item.parentJoint), _colour(item, mesh), plain, Path(item.meshPath).stem))
     return pieces
+
+
+def _scene(path: Path) -> trimesh.Scene:
+    """What a file holds. pycollada drops a whole mesh for one material whose texture it cannot find: then without textures."""
+    import trimesh
+
+    scene = trimesh.load_scene(path)
+    if scene.geometry or path.suffix.lower() != ".dae":
+        return scene
+    return trimesh.load_scene(io.BytesIO(_without_textures(path)), file_type="dae")
+
+
+def _without_textures(path: Path) -> bytes:
+    """A .dae file with a dark colour in place of every texture."""
+    root = ElementTree.parse(path).getroot()
+    space = root.tag.rpartition("}")[0] + "}"
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag == f"{space}newparam":
+                parent.remove(child)
+            elif child.tag == f"{space}texture":
+                parent.remove(child)
+                ElementTree.SubElement(parent, f"{space}color").text = " ".join(map(str, (*DARK, 1.0)))
+    return ElementTree.tostring(root)
 
 
 def _primitive(shape: Any) -> trimesh.Trimesh:

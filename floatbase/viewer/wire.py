@@ -90,6 +90,13 @@ def no_animation() -> Update:
     return encode({"type": "set_animation", "path": "", "animations": [], "options": {"play": False}})
 
 
+def end_animation() -> list[Update]:
+    """`no_animation` twice: in the animation's place, and in a place of its own, before what is drawn next. A page that was
+    busy may get that and another animation in one frame; ended only then, the old one would undo what is drawn."""
+    key, command = no_animation()
+    return [(key, command), ((key[0], key[1], "end"), command)]
+
+
 def set_control(name: str, **range_of_values: float) -> Update:
     """A slider with value, min, max and step, or a button without them, in the page's panel; it reports to the window."""
     told = json.dumps(name)

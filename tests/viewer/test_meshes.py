@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 from floatbase._assets import assets_root
+from floatbase.dynamics.contacts import Contacts
 from floatbase.robots import load, load_urdf, robots
 from floatbase.viewer.meshes import robot_meshes
 
@@ -37,6 +38,31 @@ def test_light_meshes_fill_the_same_box_as_the_originals(name: str) -> None:
         own = np.vstack([piece.mesh.vertices for piece in pieces if piece.joint == mesh.joint])
         np.testing.assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=0.006)
         np.testing.assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=0.006)
+
+
+@pytest.mark.parametrize("name", robots())
+def test_every_visual_of_the_original_is_read(name: str) -> None:
+    pytest.importorskip("trimesh", reason="the originals are read with trimesh")
+    pytest.importorskip("collada", reason="the originals are read with pycollada")
+    from floatbase.viewer.visuals import urdf_visuals
+
+    robot = load(name)
+    folders = [str(folder) for folder in robot.package_dirs]
+    visuals = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.VISUAL, package_dirs=folders).geometryObjects
+    assert {(piece.joint, piece.source) for piece in urdf_visuals(robot)} == {
+        (visual.parentJoint, Path(visual.meshPath).stem) for visual in visuals
+    }
+
+
+@pytest.mark.parametrize("name", [name for name in robots() if load(name).feet])
+def test_light_meshes_reach_down_to_the_contacts(name: str) -> None:
+    robot = load(name)
+    state = robot.standing()
+    contacts = (Contacts.flat_feet if robot.feet[0].is_flat else Contacts.points)(robot)
+    poses = state.joint_transforms
+    points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in robot_meshes(robot)]
+    for position in contacts.positions(state):
+        assert np.linalg.norm(np.vstack(points) - position, axis=1).min() < 0.03
 
 
 def test_a_robot_outside_the_catalogue_shows_its_own_meshes() -> None:

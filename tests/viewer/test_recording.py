@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 
 import matplotlib
@@ -16,9 +17,10 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, load, robots
 from floatbase.simulation.physics import Push
 from floatbase.simulation.rollout import Rollout
-from floatbase.viewer import place, recording
-from floatbase.viewer.colours import CONE, CONE_ALPHA, MEASURED
+from floatbase.viewer import place, recording, wire
+from floatbase.viewer.colours import ALARM, CONE, CONE_ALPHA, MEASURED
 from floatbase.viewer.scene import Viewer
+from floatbase.viewer.shapes import Picture
 
 from .looks import picture, settle
 
@@ -220,6 +222,75 @@ def test_the_camera_goes_with_the_robot(page, viewer: Viewer, go2: Robot) -> Non
     after = page.evaluate("viewer.controls.target.toArray()")
     assert after[0] - before[0] == pytest.approx(1.5, abs=0.01)
     assert after[1] == before[1]
+
+
+def test_the_camera_goes_on_with_a_robot_that_is_drawn_afresh(page, viewer: Viewer, go2: Robot, standing: State) -> None:
+    page.set_viewport_size({"width": 300, "height": 200})
+    viewer.show(standing).camera(follow=True)
+    page.goto(viewer.url)
+    settle(page, viewer)
+    before = page.evaluate("viewer.controls.target.toArray()")
+    viewer.window.put([wire.delete("/meshcat")])
+    viewer.canvas.picture = {}
+    q = standing.q.copy()
+    for moved in (0.1, 0.4):
+        q[0] = standing.q[0] + moved
+        viewer.show(State(go2, q))
+        page.wait_for_function(
+            "x => Math.abs(viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.x - x) < 1e-3", arg=q[0]
+        )
+        page.wait_for_function("!viewer.needs_render")
+    after = page.evaluate("viewer.controls.target.toArray()")
+    assert after[0] - before[0] == pytest.approx(0.4, abs=0.01)
+
+
+def leaning(viewer: Viewer, state: State, contacts: Contacts, tangents: list[float]) -> list[Picture]:
+    """Pictures of forces that lean forwards by so much of their normal part."""
+    quarter = viewer.robot.weight / 4
+    forces = [np.tile([tangent * quarter, 0.0, quarter], (4, 1)) for tangent in tangents]
+    return [viewer.painter.picture(state, contacts, force) for force in forces]
+
+
+def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
+    page.set_viewport_size({"width": 300, "height": 200})
+    viewer.play_pictures([0, 1, 2], leaning(viewer, standing, contacts, [0.0, 0.6, 0.0]), paused=True)
+    page.goto(viewer.url)
+    settle(page, viewer)
+    page.evaluate("viewer.animator.seek(1.0)")
+    handled = page.evaluate("viewer.num_messages_received")
+    page.evaluate("setTimeout(() => { for (const until = performance.now() + 1500; performance.now() < until;); })")
+    viewer.window.put([wire.set_property("/Grid", "visible", True)])  # the page is busy with this one
+    time.sleep(0.2)
+    viewer.play_pictures([0, 1], leaning(viewer, standing, contacts, [0.9, 0.9]))
+    page.wait_for_function(f"viewer.num_messages_received >= {handled + 2} && !viewer.needs_render")
+    cone, arrow = page.evaluate(
+        """() => ["cone/FL_foot/surface", "measured/FL_foot"].map((path) =>
+          viewer.scene_tree.find(["meshcat", ...path.split("/")]).object)
+          .map((node) => [node.children.concat(node).find((o) => o.material).material.color.toArray(), node.scale.z])"""
+    )
+    np.testing.assert_allclose(cone[0], ALARM, atol=1e-3)
+    wanted = viewer.scale * 0.25 * viewer.robot.weight * np.hypot(0.9, 1.0)
+    assert arrow[1] == pytest.approx(wanted, rel=1e-3)
+
+
+def test_every_record_has_one_clock_and_its_speed(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
+    page.set_viewport_size({"width": 300, "height": 200})
+    page.goto(viewer.url)
+    for number in range(3):
+        viewer.play_pictures([0, 1], leaning(viewer, standing, contacts, [0.1, 0.2 + 0.1 * number]), speed=0.3)
+        page.wait_for_function("scale => window.viewer && viewer.animator.mixer.timeScale == scale", arg=0.3)
+        page.wait_for_timeout(100)
+    assert page.evaluate("document.querySelector('#player select').selectedOptions[0].text") == "0.3×"
+    ticks = page.evaluate(
+        """() => new Promise((told) => {
+          const ask = window.requestAnimationFrame.bind(window);
+          let frames = 0, ticks = 0;
+          window.requestAnimationFrame = (call) => { ticks += call.name == "tick"; return ask(call); };
+          const count = () => ++frames > 10 ? told(ticks / (frames - 1)) : ask(count);
+          ask(count);
+        })"""
+    )
+    assert 0.5 <= ticks <= 1.5
 
 
 def test_controls_in_the_page_call_back(page, viewer: Viewer, standing: State) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from typing import Any
 
@@ -352,6 +353,12 @@ def test_a_notebook_shows_the_live_page(viewer: Viewer) -> None:
     viewer.close()
     assert "closed" in viewer._repr_html_()
     assert "closed" in repr(viewer)
+
+
+def test_the_name_of_a_robot_is_text_in_the_notebook(go2: Robot) -> None:
+    view = Viewer(dataclasses.replace(go2, name='a "<b>"'))
+    assert 'title="a &quot;&lt;b&gt;&quot;"' in view._repr_html_()
+    view.close()
 
 
 def test_wrong_input_is_explained(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
