@@ -78,7 +78,7 @@ def tick_times(n: int) -> Iterator[str]:
         for label, spread in SPREADS.items():
             at = states(robot, n, spread)
             pushing = np.mean([len(fast._program(q, v, 0.0)[1]) for q, v in at])
-            (quick,), (plain,) = interleaved([fast], at, 10), interleaved([slow], at[: n // 4], 2)
+            quick, plain = interleaved([fast, slow], at, 3)
             numbers = (*np.percentile(quick, [50, 99]), *np.percentile(plain, [50, 99]))
             text = " | ".join(f"{number:.1f} µs" for number in numbers)
             yield f"| {name} | {label} | {pushing:.1f} | {text} | {numbers[2] / numbers[0]:.0f} × |"

@@ -9,11 +9,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
+from math import prod
 from threading import Lock, Timer
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -48,8 +49,9 @@ def told_when_slow(text: str, after: float = 3.0) -> Iterator[None]:
 
 def obstacle(robot: Robot, contacts: Contacts, tasks: Sequence[Task], solver: str) -> str:
     """Why the compiled path cannot serve this problem, or "" when it can."""
-    if find_spec("numba") is None:
-        return 'numba is not installed: pip install "floatbase[fast]"'
+    missing = _kernel_obstacle()
+    if missing:
+        return missing
     if solver != "daqp":
         return f"solver {solver!r} was asked for, and the compiled path has its own"
     for contact in contacts:
@@ -59,6 +61,17 @@ def obstacle(robot: Robot, contacts: Contacts, tasks: Sequence[Task], solver: st
         if type(task) not in _KINDS:
             return f"task {task.name!r} is a {type(task).__name__}; compiled are the tasks of the package"
     return _robot_obstacle(robot)
+
+
+def _kernel_obstacle() -> str:
+    """Why the kernel cannot be had at all: numba is not there, or does not fit the packages beside it."""
+    if find_spec("numba") is None:
+        return 'numba is not installed: pip install "floatbase[fast]"'
+    try:
+        import floatbase.control.kernel  # noqa: F401
+    except (ImportError, OSError, AttributeError) as error:
+        return f"numba is installed and cannot be loaded ({error})"
+    return ""
 
 
 @lru_cache(maxsize=16)
@@ -137,7 +150,7 @@ def _contact_table(robot: Robot, contact: PointContact | FlatFootContact, facets
     return _ContactTable(joint, int(flat), frame, np.array(points), np.tile(cone, (len(points), 1, 1)))
 
 
-Target = tuple[int, tuple[int, ...], str, Callable[[float], npt.ArrayLike]]
+Target = tuple[int, int, tuple[int, ...], str, Callable[[float], npt.ArrayLike]]  # task, place in the table, shape, attribute
 
 
 class Program:
@@ -153,6 +166,7 @@ class Program:
         self.dynamics, self.solved, self._kernel = dynamics_of(robot), kernel.SOLVED, kernel.tick
         self.robot, self.q_shape, self.v_shape, self.nv, self.d = robot, (robot.nq,), (robot.nv,), robot.nv, robot.d
         self.fits = True
+        self._tasks = tuple(tasks)
         self._moving: list[Target] = []
         contact_tables = _stack_contacts(robot, contacts, limits)
         self.targets, task_tables = self._task_tables(robot, tasks, contacts.k)
@@ -161,18 +175,28 @@ class Program:
         self._limited = np.isfinite(limits.torque_limits)
         self.force_rows = contact_tables[4].size
 
-    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, Array, Array] | None:
-        """(q̈, τ, λ) of shape (nv + d + k,), the active rows and their multipliers; None when the readable path must decide.
+    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, Array, Array, Array] | None:
+        """(q̈, τ, λ) of shape (nv + d + k,), the active rows, their multipliers, and the targets of time t.
 
-        q, v: writable float64 arrays.
+        None when the readable path must decide. q, v: writable float64 arrays.
         """
-        if q.shape != self.q_shape or v.shape != self.v_shape or (self._moving and not self._move(t)):
+        if q.shape != self.q_shape or v.shape != self.v_shape:
+            return None
+        targets = self._targets_at(t) if self._moving else self.targets
+        if targets is None:
             return None
         dynamics = self.dynamics
         with dynamics.lock:
             dynamics.update(q, v)
-            x, active, mu, status = self._kernel(q, v, self.targets, *dynamics.views, *self._packed)
-        return (x, active, mu) if status == self.solved else None
+            x, active, mu, status = self._kernel(q, v, targets, *dynamics.views, *self._packed)
+        return (x, active, mu, targets) if status == self.solved else None
+
+    def tasks(self, targets: Array) -> tuple[Task, ...]:
+        """The tasks with the targets of one tick, as `__call__` gave them: functions may answer otherwise when asked again."""
+        values: dict[int, dict[str, Any]] = {}
+        for i, at, shape, name, _ in self._moving:
+            values.setdefault(i, {})[name] = targets[at : at + prod(shape)].reshape(shape)
+        return tuple(replace(cast(Any, task), **values[i]) if i in values else task for i, task in enumerate(self._tasks))
 
     def multipliers(self, active: Array, mu: Array, rows: int) -> Array:
         """Multipliers of the readable problem's inequality rows, shape (rows,): there only limited joints have torque rows."""
@@ -184,17 +208,18 @@ class Program:
             found[at] = max(push, 0.0)
         return found
 
-    def _move(self, t: float) -> bool:
-        """Write the moving targets of time t into the table; False when one has the wrong form."""
-        for at, shape, _, target in self._moving:
+    def _targets_at(self, t: float) -> Array | None:
+        """All targets at time t, in an array of their own: ticks of other threads may be under way. None for a wrong form."""
+        targets = self.targets.copy()
+        for _, at, shape, _, target in self._moving:
             try:
                 value = np.asarray(target(t), dtype=np.float64)
             except (TypeError, ValueError):
-                return False
+                return None
             if value.shape != shape:
-                return False
-            self.targets[at : at + value.size] = value.ravel()
-        return True
+                return None
+            targets[at : at + value.size] = value.ravel()
+        return targets
 
     def _task_tables(self, robot: Robot, tasks: Sequence[Task], k: int) -> tuple[Array, tuple[Any, ...]]:
         """All targets in a row, and the tables tasks (N, 3), gains (N, 3), frames (N, 12)."""
@@ -210,7 +235,7 @@ class Program:
                 at = sum(part.size for part in parts)
                 parts.append(np.zeros(shape).ravel())
                 if callable(value):
-                    self._moving.append((at, shape, name, value))
+                    self._moving.append((i, at, shape, name, value))
                 elif value is not None:
                     self.fits &= np.shape(value) == shape
                     parts[-1] = np.ravel(value) if np.shape(value) == shape else parts[-1]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -44,7 +43,8 @@ class Limits:
         limits = np.ravel(self.torque_limits)
         object.__setattr__(self, "torque_limits", torque_limits_of(limits.size, limits))
         positive("min_normal_force", self.min_normal_force, "N", allow_zero=True)
-        FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets)  # says what is wrong with the number
+        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets)  # says what is wrong with the number
+        object.__setattr__(self, "facets", polyhedron.facets)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -246,12 +246,9 @@ class WholeBodyController:
         )
         self.solver = solver
         self.asked_path: Path = path
-        standing = robot.standing()
-        self.qp(standing, 0.0)  # names that do not exist and shapes that do not fit show now, not in the loop
+        self.qp(robot.standing(), 0.0)  # names that do not exist and shapes that do not fit show now, not in the loop
         self._choose_path()
-        if self._program is not None:
-            with told_when_slow("floatbase compiles its controller, once: about 20 s."):
-                self._program(np.array(standing.q), np.array(standing.v), 0.0)  # compiles, or loads what was compiled
+        self._warm_up()
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The problem of one tick, to look at."""
@@ -281,19 +278,21 @@ class WholeBodyController:
         answer = program(q, v, t)
         if answer is None:
             return None
-        x, active, mu = answer
+        x, active, mu, targets = answer
         x.setflags(write=False)
         nv, tail = program.nv, program.nv + program.d
 
         def evidence() -> Solution:
-            qp = self.qp(State(self.robot, q, v), t)
+            eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
+            qp = build_qp(eom, program.tasks(targets), self.limits, t)
             return finished(qp, x, program.multipliers(active, mu, len(qp.G)), "compiled", len(active))
 
         return Command(x[nv:tail], x[:nv], x[tail:], self.contacts, evidence, "compiled")
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""
-        other = copy(self)
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
         if contacts is not None:
             other.contacts = _checked_contacts(contacts)
         if tasks is not None:
@@ -301,7 +300,24 @@ class WholeBodyController:
         other._choose_path()
         if tasks is not None or other._program is None:
             other.qp(self.robot.standing(), 0.0)  # as when it is made: what does not fit shows now
+        if self._program is None:
+            other._warm_up()
         return other
+
+    def _warm_up(self) -> None:
+        """Run one tick, which compiles, or loads what was compiled, so that the loop need not wait for it."""
+        if self._program is not None:
+            standing = self.robot.standing()
+            with told_when_slow("floatbase compiles its controller, once: about 20 s."):
+                self._program(np.array(standing.q), np.array(standing.v), 0.0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_program"}  # live views cannot be copied
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._choose_path()
+        self._warm_up()
 
     def _choose_path(self) -> None:
         """Set `path`, `path_reason` and the tables of the kernel, or raise when compiled was asked for and cannot be."""

@@ -37,6 +37,10 @@ _NOISE = 100.0  # as MOTION_NOISE of the readable path
 _CURVED = 1e-13  # least pivot of the objective's Cholesky factor, squared, relative to its diagonal
 _VIOLATED = 1e-9  # as FEASIBILITY_TOLERANCE of the readable path, on rows of unit length
 _PARALLEL = 1e-12  # a row's part outside the active rows, squared, below which it depends on them
+_POLISHED = 3  # steps of Newton's method at most
+_SETTLED = 1e-6  # part of β: what is left after a step so small is rounding
+_UNSETTLED = 1e-4  # part of β that the last of them may still move
+_PULLING = 1e-9  # part of the largest multiplier by which one may be negative
 
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -864,12 +868,14 @@ def enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, d, z, r
 def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
     """One step of Newton's method from (β, mu) that are right but for rounding; slope: the gradient there, shape (nb,).
 
+    Returns the largest change of an entry of β.
     rows: (q, nb), bounds: (q,) of the active rows. W, U: the factors of Goldfarb and Idnani: rows @ Wᵀ = [Uᵀ 0] and W H Wᵀ = 1.
     """
     nb = beta.size
     if q == 0:
-        beta += minimum(L, slope)
-        return
+        move = minimum(L, slope)
+        beta += move
+        return np.max(np.abs(move))
     for a in range(q):
         for c in range(nb):
             slope[c] += mu[a] * rows[a, c]
@@ -884,15 +890,30 @@ def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
         for j in range(a):
             y[a] -= U[j, a] * y[j]
         y[a] /= U[a, a]
+    move = np.zeros(nb)
     for j in range(nb):
         step = y[j] if j < q else d[j]
         for i in range(nb):
-            beta[i] += step * W[j, i]
-    for a in range(q - 1, -1, -1):
+            move[i] += step * W[j, i]
+    beta += move
+    for a in range(q - 1, -1, -1):  # the slope that the way to the bounds leaves is held by the multipliers
+        d[a] -= y[a]
         for j in range(a + 1, q):
             d[a] -= U[a, j] * d[j]
         d[a] /= U[a, a]
         mu[a] += d[a]
+    return np.max(np.abs(move))
+
+
+@_compiled
+def pulling_row(mu, q):
+    """The active row whose multiplier, of q ones, is the most negative, so that it should not be active; -1 for none."""
+    least, largest, found = 0.0, 0.0, -1
+    for a in range(q):
+        largest = max(largest, abs(mu[a]))
+        if mu[a] < least:
+            least, found = mu[a], a
+    return found if least < -_PULLING * largest - 1e-13 else -1
 
 
 @_compiled
@@ -900,10 +921,11 @@ def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, l
     """(27) β (nb,) with the least objective that keeps all rows; the active rows, their multipliers, and a status.
 
     The dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): start at the optimum without rows,
-    bring a violated one to its bound, again and again. Rows that are never violated are only looked at.
+    bring a violated one to its bound, again and again. Rows that are never violated are only looked at. The end is
+    polished; where that shows it to be none, since a row pulls or is violated, the search goes on.
     """
     H, slope = normal_equations(R, diagonal, aim)
-    nb, q = slope.size, 0
+    nb, q, polished, moved = slope.size, 0, 0, 0.0
     active, mu, bounds, rows = np.empty(nb, np.int64), np.empty(nb), np.empty(nb), np.empty((nb, nb))
     L, curved = cholesky(H)
     if not curved:
@@ -911,20 +933,31 @@ def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, l
     beta = minimum(L, slope)
     forces, tau = np.empty(3 * cones.shape[0]), np.empty(T.shape[0])
     row, d, z, r = np.empty(nb), np.empty(nb), np.empty(nb), np.empty(nb)
-    W, U = L, L  # made when the first row is violated
-    for count in range(100 + 10 * nb):
+    W, U, made = L, L, False  # made when the first row is violated
+    number = 0
+    for _ in range(100 + 10 * nb):
         number = violated_row(V, beta_of, T, beta, cones, lengths, least_normal, limits, forces, tau)
         if number < 0:
-            break
-        if count == 0:
-            W, U = inverse(L), np.zeros((nb, nb))
+            if polished == _POLISHED:
+                break
+            moved = polish(beta, mu, active, q, gradient(R, diagonal, aim, beta), L, W, U, rows, bounds)
+            polished = polished + 1 if moved > _SETTLED * (1.0 + np.max(np.abs(beta))) else _POLISHED
+            pulling = pulling_row(mu, q)
+            if pulling >= 0:
+                drop_row(W, U, active, mu, rows, bounds, pulling, q)
+                q, polished = q - 1, 0
+            elif moved <= _VIOLATED:
+                break
+            continue
+        polished = 0
+        if not made:
+            W, U, made = inverse(L), np.zeros((nb, nb)), True
         bound = row_in_beta(number, V, T, cones, least_normal, limits, row)
         q, status = enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, d, z, r)
         if status != SOLVED:
             return beta, active[:0], mu[:0], status
-    if number >= 0:
+    if number >= 0 or polished == 0 or not moved <= _UNSETTLED * (1.0 + np.max(np.abs(beta))):
         return beta, active[:0], mu[:0], DOUBTFUL
-    polish(beta, mu, active, q, gradient(R, diagonal, aim, beta), L, W, U, rows, bounds)
     return beta, active[:q], mu[:q], SOLVED
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import os
+import pickle
 import subprocess
 import sys
 import time
@@ -412,3 +415,118 @@ def test_a_long_compilation_is_announced_and_a_short_one_is_not(capsys: pytest.C
 def test_the_tick_can_be_compiled_before_it_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compile"]) == 0
     assert "compiled path" in capsys.readouterr().out
+
+
+# one controller in many hands ----------------------------------------------------------------------------------------------
+
+
+def test_a_tick_keeps_its_targets_when_another_tick_comes_between() -> None:
+    """As when two threads share a controller: one tick's targets must not reach the other's problem."""
+    robot = judges.load("go2")
+    state, com = robot.standing(), robot.standing().com
+
+    def velocity(t: float) -> list[float]:
+        if t == 1.0:
+            fast(state.q, state.v, 7.0)
+        return [0.0, 0.0, 0.0]
+
+    rising = fb.CoMTask(lambda t: com + [0.0, 0.0, 0.01 * t], velocity)
+    fast, slow = pair(robot, judges.stance(robot), [rising, *fb.standing_tasks(state)[1:]])
+    assert difference((fast, slow), state, 1.0) < TORQUE
+
+
+def test_the_evidence_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
+    robot = judges.load("go2")
+    state, slider = robot.standing(), {"height": 0.0, "turn": 0.0}
+    tasks = [
+        fb.CoMTask(lambda t: state.com + [0.0, 0.0, slider["height"]], lambda t: [0.0, 0.0, slider["height"]]),
+        fb.OrientationTask("base", lambda t: judges.rotation([slider["turn"], 0.0, 0.0])),
+        fb.PostureTask(state.q),
+    ]
+    controller, _ = pair(robot, judges.stance(robot), tasks)
+    command = controller(state.q, state.v)
+    slider.update(height=0.2, turn=0.5)
+    assert command.solution.residuals.stationarity < 1e-8
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_controller_can_be_copied_and_sent_to_another_process(path: str) -> None:
+    robot = judges.load("go2")
+    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), path=path)
+    state = robot.random_state(1, 0.1)
+    for other in (copy.deepcopy(controller), copy.copy(controller), pickle.loads(pickle.dumps(controller))):
+        assert other.path == path
+        assert np.allclose(other(state.q, state.v).tau, controller(state.q, state.v).tau, rtol=0.0, atol=TORQUE)
+
+
+def test_a_replaced_controller_that_comes_to_the_compiled_path_has_run_it_before_the_loop_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = judges.load("go2")
+    readable = fb.WholeBodyController(robot, judges.stance(robot), [OwnTask()])
+    ticks = []
+    tick = compiled.Program.__call__
+    monkeypatch.setattr(compiled.Program, "__call__", lambda self, *given: (ticks.append(given), tick(self, *given))[1])
+    compiled_one = readable.replace(tasks=fb.standing_tasks(robot.standing()))
+    assert (compiled_one.path, len(ticks)) == ("compiled", 1)
+    compiled_one.replace(tasks=fb.standing_tasks(robot.standing()))
+    assert len(ticks) == 1, "a compiled controller need not run again what it has run"
+
+
+def test_a_numba_that_cannot_be_loaded_leaves_the_readable_path_and_says_why(tmp_path: Path) -> None:
+    """As when numba wants an older numpy than the one that is installed."""
+    (tmp_path / "numba").mkdir()
+    (tmp_path / "numba" / "__init__.py").write_text("raise ImportError('Numba needs NumPy 2.0 or less')")
+    code = (
+        "import floatbase as fb; robot = fb.load('go2'); "
+        "made = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())); "
+        "print(made.path, made.path_reason)"
+    )
+    paths = os.pathsep.join([str(tmp_path), *sys.path])
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=os.environ | {"PYTHONPATH": paths})
+    assert said.stdout.startswith("readable numba is installed and cannot be loaded (Numba needs NumPy"), said.stderr
+
+
+def test_polish_is_newtons_step_it_reaches_the_optimum_from_anywhere() -> None:
+    """A small problem with two active rows: after one step point and multipliers are those of the KKT system."""
+    from floatbase.control import kernel
+
+    rng = np.random.default_rng(0)
+    root, rows, (bounds, g) = rng.standard_normal((4, 4)), rng.standard_normal((2, 4)), (rng.standard_normal(n) for n in (2, 4))
+    H = root @ root.T + np.eye(4)
+    L = np.linalg.cholesky(H)
+    turn, upper = np.linalg.qr(np.linalg.solve(L, rows.T), mode="complete")
+    W, U = turn.T @ np.linalg.inv(L), np.zeros((4, 4))
+    U[:2, :2] = upper[:2]
+    beta, mu = rng.standard_normal(4), rng.standard_normal(2)
+    kernel.polish.py_func(beta, mu, np.arange(2), 2, H @ beta + g, L, W, U, rows, bounds)
+    K = np.block([[H, rows.T], [rows, np.zeros((2, 2))]])
+    assert np.allclose(np.concatenate([beta, mu]), np.linalg.solve(K, np.concatenate([-g, bounds])), rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "weight", "seeds"), [("solo12", 1e3, [12]), ("solo12", 1e5, [3, 8, 10, 15, 27, 28, 29, 38]), ("go2", 1e5, [38])]
+)
+def test_weights_far_apart_give_the_optimum_or_the_readable_path(name: str, weight: float, seeds: list[int]) -> None:
+    """Rounding in the search can end it at the wrong active rows: they pull, or others are violated, once it is polished."""
+    robot = judges.load(name)
+    at = robot.standing()
+    contacts = fb.Contacts.points(robot, mu=0.4, frames=[foot.frame for foot in robot.feet][:3])
+    tasks = [fb.CoMTask(at.com, weight=weight), fb.PostureTask(at.q)]
+    fast, _ = pair(robot, contacts, tasks, facets=64)
+    exact = fb.WholeBodyController(robot, contacts, tasks, facets=64, solver="active_set")
+    for seed in seeds:
+        state = robot.random_state(seed, 0.3)
+        found, wanted = fast(state.q, state.v), exact(state.q, state.v)
+        assert np.max(np.abs(found.tau - refined(wanted.solution))) < 1e-6
+        assert found.solution.residuals.inequality < 1e-8
+
+
+def test_a_whole_number_of_facets_may_be_written_with_a_point() -> None:
+    robot = judges.load("go2")
+    state, contacts = robot.standing(), judges.stance(robot)
+    for path in ("compiled", "readable"):
+        eight, same = (
+            fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), facets=facets, path=path) for facets in (8, 8.0)
+        )
+        assert np.array_equal(eight(state.q, state.v).tau, same(state.q, state.v).tau)
