@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
 _MOTION = {CoMTask: 0, OrientationTask: 1, FrameTask: 2}
 _KINDS: dict[type, int] = {**_MOTION, PostureTask: 3, ForceTask: 4, TorqueTask: 5}
-_JOINTS = ("JointModelR", "JointModelP", "JointModelFreeFlyer")  # their axes stand still in the joint's own frame
+# their axes stand still in the joint's own frame
+_JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
 _POSE = 12  # numbers of a pose: rotation column by column, then the place
 
 

@@ -123,7 +123,8 @@ def load_urdf(
 
     name: the file's name without its ending by default. floating: whether the root link is free to move. package_dirs: where
     meshes named package://… lie; the file's own folder is always searched. The rest as for `load`; the posture is that of
-    all joints at zero by default. Raises `InputError` for a file that is not there or cannot be read.
+    all joints at zero by default. Raises `InputError` for a file that is not there or cannot be read, and for planar and
+    floating joints inside the robot.
     """
     urdf = Path(path).expanduser().resolve()
     if not urdf.is_file():
@@ -135,6 +136,12 @@ def load_urdf(
         model = _model(urdf, floating)
     except (RuntimeError, ValueError) as error:
         raise InputError(f"Pinocchio cannot read {urdf.name} as a URDF: {error}") from None
+    for i in range(2 if floating else 1, model.njoints):
+        if model.joints[i].nv != 1:
+            raise InputError(
+                f"joint {model.names[i]!r} of {urdf.name} moves in {model.joints[i].nv} ways; a motor drives one. Make it "
+                "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
+            )
     return _robot(name, model, loader, None, pin.neutral(model), list(feet), foot_radius, torque_limits, posture)
 
 

@@ -36,3 +36,15 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     broken.write_text("<robot>")
     with pytest.raises(InputError, match=r"Pinocchio cannot read broken\.urdf as a URDF"):
         fb.load_urdf(broken)
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_a_joint_that_no_motor_drives_is_refused_by_name(kind: str, tmp_path: Path) -> None:
+    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    path = tmp_path / "table.urdf"
+    path.write_text(
+        f'<robot name="table"><link name="base">{link}</link><link name="top">{link}</link>'
+        f'<joint name="slide" type="{kind}"><parent link="base"/><child link="top"/><axis xyz="0 0 1"/></joint></robot>'
+    )
+    with pytest.raises(InputError, match=r"joint 'slide' of table.urdf moves in \d ways; a motor drives one"):
+        fb.load_urdf(path)
