@@ -58,7 +58,7 @@ def support_region(positions: npt.ArrayLike, lift: float, ground: Plane = LEVEL)
 
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
-    """A frame, shape (4, 4), as three rods: x vermilion, y green, z blue; with its name when given."""
+    """A frame, shape (4, 4), as three rods: x vermilion, y green, z blue, seen through the robot; with its name when given."""
     matrix = np.array(checked("pose of a frame", pose, (4, 4)))
     matrix[:3, :3] *= positive("length of a frame's axes", length, "m")
     picture = {"/axes": Item(_axes(), matrix)}
@@ -87,4 +87,4 @@ def _axes() -> Shape:
         np.tile(np.round(255 * np.array(colour)), (len(vertices), 1))
         for colour, (vertices, _) in zip((X_AXIS, Y_AXIS, Z_AXIS), rods, strict=True)
     ]
-    return three.mesh(*geometry.merged(rods), colours=np.vstack(colours))
+    return three.mesh(*geometry.merged(rods), colours=np.vstack(colours), through=True)

@@ -84,7 +84,7 @@ def mesh(
         "color": code(colour),
         "vertexColors": colours is not None,
         "side": 2,
-        "transparent": opacity < 1.0,
+        "transparent": opacity < 1.0 or through,  # so that no veil comes over what is seen through all
         "opacity": opacity,
         "depthWrite": opacity == 1.0 or veil,
         "depthTest": not through,

@@ -8,7 +8,7 @@ import pytest
 from floatbase.dynamics.contacts import Contacts
 from floatbase.robots import Robot, State, load, robots
 from floatbase.viewer import wire
-from floatbase.viewer.colours import ALARM, CALM, COM, MEASURED, WARNING
+from floatbase.viewer.colours import ALARM, CALM, COM, MEASURED, WARNING, X_AXIS
 from floatbase.viewer.scene import Viewer
 from floatbase.viewer.window import Window
 
@@ -62,6 +62,29 @@ def test_the_page_comes_back_when_the_window_does(page, go2: Robot) -> None:
         assert second.browsers == 1
         page.wait_for_function("document.getElementById('title').textContent == 'back again'")
         assert page.evaluate("getComputedStyle(document.getElementById('notice')).display") == "none"
+
+
+def test_pushes_and_frames_are_seen_through_the_robot_and_its_ghost(page, viewer: Viewer, go2: Robot, standing: State) -> None:
+    page.goto(viewer.url)
+    q = standing.q.copy()
+    q[2] += 0.05
+    seen = []
+    for ghost in (None, State(go2, q)):
+        for name, parts in (("push", {"push": ("base", [0.0, 60.0, 0.0])}), ("frame", {"frames": ["base"]})):
+            shots = []
+            for title, more in ((f"no {name}", {}), (name, parts)):
+                viewer.show(standing, com=False, ghost=ghost, title=title, **more)
+                page.wait_for_function(f"document.querySelector('#title').textContent == '{title}' && !viewer.needs_render")
+                shots.append(picture(page, f"{title}{' and ghost' if ghost else ''}".replace(" ", "_")))
+            before, after = shots
+            seen.append(dark_pixels(after - before, after) if name == "push" else hue_pixels(after, X_AXIS))
+    assert seen[0] > 200 and seen[2] > 0.9 * seen[0]
+    assert seen[1] > 50 and seen[3] > 0.9 * seen[1]
+
+
+def dark_pixels(change: np.ndarray, image: np.ndarray) -> int:
+    """How many pixels have become dark where the robot's body is: not those of the scale bar."""
+    return int(np.sum(((change.max(axis=2) < -40) & (image.max(axis=2) < 70))[:330]))
 
 
 def test_get_image_is_the_picture_in_the_page(page, viewer: Viewer, standing: State) -> None:
