@@ -10,8 +10,10 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import floatbase as fb
+from floatbase.errors import ViewerError
 from floatbase.objectives.tasks import Task
 from floatbase.robots.robot import Robot
 from floatbase.simulation.live import SEEN, Live
@@ -138,7 +140,8 @@ class Playground:
     def _say(self, status: str) -> None:
         """Tell what stopped the run, if anything did, over the last picture."""
         self.outcome = {"running": "", "paused": "paused"}.get(status, f"{status}: press reset")
-        self._draw()
+        with suppress(ViewerError):  # a window that is closed tells nobody anything
+            self._draw()
 
     def _draw(self) -> None:
         record = self.last

@@ -107,6 +107,18 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
     assert playground.run.status == "running"
 
 
+@pytest.mark.filterwarnings("error")  # as an exception in the run's thread would be
+def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> None:
+    until = time.monotonic() + 20.0
+    while playground.last is None and time.monotonic() < until:
+        time.sleep(0.02)
+    playground.view.close()
+    while playground.run.status == "running" and time.monotonic() < until:
+        time.sleep(0.02)
+    assert "window is closed" in playground.run.status
+    playground.run.close()
+
+
 def test_the_pace_is_simulated_time_over_time() -> None:
     now = [0.0]
     pace = Pace(lambda: now[0])
