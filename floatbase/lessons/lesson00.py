@@ -27,9 +27,11 @@ EXERCISES = (
         solution="total = robot.mass * 9.81",
         judge=Numeric(
             right=_weight_of_links,
+            tolerance=2e-3,  # g may be 9.8
             praise="Standing still means no vertical acceleration, so the ground carries exactly the weight.",
             mistakes={
                 "That is a mass in kg; a force needs one more factor.": lambda: _go2().mass,
+                "That takes g as 10 m/s²; the physics here has 9.81.": lambda: 10 * _go2().mass,
                 "That is the share of one foot, on average; all feet are asked for.": lambda: _weight_of_links() / 4,
                 "That is what the robot does to the ground; asked is what the ground does to the robot.": lambda: (
                     -_weight_of_links()

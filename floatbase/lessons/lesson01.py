@@ -233,7 +233,7 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> widget
         view.show(state, contacts, planned=f, wrench=np.concatenate([f.sum(axis=0), moment]))
         a = state.com_jacobian @ command.qdd
         return (
-            f"f<sub>c</sub> = {_row(f.sum(axis=0))} N, m (a + g) = {_row(state.robot.mass * (a + [0, 0, 9.81]))} N, "
+            f"f<sub>c</sub> = {_row(f.sum(axis=0))} N, m (a - g) = {_row(state.robot.mass * (a - [0, 0, -9.81]))} N, "
             f"τ<sub>c</sub> = {_row(moment)} N·m"
         )
 
@@ -382,7 +382,7 @@ EXERCISES = (
                 "The moment is taken about the centre of mass; the bolts sit at the base.": _about_the_centre_of_mass,
                 "This holds the weight's moment as well; asked is the answer to the wall alone.": _with_the_weight,
                 "Zero would mean that nobody answers the wall. Which lever, and which force?": lambda: np.zeros(3),
-                "Only the height of the tool counts here; it is also 11 cm to the side, and that is a lever too.": (
+                "This takes the height of the tool alone; it is also 11 cm to the side, and that is a lever too.": (
                     lambda: np.array([0.0, 60.0 * _pressed()[1][2], 0.0])
                 ),
                 "* multiplies number by number; a moment is the cross product of lever and force.": (
@@ -424,13 +424,15 @@ EXERCISES = (
     Exercise(
         name="01.3",
         statement="go2 stands on a level floor with μ = 0.7 and is pulled sideways, low enough not to tip. What is the largest "
-        "horizontal force, in N, that the floor can answer while all feet stay put?",
+        "horizontal force, in N, that the floor can answer while the robot stays at rest?",
         stub="most = 1000.0  # N: replace this number by an expression",
         solution="most = 0.7 * go2.mass * 9.81",
         judge=Numeric(
             right=_carried_by_friction,
-            praise="The bolts' answer had no bound. This one is friction times weight, and no controller can raise it.",
+            tolerance=2e-3,  # g may be 9.8
+            praise="The bolts' answer had no bound. This one is friction times weight, as long as no jump adds to it.",
             mistakes={
+                "That takes g as 10 m/s²; the physics here has 9.81.": lambda: 10 * _carried_by_friction() / 9.81,
                 "That is the weight. A horizontal force has to come from friction.": lambda: _carried_by_friction() / 0.7,
                 "That is the share of one foot; four feet share the work.": lambda: _carried_by_friction() / 4,
                 "All four feet together carry one weight, not four.": lambda: 4 * _carried_by_friction(),

@@ -269,8 +269,8 @@ EXERCISES = (
                 "That is how many do not move it.": lambda: 1,
                 "That is the number of force components k; asked for are directions of β.": lambda: 6,
                 "That is for three feet.": lambda: 9,
-                "That is rank J_b: how many base motions two feet stop. d - r + rank J_b is asked for.": lambda: 5,
-                "You have counted more than one internal force: k is 6, but the rank of J_b is not.": lambda: 10,
+                "That is how many motions of the base two feet can stop; the legs move, too.": lambda: 5,
+                "You have counted more than one internal force. Which pushes of two feet turn nothing?": lambda: 10,
             },
         ),
         explanation="d - r + rank J_b = 12 - 6 + 5: about the line through both feet no point foot can stop the base from "

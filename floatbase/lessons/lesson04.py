@@ -164,7 +164,7 @@ def _gradients() -> dict[str, Callable[[], Any]]:
     return {
         "There is nothing there yet: at a minimum the gradient is zero, but τ = 0 is none.": lambda: np.zeros(12),
         "The sign: residual = actual - wanted, and the gradient points uphill.": lambda: -right(),
-        "The drift is forgotten: with q̈ alone the centre of mass accelerates by J q̈ + J̇ q̇.": gradient(drift=0.0),
+        "The drift is forgotten: the centre of mass accelerates by J q̈ + J̇ q̇.": gradient(drift=0.0),
         "The drift has the wrong sign.": gradient(drift=-1.0),
         "η has an offset: with the motors off the robot accelerates too, by b.": gradient(offset=0.0),
         "The offset of η and the drift are both forgotten.": gradient(drift=0.0, offset=0.0),
@@ -261,7 +261,7 @@ EXERCISES = (
                 "That is for the centre of mass alone.": lambda: 9,
                 "Those are the squeezes. Has the free leg nothing to do?": lambda: 3,
                 "That is counted in q̈, where most directions are not possible at all.": lambda: 12,
-                "That is how many are not flat in one cost alone.": lambda: 0,
+                "So it would be with effort; these two costs do not see all that three feet can do.": lambda: 0,
             },
         ),
         explanation="β has 12 directions and the two costs bend 6 of them; 9 forces leave 9 - 6 = 3 squeezes.",

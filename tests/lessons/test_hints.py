@@ -187,3 +187,21 @@ def test_no_answer_at_all_makes_a_check_fail(name: str, odd: str) -> None:
         warnings.simplefilter("error")
         said = exercises()[name].judge(ODD[odd])
     assert not said.right and said.text
+
+
+@pytest.mark.parametrize("name", ["00.1", "01.3"])
+def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str) -> None:
+    share = {"00.1": 1.0, "01.3": 0.7}[name]
+    judge = exercises()[name].judge
+    assert judge(share * GO2.mass * 9.8).right
+    assert "g as 10" in judge(share * GO2.mass * 10.0).text
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "hint"),
+    [("03.1", 5, "the legs move"), ("03.1", 10, "more than one internal force"), ("04.2", 0, "with effort")],
+)
+def test_a_wrong_count_gets_the_hint_that_fits(name: str, count: int, hint: str) -> None:
+    said = exercises()[name].judge(count)
+    assert not said.right
+    assert hint in said.text

@@ -47,7 +47,7 @@ def test_03_1_knows_each_wrong_count() -> None:
         1: "do not move",
         6: "components",
         9: "three feet",
-        5: "J_b",
+        5: "legs move",
         10: "more than",
     }.items():
         answer = verdict("03.1", wrong)

@@ -76,7 +76,7 @@ def test_04_1_knows_sign_frame_transpose_drift_offset_and_shape() -> None:
 
 def test_04_2_knows_each_wrong_count() -> None:
     assert verdict("04.2", 6).right
-    for wrong, hint in {9: "alone", 3: "free leg", 12: "q̈", 0: "one cost"}.items():
+    for wrong, hint in {9: "alone", 3: "free leg", 12: "q̈", 0: "with effort"}.items():
         said = verdict("04.2", wrong)
         assert not said.right and hint in said.text, (wrong, said)
 
