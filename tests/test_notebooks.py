@@ -11,18 +11,27 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import nbformat
 import psutil
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
+import floatbase as fb
 from floatbase.lessons import progress
 from floatbase.lessons.exercises import check, exercises
-from floatbase.lessons.notebooks import FOLDER, execute, read, solved
+from floatbase.lessons.notebooks import FOLDER, execute, read, run, solved
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 LESSONS = sorted(FOLDER.glob("*.ipynb"))
 LIMIT, LIMIT_FOR_ALL = 30.0, 180.0  # s of one core, which a busy machine does not change: a lesson; all of them, both ways
 TOOK: dict[str, float] = {}  # what each run of a lesson took
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """The controller is compiled before a lesson is measured or compared: where it was not yet, that takes 20 s and is told."""
+    robot = fb.load("go2")
+    fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
 
 
 def ids(path: Path) -> str:
@@ -121,6 +130,14 @@ def test_an_exercise_has_no_answer_at_first_and_says_so(name: str) -> None:
     verdict = check(name, None)
     assert not verdict.right
     assert "no answer yet" in verdict.text
+
+
+def test_what_a_run_says_on_the_error_stream_is_not_stored(tmp_path: Path) -> None:
+    lesson = tmp_path / "lesson.ipynb"
+    spoken = 'import sys\nprint("of this run", file=sys.stderr)\nprint("of the lesson")'
+    nbformat.write(new_notebook(cells=[new_code_cell(spoken)]), lesson)
+    run(lesson)
+    assert [output["text"] for output in read(lesson).cells[0].outputs] == ["of the lesson\n"]
 
 
 def test_running_a_lesson_counts_no_try_of_a_learner(tmp_path: Path) -> None:

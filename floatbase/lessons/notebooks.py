@@ -64,8 +64,9 @@ def run(path: Path) -> None:
         if cell.cell_type != "code":
             continue
         cell.metadata.pop("execution", None)  # times of day
-        if "picture" in cell.metadata.get("tags", []):
-            cell.outputs = []
+        picture = "picture" in cell.metadata.get("tags", [])
+        # what went to the error stream is about this run, not the lesson
+        cell.outputs = [] if picture else [output for output in cell.outputs if output.get("name") != "stderr"]
     notebook.metadata.pop("widgets", None)
     nbformat.write(notebook, path)
 
