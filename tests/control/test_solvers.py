@@ -54,9 +54,7 @@ def test_the_unit_of_a_row_changes_its_multiplier_only(solver: str, row_scale: f
 def test_the_unit_of_an_equation_does_not_make_it_disappear(solver: str, equality_scale: float) -> None:
     """An equation in units of 1e-12 beside one in units of 1 must not count as one of rank 0."""
     small = corner(equality_scale=equality_scale)
-    qp = QP(
-        small.H, small.g, np.vstack([small.A, [0.0, 1.0, 0.0]]), np.append(small.b, 0.75), small.G, small.h
-    )
+    qp = QP(small.H, small.g, np.vstack([small.A, [0.0, 1.0, 0.0]]), np.append(small.b, 0.75), small.G, small.h)
     assert qp.equality_space.n_in == 1
     found = solve(qp, solver)
     assert np.allclose(found.x, [1.0, 0.75, 1.0], atol=1e-6)

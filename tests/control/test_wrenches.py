@@ -205,9 +205,7 @@ def test_limits_make_the_set_bounded_and_the_support_function_its_largest_wrench
     state, contacts = stance("go2", 4, 0.4)
     free, limited = wrench_set(state, contacts), wrench_set(state, contacts, max_normal_force=[50.0, 60.0, 70.0, 80.0])
     for direction in np.random.default_rng(0).normal(size=(20, 6)):
-        best = linprog(
-            -(direction @ limited.rays), np.kron(np.eye(4), np.ones(4)), limited.max_normal_force, bounds=(0, None)
-        )
+        best = linprog(-(direction @ limited.rays), np.kron(np.eye(4), np.ones(4)), limited.max_normal_force, bounds=(0, None))
         assert limited.support(direction) == pytest.approx(-best.fun, abs=1e-9)
         assert free.support(direction) == (0.0 if np.max(direction @ free.rays) <= 0 else np.inf)
         assert limited.contains(limited.rays @ best.x, tolerance=1e-5)
@@ -217,9 +215,7 @@ def test_limits_make_the_set_bounded_and_the_support_function_its_largest_wrench
 
 def test_some_limits_leave_some_directions_without_end() -> None:
     wrenches = of([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [UP, UP], limit=[10.0, np.inf])
-    assert wrenches.support([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]) == pytest.approx(
-        0.0
-    )  # a foot at x > 0 pitches forward: τ_y < 0
+    assert wrenches.support([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]) == pytest.approx(0.0)  # a foot at x > 0 pitches forward: τ_y < 0
     assert wrenches.support([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]) == np.inf
     assert wrenches.support([0.0, 0.0, 1.0, 0.0, 1.0, 0.0]) == pytest.approx(10.0)
 
@@ -238,9 +234,7 @@ def test_reach_is_where_membership_ends() -> None:
 
 def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight() -> None:
     """Without torque about a CoM at the height of the ground, only friction ends it."""
-    wrenches = of(
-        [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]], [UP] * 4, 0.5, 4, inside=False
-    )
+    wrenches = of([[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]], [UP] * 4, 0.5, 4, inside=False)
     carrying = [0.0, 0.0, 100.0, 0.0, 0.0, 0.0]
     assert wrenches.reach([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(50.0)
     assert wrenches.reach([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], carrying) == np.inf
@@ -255,9 +249,7 @@ def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight()
 
 @pytest.mark.parametrize("limit", [None, 90.0])
 @pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("talos", 2), ("talos", 1)])
-def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(
-    name: str, feet: int, limit: float | None
-) -> None:
+def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(name: str, feet: int, limit: float | None) -> None:
     state, contacts = stance(name, feet, 0.4)
     limit = None if limit is None else limit / 150.0 * state.robot.weight
     wrenches = wrench_set(state, contacts, max_normal_force=limit)
