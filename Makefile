@@ -66,7 +66,8 @@ $(VENV)/locked-$(KEY): environment.txt | python
 
 $(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 	@$(PIP) install -q --no-deps --no-build-isolation -e .
-	@$(BIN)/python -m floatbase compile
+	@echo "Compiling the controller, once."
+	@$(BIN)/python -m floatbase compile >/dev/null
 	@touch $@
 
 python:

@@ -27,7 +27,8 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
     try:
         array = read_only(value)
     except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers of shape {_shape_text(shape)}, not {value!r}.") from None
+        wanted = f"numbers of shape {_shape_text(shape)}" if shape else "a number"
+        raise InputError(f"{name} must be {wanted}, not {value!r}.") from None
     fits = array.ndim == len(shape) and all(want is None or have == want for have, want in zip(array.shape, shape, strict=True))
     if not fits:
         unit_text = f" ({unit})" if unit else ""

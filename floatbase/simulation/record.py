@@ -88,7 +88,8 @@ class Rollout:
         return read_only(np.linalg.norm(self.foot_positions - self.foot_positions[0], axis=2).max(axis=0))
 
     def __repr__(self) -> str:
-        return f"Rollout({self.robot.name}, {self.time[-1] if len(self) else 0.0:.3f} s, {self.outcome})"
+        span = f"{len(self)} rows to {self.time[-1]:.3f} s" if len(self) else "no row"
+        return f"Rollout({self.robot.name}, {span}, {self.outcome})"
 
 
 class Row(NamedTuple):
