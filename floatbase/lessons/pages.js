@@ -13,6 +13,8 @@ async function unpack(id) {
 }
 
 async function contents() {
+  if (!window.DecompressionStream) throw new Error("The 3-D pictures of this page are packed in a way that this browser is too " +
+    "old to open. Open it in a current one: Chrome or Edge from 80, Firefox from 113, Safari from 16.4.");
   const text = async (id) => new TextDecoder().decode(await unpack(id));
   const [code, inner, commands] = await Promise.all([text("viewer-code"), text("inner-page"), unpack("commands")]);
   return {code, inner, commands: parts(commands)};
@@ -86,7 +88,7 @@ window.addEventListener("message", ({source, data}) => {
 });
 
 const watch = new IntersectionObserver((entries) => {
-  for (const {target, isIntersecting} of entries) if (isIntersecting) show(target).catch((error) => say(target, String(error)));
+  for (const {target, isIntersecting} of entries) if (isIntersecting) show(target).catch((error) => say(target, error.message));
 }, {rootMargin: "300px 0px"});
 
 for (const place of places) {

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, checked, positive
+from floatbase.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -16,6 +20,8 @@ class View:
     azimuth: degrees around the vertical, 0 in front of the robot (+x), 90 at its left (+y). elevation: degrees above the
     ground. distance: 1 fills the picture with the robot. angle: vertical field of view, degrees. feet: fill it with the
     robot's feet instead. around: a point, m, world, and a radius, m, to fill it with instead of the robot.
+    Raises `InputError` for what no camera can do: an elevation beyond ±90, an angle that is not between 0 and 180, a distance
+    or a radius that is not above 0, and numbers that are not finite.
     """
 
     azimuth: float = 40.0
@@ -24,6 +30,31 @@ class View:
     angle: float = 32.0
     feet: bool = False
     around: tuple[tuple[float, float, float], float] | None = None
+
+    def __post_init__(self) -> None:
+        positive("distance of a View", self.distance)
+        for name in ("azimuth", "elevation"):
+            _check_degrees(name, getattr(self, name))
+        if abs(self.elevation) > 90.0:
+            raise InputError(f"elevation of a View is {self.elevation:g}; it must be from -90 (below) to 90 (above) degrees.")
+        if positive("angle of a View", self.angle, "degrees") >= 180.0:
+            raise InputError(f"angle of a View is {self.angle:g}; it must be below 180 degrees; 32 is usual.")
+        if self.around is not None:
+            _check_around(self.around)
+
+
+def _check_degrees(name: str, value: Any) -> None:
+    if not isinstance(value, Real) or not math.isfinite(value):
+        raise InputError(f"{name} of a View is {value!r}; it must be a finite number, in degrees.")
+
+
+def _check_around(around: Any) -> None:
+    try:
+        point, radius = around
+    except (TypeError, ValueError):
+        raise InputError(f"around of a View is {around!r}; it must be a point and a radius, as ((0, 0, 0.3), 0.5).") from None
+    checked("point in around of a View", point, (3,), "m")
+    positive("radius in around of a View", radius, "m")
 
 
 PRESETS = {

@@ -36,8 +36,12 @@ class Canvas:
         """Send settings of the page, as background, camera and title, but those that are so already."""
         fresh = [(key, command) for key, command in updates if self._settings.get(key) != command]
         if fresh:
-            self.window.put(fresh)
-            self._settings.update(fresh)
+            self.set_again(*fresh)
+
+    def set_again(self, *updates: wire.Update) -> None:
+        """Send settings of the page, also those that are so already: the reader may have changed them there."""
+        self.window.put(updates)
+        self._settings.update(updates)
 
 
 def _changes(path: str, old: Item | None, new: Item) -> list[wire.Update]:

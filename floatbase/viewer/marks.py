@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -12,8 +13,10 @@ from floatbase._arrays import checked, positive
 from floatbase.viewer import geometry, three
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.ground import LEVEL, Plane
-from floatbase.viewer.shapes import Item, Picture, arrow, directed, flat_polygon, label, placed
+from floatbase.viewer.shapes import ARROW, Item, Picture, arrow, arrow_width, directed, flat_polygon, label, placed
 from floatbase.viewer.three import Shape
+
+OUTLINE = 0.6  # how wide a push's outline is, over the radius of its shaft
 
 
 def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike, size: float, colour: RGB = COM) -> Picture:
@@ -36,9 +39,16 @@ def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = C
     return Item(_unit_curl(colour), placed(position, geometry.frame_along(moment / radius), radius))
 
 
-def push(position: npt.ArrayLike, vector: npt.ArrayLike, size: float, colour: RGB = PUSH) -> Item:
-    """A push: an arrow that ends at `position`, where it acts, as long as `vector`, m, world; seen through the robot."""
-    return arrow(np.asarray(position) - np.asarray(vector), vector, colour, size, through=True)
+def push(
+    position: npt.ArrayLike, vector: npt.ArrayLike, size: float, colour: RGB = PUSH, outline: RGB = (1.0, 1.0, 1.0)
+) -> Item:
+    """A push: an arrow that ends at `position`, where it acts, as long as `vector`, m, world; seen through the robot, with an
+    outline, so that it stands out from a robot of its own colour."""
+    vector, length = directed("an arrow", vector)
+    width = arrow_width(length, size)
+    rotation = geometry.frame_along(vector / length)
+    shape = _outlined_arrow(colour, outline, max(round(2.0 * length / width), 1))
+    return Item(shape, placed(np.asarray(position) - vector, rotation, (width / 2, width / 2, length)))
 
 
 def support_region(positions: npt.ArrayLike, lift: float, ground: Plane = LEVEL) -> Picture:
@@ -77,6 +87,23 @@ def _unit_curl(colour: RGB) -> Shape:
     along = np.array([-at[1], at[0], 0.0])
     turned = head @ geometry.frame_along(along).T + at
     return three.mesh(*geometry.merged([ring, (turned, faces)]), colour)
+
+
+@lru_cache(maxsize=64)
+def _outlined_arrow(colour: RGB, outline: RGB, slender: int) -> Shape:
+    """The unit arrow, drawn over a wider one. slender: its length over its shaft's radius, which the outline's ends need.
+
+    One mesh seen through all is painted in the order of its faces, so the outline comes first.
+    """
+    (_, _), (shaft, _), (_, neck), (head, _), (_, tip) = ARROW
+    opening = head / (slender * (tip - neck))  # of the head, as it is drawn
+    back = OUTLINE / slender
+    top = tip + OUTLINE * math.hypot(1.0, 1.0 / opening) / slender
+    wide, low = shaft + OUTLINE, neck - back
+    around = geometry.revolved([(0.0, -back), (wide, -back), (wide, low), (opening * slender * (top - low), low), (0.0, top)])
+    parts = [around, geometry.revolved(ARROW)]
+    colours = [np.tile(np.round(255 * np.array(c)), (len(p), 1)) for c, (p, _) in zip((outline, colour), parts, strict=True)]
+    return three.mesh(*geometry.merged(parts), colours=np.vstack(colours), lit=False, through=True)
 
 
 @lru_cache(maxsize=1)

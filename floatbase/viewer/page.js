@@ -26,6 +26,28 @@ function startViewer() {
   return viewer;
 }
 
+// Words in the middle of the page, for when there is no picture.
+function say(words) {
+  part("notice").textContent = words;
+  part("notice").style.display = "block";
+}
+
+const NO_WEBGL = "This 3-D picture needs WebGL, which this browser does not have or has switched off. Switch on hardware " +
+  "acceleration in the browser's settings and restart it, or open the page in another browser.";
+const NO_UNPACKING = "This page is packed in a way that this browser is too old to open. Open it in a current one: Chrome or " +
+  "Edge from 80, Firefox from 113, Safari from 16.4.";
+
+// The viewer, or null and words in the page where the browser cannot draw.
+function viewerOrWords() {
+  try {
+    return startViewer();
+  } catch (error) {
+    if (!String(error).includes("WebGL")) throw error;
+    say(NO_WEBGL);
+    return null;
+  }
+}
+
 function legendLine([colour, text]) {
   const line = document.createElement("div"), spot = document.createElement("i");
   spot.style.background = colour;
@@ -50,7 +72,7 @@ function startCamera(viewer) {
         viewer.camera.position.add(step);
         viewer.controls.target.add(step);
       }
-      last = now;
+      last = now || last;  // a robot that is taken away and drawn again elsewhere is followed there
     }
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
     if (room && !viewer.gui.closed) viewer.camera.setViewOffset(w, h, viewer.gui.width / 2, 0, w, h);
@@ -171,10 +193,12 @@ function startRest(viewer) {
 
 // Call start() once, when the page is first seen, and look after its context from then on.
 function startWhenSeen(start) {
-  let rest = null;
+  let rest = null, blind = false;
   onSight((seen) => {
-    if (rest === null && seen) {
-      window.viewer = startViewer();
+    if (rest === null && seen && !blind) {
+      window.viewer = viewerOrWords();
+      blind = viewer === null;
+      if (blind) return;
       rest = startRest(viewer);
       start(rest);
     }
@@ -220,6 +244,7 @@ async function unpack(id) {
 }
 
 async function open() {
+  if (!window.DecompressionStream) return say(NO_UNPACKING);
   load(new TextDecoder().decode(await unpack("viewer-code")));
   const scene = await unpack("scene");
   startWhenSeen(() => draw(scene));

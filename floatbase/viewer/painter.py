@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -50,7 +50,8 @@ class Painter:
     """Draws a robot.
 
     scale: m drawn for a newton; None for one that fits the robot. facets, inside: of the friction polyhedra; None for round
-    cones. ground: None for the one that the contacts stand on. lines, text: colours of the ground's lines and of text.
+    cones. ground: None for the one that the contacts stand on. lines, text, paper: colours of the ground's lines, of text and
+    of what is behind them.
     """
 
     robot: Robot
@@ -60,6 +61,7 @@ class Painter:
     ground: Plane | None
     lines: RGB
     text: RGB
+    paper: RGB
 
     def picture(
         self,
@@ -77,17 +79,20 @@ class Painter:
         frames: Sequence[str] = (),
         labels: bool = False,
         extra: Mapping[str, Item] | None = None,
+        lifted: Collection[str] = (),
     ) -> Picture:
-        """Everything that was asked for, as path -> item; the arguments are those of `Viewer.show`."""
+        """Everything that was asked for, as path -> item; the arguments are those of `Viewer.show`, and lifted: names of
+        contacts that do not stand just now, which have no patch, no cone and no part in the support region."""
         self._check_state(state)
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
         picture = {"ground": ground.lines(self.lines)} | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
-            picture |= self._contacts(contacts, positions, both, cones)
+            stands = [contact.name not in lifted for contact in contacts for _ in contact.point_names]
+            picture |= self._contacts(contacts, positions, both, cones, stands)
             if support:
-                picture |= below("support", marks.support_region(positions, 0.004 * self.size, ground))
+                picture |= below("support", marks.support_region(positions[stands], 0.004 * self.size, ground))
             if labels:
                 picture |= self._labels(state, contacts, positions)
         if com:
@@ -184,15 +189,16 @@ class Painter:
         poses = state.joint_transforms
         return {f"{root}/{name}": Item(look, poses[joint]) for (joint, name), look in zip(self._paths, looks, strict=True)}
 
-    def _contacts(self, contacts: Contacts, positions: Array, forces: Forces, cones: bool) -> Picture:
-        """Patches, cones and forces at every point."""
+    def _contacts(self, contacts: Contacts, positions: Array, forces: Forces, cones: bool, stands: list[bool]) -> Picture:
+        """Forces at every point, and patches and cones at those that stand."""
         picture: Picture = {}
         height = self.cone_height(contacts)
         rows = zip(contacts.point_names, positions, contacts.normals, contacts.mus, strict=True)
         for i, (name, position, normal, mu) in enumerate(rows):
             at = plain(name)
-            picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
-            if cones:
+            if stands[i]:
+                picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
+            if cones and stands[i]:
                 force = None if forces.judged is None else forces.judged[i]
                 picture |= below(f"cone/{at}", self._cone(position, normal, float(mu), height, force))
             for kind, vectors, colour in forces.kinds:
@@ -239,7 +245,7 @@ class Painter:
         if self._is_quiet(force):
             return {}
         at = state.frame_pose(frame).translation
-        return {"push": marks.push(at, self.scale * force, self.size, self.text)}
+        return {"push": marks.push(at, self.scale * force, self.size, self.text, self.paper)}
 
     @cached_property
     def _patch_radius(self) -> float:

@@ -78,6 +78,11 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
     return None
 
 
+def lifted_at(rollout: Rollout, row: int) -> frozenset[str]:
+    """Names of the record's contacts that the controller's stance does not have at a row: feet that swing."""
+    return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
+
+
 def _courses(pictures: list[Picture]) -> dict[str, _Course]:
     """Every item's course; a path that shows several shapes in turn becomes several items."""
     seen: dict[str, dict[int, Item]] = {}

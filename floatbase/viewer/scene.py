@@ -75,8 +75,8 @@ class Viewer:
         self.robot, self.background = robot, background
         self.height = int(positive("height", height, "pixels"))
         asked = None if scale is None else positive("scale", scale, "m/N")
-        lines, text = BACKGROUNDS[background][2:]
-        self.painter = Painter(robot, asked, facets, inside, _plane(ground), lines, text)
+        paper, _, lines, text = BACKGROUNDS[background]
+        self.painter = Painter(robot, asked, facets, inside, _plane(ground), lines, text, paper)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
         self._moving = False
@@ -133,7 +133,7 @@ class Viewer:
         self.draw(picture, title, ghost_name)
         if self._last is None:
             self._last = state
-            self.camera()
+            self.canvas.set(*self._looking(View(), follow=False))
         self._last = state
         return self
 
@@ -163,9 +163,11 @@ class Viewer:
     ) -> Viewer:
         """Play a record in the page, over and over, with a slider to seek and a choice of speeds; this call returns at once.
 
+        A contact that the controller's stance does not have just then has no cone; what the physics measures there is drawn.
         speed: 1 for real time, 0.25 for slow motion. rate: pictures a second of the record. planned: the planned forces
         too. com, cones, support, ghost, ghost_name: as for `show`. follow: the camera goes with the robot. paused: wait for
-        the reader to press play. Raises `InputError` for a record of another robot or without rows.
+        the reader to press play. A page whose view the reader has turned is left so when a record is played again.
+        Raises `InputError` for a record of another robot or without rows.
         """
         if rollout.robot.name != self.robot.name:
             raise InputError(f"this viewer shows {self.robot.name}, but the record is one of {rollout.robot.name}.")
@@ -179,12 +181,14 @@ class Viewer:
                 rollout.measured[i],
                 rollout.planned[i] if planned and np.isfinite(rollout.planned[i]).all() else None,
                 com=com, cones=cones, support=support, ghost=ghost, push=recording.push_at(rollout, i),
+                lifted=recording.lifted_at(rollout, i),
             )
             for i in rows
         ]  # fmt: skip
         self.play_pictures(rollout.time[rows], pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name)
         self._last = State(self.robot, rollout.q[rows[0]], rollout.v[rows[0]])
-        return self.camera(follow=follow)
+        self.canvas.set(*self._looking(View(), follow))
+        return self
 
     def play_pictures(
         self, times: npt.ArrayLike, pictures: Sequence[Picture], *, speed: float = 1.0, paused: bool = False,
@@ -201,20 +205,25 @@ class Viewer:
     def camera(self, view: str | View = "default", follow: bool = False) -> Viewer:
         """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`.
 
-        follow: go with the robot when it walks away.
+        follow: go with the robot when it walks away. Every call moves the pages there, also those whose view the reader has
+        turned: what is called at every move of a slider should leave the camera alone. Raises `InputError` for another name.
         """
-        if isinstance(view, str):
-            if view not in PRESETS:
-                raise InputError(f"camera view is {view!r}; it must be one of {', '.join(PRESETS)}, or a View.")
+        if isinstance(view, str) and view in PRESETS:
             view = PRESETS[view]
+        if not isinstance(view, View):
+            raise InputError(f"camera view is {view!r}; it must be one of {', '.join(PRESETS)}, or a View.")
+        self.canvas.set_again(*self._looking(view, follow))
+        return self
+
+    def _looking(self, view: View, follow: bool) -> tuple[wire.Update, wire.Update]:
+        """The page's settings for a view of the robot where it is now."""
         low, high = self.painter.feet_box if view.feet else self.painter.box
         moved = np.zeros(3)
         if self._last is not None:
             moved[:2] = self._last.com[:2] - self.painter.home.com[:2]
         target, eye = eye_and_target(view, low + moved, high + moved)
         base = f"{ROOT}robot/{self.robot.model.names[1]}" if follow and self.robot.is_floating else ""
-        self.canvas.set(wire.set_camera(eye, target, view.angle), wire.page_command("set_follow", node=base))
-        return self
+        return wire.set_camera(eye, target, view.angle), wire.page_command("set_follow", node=base)
 
     def save(self, path: str | Path, title: str | None = None) -> Path:
         """Write the scene, still or moving, as one HTML file that needs neither server nor network; return its path.

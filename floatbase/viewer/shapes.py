@@ -23,6 +23,7 @@ from floatbase.viewer.three import Shape
 FACET_ALPHA = 0.75
 ARROW_SLENDERNESS = 0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
 ARROW_LENGTH = 0.2  # m
+ARROW = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.78), (2.1, 0.78), (0.0, 1.0))  # (radius, height), 1 long, its shaft of radius 1
 
 
 class Item(NamedTuple):
@@ -68,19 +69,21 @@ def directed(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
     return array, length
 
 
-def arrow(
-    start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False, through: bool = False
-) -> Item:
+def arrow(start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False) -> Item:
     """An arrow from `start` along `vector`, as long as the vector, both in m, world.
 
     size: of the robot, m; the shaft is wide enough to be seen beside it, and wider the longer the arrow, by the square root.
-    halo: wider and translucent, so that it shows around another arrow at the same place. through: seen through the robot.
+    halo: wider and translucent, so that it shows around another arrow at the same place.
     """
     vector, length = directed("an arrow", vector)
-    reference = ARROW_LENGTH * size
-    width = min(ARROW_SLENDERNESS * math.sqrt(length * reference), 0.35 * length) * (1.8 if halo else 1.0)
+    width = arrow_width(length, size) * (1.8 if halo else 1.0)
     rotation = geometry.frame_along(vector / length)
-    return Item(_unit_arrow(colour, 0.6 if halo else 1.0, through), placed(start, rotation, (width / 2, width / 2, length)))
+    return Item(_unit_arrow(colour, 0.6 if halo else 1.0), placed(start, rotation, (width / 2, width / 2, length)))
+
+
+def arrow_width(length: float, size: float) -> float:
+    """Width of the shaft of an arrow so long, m, beside a robot of this size, m."""
+    return min(ARROW_SLENDERNESS * math.sqrt(length * ARROW_LENGTH * size), 0.35 * length)
 
 
 def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str) -> Item:
@@ -185,10 +188,9 @@ def _surface_frame_of(x: float, y: float, z: float) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _unit_arrow(colour: RGB, opacity: float, through: bool) -> Shape:
-    """Along z, 1 long, its shaft of radius 1."""
-    profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.78), (2.1, 0.78), (0.0, 1.0)]
-    return three.mesh(*geometry.revolved(profile), colour, opacity=opacity, through=through)
+def _unit_arrow(colour: RGB, opacity: float) -> Shape:
+    """Along z."""
+    return three.mesh(*geometry.revolved(ARROW), colour, opacity=opacity)
 
 
 @lru_cache(maxsize=64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,76 @@ def test_pushes_and_frames_are_seen_through_the_robot_and_its_ghost(page, viewer
             seen.append(dark_pixels(after - before, after) if name == "push" else hue_pixels(after, X_AXIS))
     assert seen[0] > 200 and seen[2] > 0.9 * seen[0]
     assert seen[1] > 50 and seen[3] > 0.9 * seen[1]
+
+
+def test_the_camera_moves_when_it_is_called_and_not_when_a_picture_is_drawn(page, viewer: Viewer, standing: State) -> None:
+    eye = "viewer.camera.position.toArray()"
+
+    def told(title: str) -> list[float]:
+        """Where the page looks from once it has the title."""
+        viewer.show(standing, title=title)
+        page.wait_for_function(f"document.querySelector('#title').textContent == '{title}' && !viewer.needs_render")
+        return page.evaluate(eye)
+
+    viewer.show(standing).camera("front")
+    page.goto(viewer.url)
+    settle(page, viewer)
+    front = page.evaluate(eye)
+    page.mouse.move(450, 200)
+    page.mouse.down()
+    page.mouse.move(600, 260, steps=4)
+    page.mouse.up()
+    turned = page.evaluate(eye)
+    assert np.linalg.norm(np.subtract(turned, front)) > 0.3
+    np.testing.assert_allclose(told("turned by the reader"), turned, atol=1e-6)
+    viewer.camera("front")
+    np.testing.assert_allclose(told("front again"), front, atol=1e-6)
+    viewer.camera("left")
+    left = told("left")
+    page.reload()
+    settle(page, viewer)
+    np.testing.assert_allclose(page.evaluate(eye), left, atol=1e-6)
+
+
+NO_WEBGL = """const get = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  return kind.includes("webgl") ? null : get.call(this, kind, ...more);
+};"""
+
+
+@pytest.mark.parametrize("kind", ["live", "file"])
+def test_a_page_without_webgl_says_so(page, viewer: Viewer, standing: State, tmp_path: Path, kind: str) -> None:
+    viewer.show(standing)
+    page.add_init_script(NO_WEBGL)
+    page.goto(viewer.url if kind == "live" else viewer.save(tmp_path / "scene.html").as_uri())
+    page.wait_for_function("getComputedStyle(document.getElementById('notice')).display == 'block'")
+    assert "needs WebGL" in page.inner_text("#notice") and "Switch on hardware acceleration" in page.inner_text("#notice")
+    picture(page, f"no_webgl_{kind}")
+
+
+def test_a_file_that_the_browser_cannot_unpack_says_so(page, viewer: Viewer, standing: State, tmp_path: Path) -> None:
+    viewer.show(standing)
+    page.add_init_script("delete window.DecompressionStream")
+    page.goto(viewer.save(tmp_path / "scene.html").as_uri())
+    page.wait_for_function("getComputedStyle(document.getElementById('notice')).display == 'block'")
+    assert "too old to open" in page.inner_text("#notice") and "Firefox from 113" in page.inner_text("#notice")
+    picture(page, "no_unpacking")
+
+
+@pytest.mark.parametrize("background", ["light", "dark"])
+def test_a_push_on_a_robot_of_its_own_colour_has_an_outline(page, background: str) -> None:
+    robot = load("go2" if background == "dark" else "solo12")
+    viewer = Viewer(robot, background=background)
+    page.goto(viewer.url)
+    shots = []
+    for title, push in (("no push", None), ("push", ("base", [0.0, 0.5 * robot.weight, 0.0]))):
+        viewer.show(robot.standing(), com=False, push=push, title=title)
+        page.wait_for_function(f"document.querySelector('#title').textContent == '{title}' && !viewer.needs_render")
+        shots.append(picture(page, f"{title}_on_{background}".replace(" ", "_")))
+    viewer.close()
+    before, after = (shot[60:330].mean(axis=2) for shot in shots)
+    assert np.sum((after > 220) & (after - before > 60)) > 100  # what is light in it
+    assert np.sum((after < 70) & (before - after > 60)) > 100  # what is dark
 
 
 def dark_pixels(change: np.ndarray, image: np.ndarray) -> int:

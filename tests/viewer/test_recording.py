@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import time
 from pathlib import Path
@@ -97,6 +98,22 @@ def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hid
     np.testing.assert_array_equal(visible[:, 0], times <= 1.5)
     times, pushed = moving["push", ".visible"]
     np.testing.assert_array_equal(pushed[:, 0], (times >= 0.3 - 1e-6) & (times < 0.5 - 1e-6))
+
+
+def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer: Viewer, go2: Robot) -> None:
+    rollout = record(go2)
+    swings = (rollout.time > 0.4) & (rollout.time < 1.0)
+    stance = rollout.contacts.without("FL_foot")
+    walking = dataclasses.replace(rollout, stances=tuple(stance if away else rollout.contacts for away in swings))
+    viewer.play(walking, support=True)
+    moving = tracks(viewer)
+    for part in ("cone/FL_foot/surface", "patch/FL_foot"):
+        times, visible = moving[part, ".visible"]
+        np.testing.assert_array_equal(visible[:, 0], (times < 0.4 + 1e-6) | (times > 1.0 - 1e-6))
+    assert not {("cone/FR_foot/surface", ".visible"), ("measured/FL_foot", ".visible")} & set(moving)
+    regions = [item for path, item in viewer.canvas.picture.items() if path.startswith("support")]
+    points = [item.shape.lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data for item in regions]
+    assert {3, 4} <= {len(numbers) // 6 for numbers in points}
 
 
 def test_quaternions_do_not_jump(go2: Robot, viewer: Viewer) -> None:

@@ -13,7 +13,7 @@ from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, load, robots
 from floatbase.simulation.physics import Ground, Simulation
-from floatbase.viewer.camera import PRESETS
+from floatbase.viewer.camera import PRESETS, View
 from floatbase.viewer.colours import ALARM, BACKGROUNDS, CALM, IDLE, MEASURED, PLANNED, WARNING
 from floatbase.viewer.scene import Viewer
 from floatbase.viewer.three import code
@@ -298,11 +298,46 @@ def test_the_legend_names_what_is_in_the_picture_and_nothing_else(
 def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing: State, background: str) -> None:
     view = Viewer(go2, background=background)
     view.show(standing, push=("base", [0.0, 30.0, 0.0]))
-    look = material(view, "/meshcat/push")
-    assert look["depthTest"] is False
-    assert (look["color"] == code(BACKGROUNDS["dark"][3])) == (background == "dark")
-    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [f"#{look['color']:06X}", "push"]
+    assert material(view, "/meshcat/push")["depthTest"] is False
+    text = f"#{code(BACKGROUNDS[background][3]):06X}"
+    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [text, "push"]
     view.close()
+
+
+def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(viewer: Viewer, go2: Robot, standing: State) -> None:
+    def looked() -> int:
+        return viewer.window.scene.since(0)[0]
+
+    viewer.show(standing)
+    for view in ("front", "front", View(30.0), View(30.0)):
+        before = looked()
+        viewer.camera(view)
+        assert looked() == before + 2  # where from, and whether it follows
+    before = looked()
+    viewer.show(standing)
+    assert looked() == before
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"angle": 0.0}, "angle of a View is 0; it must be > 0 degrees"),
+        ({"angle": 180.0}, "angle of a View is 180; it must be below 180 degrees"),
+        ({"angle": np.nan}, "angle of a View is nan; it must be > 0"),
+        ({"azimuth": np.nan}, "azimuth of a View is nan; it must be a finite number, in degrees"),
+        ({"azimuth": "front"}, "azimuth of a View is 'front'; it must be a finite number"),
+        ({"elevation": None}, "elevation of a View is None; it must be a finite number"),
+        ({"elevation": 91.0}, "elevation of a View is 91; it must be from -90 .below. to 90"),
+        ({"distance": 0.0}, "distance of a View is 0; it must be > 0"),
+        ({"around": (0.0, 0.0, 0.3)}, r"around of a View is .*; it must be a point and a radius, as"),
+        ({"around": ((0.0, 0.0), 0.3)}, r"point in around of a View has shape \(2,\)"),
+        ({"around": ((0.0, 0.0, np.inf), 0.3)}, "point in around of a View holds inf"),
+        ({"around": ((0.0, 0.0, 0.3), 0.0)}, "radius in around of a View is 0; it must be > 0 m"),
+    ],
+)
+def test_what_no_camera_can_do_is_explained(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        View(**values)
 
 
 def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
@@ -373,6 +408,7 @@ def test_wrong_input_is_explained(viewer: Viewer, go2: Robot, standing: State, c
         ),
         (lambda: viewer.show(standing, contacts, planned=np.full(12, np.nan)), r"planned holds nan at index \[0, 0\]"),
         (lambda: viewer.camera("above"), "camera view is 'above'; it must be one of default, front"),
+        (lambda: viewer.camera(90.0), "camera view is 90.0; it must be one of default, .* or a View"),  # type: ignore[arg-type]
         (lambda: Viewer("go2"), "Viewer needs a Robot, as in fb.Viewer"),
         (lambda: Viewer(go2, background="pink"), "background is 'pink'; it must be one of white, light, dark"),
         (lambda: Viewer(go2, ground=[1, 0, 0]), "the normal of the ground must point up"),

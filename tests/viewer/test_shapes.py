@@ -172,6 +172,32 @@ def test_the_colour_code_is_readable_for_the_colour_blind(name: str) -> None:
         assert np.linalg.norm(difference) > 0.2
 
 
+@pytest.mark.parametrize("background", BACKGROUNDS)
+@pytest.mark.parametrize("name", DEFICIENCIES)
+def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_the_push(name: str, background: str) -> None:
+    paper, text = BACKGROUNDS[background][0], BACKGROUNDS[background][3]
+    outlined = marks.push([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 1.0, text, paper).shape.lowered
+    data = outlined["geometries"][0]["data"]["attributes"]["color"]["array"].data
+    first, *_, last = np.frombuffer(data, np.uint8).reshape(-1, 3) / 255  # painted in this order
+    for have, wanted in ((first, paper), (last, text)):
+        np.testing.assert_allclose(have, wanted, atol=1e-2)
+    assert np.linalg.norm(_simulated(tuple(first), DEFICIENCIES[name]) - _simulated(tuple(last), DEFICIENCIES[name])) > 0.8
+
+
+def test_a_pushs_outline_is_as_wide_at_its_ends_as_along_it() -> None:
+    for vector in ([0.02, 0.0, 0.0], [0.3, 0.0, 0.0], [1.5, 0.0, 0.0]):
+        item = marks.push([0.0, 0.0, 0.0], vector, 1.0)
+        attributes = item.shape.lowered["geometries"][0]["data"]["attributes"]
+        unit = np.frombuffer(attributes["position"]["array"].data, "<i2").reshape(-1, 3)
+        points = unit * item.shape.lowered["object"]["matrix"][0] @ item.matrix[:3, :3].T  # m, seen from where it begins
+        colours = np.frombuffer(attributes["color"]["array"].data, np.uint8).reshape(-1, 3)
+        outline, arrow = points[colours[:, 0] == 255], points[colours[:, 0] < 255]
+        radius = np.linalg.norm(item.matrix[:3, 0])
+        back = arrow[:, 0].min() - outline[:, 0].min()
+        assert back == pytest.approx(marks.OUTLINE * radius, rel=0.1)
+        assert outline[:, 0].max() > arrow[:, 0].max() + 0.9 * back
+
+
 def test_every_background_has_readable_text() -> None:
     for top, bottom, _, text in BACKGROUNDS.values():
         assert min(abs(np.mean(top) - np.mean(text)), abs(np.mean(bottom) - np.mean(text))) > 0.5
