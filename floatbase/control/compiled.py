@@ -37,7 +37,7 @@ _POSE = 12  # numbers of a pose: rotation column by column, then the place
 
 
 @contextmanager
-def told_when_slow(text: str, after: float = 3.0) -> Iterator[None]:
+def told_when_slow(text: str, after: float = 6.0) -> Iterator[None]:
     """Say on the error stream why it takes so long when the work inside takes more than `after` s."""
     timer = Timer(after, lambda: print(text, file=sys.stderr, flush=True))
     timer.daemon = True

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -38,7 +39,8 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     assert "ur5 at http://127.0.0.1" in process.stdout.readline()
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)
-    assert (process.returncode, errors) == (0, "")
+    compiled = "floatbase compiles its controller, once: about 20 s.\n"  # where `make setup` did not
+    assert (process.returncode, errors.replace(compiled, "")) == (0, "")
 
 
 @pytest.fixture
@@ -89,14 +91,21 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
 
 
 def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
+    from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
+
     page.goto(playground.view.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     page.evaluate("viewer.gui_controllers['push towards [°]'].setValue(-90)")
     page.evaluate("viewer.gui_controllers['push [N]'].setValue(40)")
-    page.evaluate("viewer.gui_controllers['push'].fire()")
     drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
-    page.wait_for_function(f"{drawn}.children.length > 0")
-    arrow = page.evaluate(f"{drawn}.matrix.elements.slice(8, 11)")
+    arrow = None
+    for _ in range(8):  # the arrow stays for half a second, in which a busy machine may draw no frame
+        page.evaluate("viewer.gui_controllers['push'].fire()")
+        with suppress(PlaywrightTimeoutError):
+            seen = f"{drawn}.children.length > 0 && Array.from({drawn}.matrix.elements.slice(8, 11))"
+            arrow = page.wait_for_function(seen, timeout=4000).json_value()
+            break
+    assert arrow is not None
     np.testing.assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
     picture(page, "bare_page_pushed")
     page.wait_for_function(f"{drawn}.children.length == 0")
