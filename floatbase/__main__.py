@@ -16,7 +16,7 @@ import floatbase as fb
 from floatbase.errors import ViewerError
 from floatbase.objectives.tasks import Task
 from floatbase.robots.robot import Robot
-from floatbase.simulation.live import SEEN, Live
+from floatbase.simulation.live import SEEN, Live, advice
 from floatbase.viewer.recording import push_at
 
 PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller; all of them stand and are pushed
@@ -109,7 +109,6 @@ class Playground:
 
     def _push(self) -> None:
         angle = math.radians(self.towards)
-        self.run.start()
         self.run.push([self.force * math.cos(angle), self.force * math.sin(angle), 0.0], frame=self.pushed)
 
     def _pause(self) -> None:
@@ -139,7 +138,7 @@ class Playground:
 
     def _say(self, status: str) -> None:
         """Tell what stopped the run, if anything did, over the last picture."""
-        self.outcome = {"running": "", "paused": "paused"}.get(status, f"{status}: press reset")
+        self.outcome = "" if status == "running" else advice(status)
         with suppress(ViewerError):  # a window that is closed tells nobody anything
             self._draw()
 

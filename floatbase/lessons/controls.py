@@ -37,7 +37,7 @@ def slider_panel(
     for slider in sliders.values():
         slider.observe(moved, names="value")
     moved()
-    picture = widgets.HTML(layout=widgets.Layout(width="62%" if beside else "100%"))
+    picture = widgets.HTML(layout=widgets.Layout(width="62%" if beside else "auto"))
     top = [widgets.HBox([picture, note])] if beside else [picture, note]
     return _Panel(view, picture, [*top, *sliders.values()])
 

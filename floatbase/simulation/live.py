@@ -16,6 +16,11 @@ FRAME = 1.0 / 30.0  # s between pictures, about
 SEEN = 0.4  # s for which a slice still lists a push that is over: a tenth of a second is too short for the eye
 
 
+def advice(status: str) -> str:
+    """A status of `Live` as a line for who watches: what stopped the run, and what to do about it."""
+    return status if status in ("running", "paused") else f"{status}: press reset, or push again"
+
+
 class Live:
     """Runs `rollout` in slices of a 30th of a second in a thread of its own and hands each slice to `show`.
 
@@ -68,38 +73,25 @@ class Live:
 
     def start(self) -> None:
         """Run, or go on after a pause; a fallen robot is put back on its feet."""
-        with self._lock:
-            self._touch()
-            if self._status not in ("running", "paused"):
-                self._reset = True
-            if self._stop is None or self._stop.is_set():
-                self._stop = threading.Event()
-                self._thread = threading.Thread(
-                    target=self._loop, args=(self._stop, self._thread), name="floatbase-live", daemon=True
-                )
-                self._thread.start()
-            changed = self._become("running")
-        self._tell(changed)
+        self._go()
 
     def pause(self) -> None:
-        """Stop after the present slice; `start` goes on from there."""
+        """Stop after the present slice; `start` goes on from there. What has stopped already stays as it is."""
         with self._lock:
             self._halt()
-            changed = self._become("paused")
+            changed = self._status == "running" and self._become("paused")
         self._tell(changed)
 
     def reset(self) -> None:
-        """Put the robot back on its feet and run."""
-        with self._lock:
-            self._reset = True
-        self.start()
+        """Put the robot back on its feet and run; pushes asked for before are forgotten."""
+        self._go(anew=True)
 
     def push(self, force: npt.ArrayLike, duration: float = 0.1, frame: str = "base") -> None:
-        """Push now: force (3,) N, world, for `duration` s, at a frame of the robot."""
-        push = Push(force, 0.0, duration, frame)  # type: ignore[arg-type]
-        with self._lock:
-            self._touch()
-            self._asked.append(push)
+        """Push now: force (3,) N, world, for `duration` s, at a frame of the robot.
+
+        Starts the run where it stands still. A fallen robot is put back on its feet first: the push begins with it, at 0 s.
+        """
+        self._go(pushes=(Push(force, 0.0, duration, frame),))  # type: ignore[arg-type]
 
     def use(self, controller: Controller) -> None:
         """Go on under another controller from the next slice."""
@@ -119,6 +111,22 @@ class Live:
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(timeout=5.0)
+
+    def _go(self, anew: bool = False, pushes: tuple[Push, ...] = ()) -> None:
+        """Run with these pushes, on fresh feet where asked or needed: all in one step, so that no slice comes between."""
+        with self._lock:
+            self._touch()
+            if anew or self._status not in ("running", "paused"):
+                self._reset, self._asked = True, []
+            self._asked.extend(pushes)
+            if self._stop is None or self._stop.is_set():
+                self._stop = threading.Event()
+                self._thread = threading.Thread(
+                    target=self._loop, args=(self._stop, self._thread), name="floatbase-live", daemon=True
+                )
+                self._thread.start()
+            changed = self._become("running")
+        self._tell(changed)
 
     def _touch(self) -> None:
         self._touched = time.monotonic()
@@ -156,7 +164,6 @@ class Live:
         try:
             if reset:
                 self._start_anew()
-                asked = []
             record = rollout(self._sim, controller, self._frame, self._with(asked), self._period, self._actuators)
             if len(record):
                 self._show(record)
@@ -182,12 +189,14 @@ class Live:
         """Go on, or pause for what came out of a slice or because nobody looks."""
         with self._lock:
             changed = False
-            if stop.is_set():  # somebody paused meanwhile, and has said so
+            if self._reset:  # what came out is about a robot that is put back next
                 pass
+            elif outcome != "completed" and stop is not self._stop:  # paused and started again meanwhile
+                self._reset = True
             elif outcome != "completed":
                 stop.set()
                 changed = self._become(outcome)
-            elif time.monotonic() - self._touched > self._idle:
+            elif not stop.is_set() and time.monotonic() - self._touched > self._idle:
                 stop.set()
                 changed = self._become("paused")
         self._tell(changed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -54,8 +55,8 @@ def rollout(
     A controller that changes its stance shows the present one as `.contacts`. A fall, a divergence of the physics, a
     controller that finds no answer or torques that are no numbers end the rollout; the record up to there is returned and
     says so.
-    Raises `InputError` for a period or a duration that does not divide, a push that is none or moves nothing, and a
-    controller without `.tau`.
+    Raises `InputError` for a period or a duration that does not divide, a push that is none or moves nothing, a controller
+    that cannot be called as controller(q, v, t), and an answer without `.tau`.
     """
     _check(sim, controller, pushes)
     period = sim.timestep if control_period is None else control_period
@@ -100,6 +101,7 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
         raise InputError(f"rollout needs a Simulation first, as fb.Simulation(robot), not {sim!r}.")
     if not callable(controller):
         raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
+    _check_call(controller)
     robot = getattr(controller, "robot", sim.robot)
     if robot is not sim.robot:
         raise InputError(
@@ -111,6 +113,22 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
         if not isinstance(push, Push):
             raise InputError(f"pushes must hold fb.Push values; {push!r} is none.")
         sim.pushed_body(push)
+
+
+def _check_call(controller: Controller) -> None:
+    """A controller must take (q, v, t). What does not tell its parameters, as some that are not Python, is let pass."""
+    try:
+        signature = inspect.signature(controller)
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(None, None, 0.0)
+    except TypeError as error:
+        name = getattr(controller, "__name__", type(controller).__name__)
+        raise InputError(
+            f"rollout calls controller(q, v, t) with the time t, s; {name} takes {signature} ({error}). Let it take all "
+            f"three, as in lambda q, v, t: …"
+        ) from None
 
 
 class _NotFinite(InputError):
@@ -148,7 +166,11 @@ class _Run:
     def _desired(self, command: Any) -> Array:
         """The torques of a command, shape (d,)."""
         if not hasattr(command, "tau"):
-            raise InputError(f"a controller must answer with .tau (N·m), as fb.Command does; got {command!r}.")
+            d = self.sim.robot.d
+            raise InputError(
+                f"a controller must answer with .tau, shape ({d},), N·m, as fb.Command does; got {command!r}. Any object "
+                f"with .tau will do: types.SimpleNamespace(tau=…)."
+            )
         return self._finite("the controller's torques", command.tau)
 
     def _stance(self) -> Contacts:

@@ -88,7 +88,7 @@ def test_the_button_pushes_again_and_says_when_there_is_nothing_to_push_with(pan
 def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Panel) -> None:
     panel.towards.value = 60.0
     panel.force.value = 600.0
-    until(lambda: panel.line.value == "fell: press reset")
+    until(lambda: panel.line.value == "fell: press reset, or push again")
     panel.buttons["reset"].click()
     assert (panel.force.value, panel.towards.value, panel.line.value) == (0.0, 90.0, "running")
     until(lambda: panel.run._sim.time > 0.1 and panel.arrow is None)
@@ -96,4 +96,26 @@ def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Pa
     panel.buttons["pause"].click()
     assert panel.line.value == "paused"
     panel.buttons["run"].click()
+    assert panel.line.value == "running"
+
+
+def test_a_push_after_a_fall_always_pushes(panel: Panel) -> None:
+    told = "pushed with 600 N towards 60° for 0.1 s"
+    panel.towards.value = 60.0
+    panel.force.value = 600.0
+    for _ in range(6):
+        until(lambda: panel.line.value == "fell: press reset, or push again")
+        panel.push.click()
+        assert panel.line.value == told
+        assert panel.run.status == "running"
+
+
+def test_a_reset_shows_what_the_run_does_and_no_old_word(panel: Panel) -> None:
+    panel.force.value = 20.0
+    assert panel.line.value.startswith("pushed with")
+    panel.buttons["reset"].click()
+    assert panel.line.value == "running"
+    panel.push.click()
+    assert panel.line.value == "a push of 0 N: set how hard first"
+    panel.buttons["reset"].click()
     assert panel.line.value == "running"

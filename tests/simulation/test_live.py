@@ -73,12 +73,138 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slic
     until(lambda: len(slices) > 1)
 
 
-def test_pushes_asked_for_before_a_reset_are_forgotten(run: Live, slices: list[fb.Rollout]) -> None:
+class Held:
+    """Takes slices as `show`; while `hold` is set the run stands in the middle of one, and nothing is left to chance."""
+
+    def __init__(self) -> None:
+        self.slices: list[fb.Rollout] = []
+        self.go_on, self.inside = threading.Event(), threading.Event()
+        self.go_on.set()
+
+    def __call__(self, record: fb.Rollout) -> None:
+        self.slices.append(record)
+        self.inside.set()
+        assert self.go_on.wait(15.0)
+
+    def hold(self) -> None:
+        self.go_on.clear()
+        self.inside.clear()
+        assert self.inside.wait(15.0)
+
+
+@pytest.fixture
+def held() -> Held:
+    return Held()
+
+
+@pytest.fixture
+def held_run(held: Held) -> Iterator[Live]:
+    live = Live(fb.Simulation(ROBOT), CONTROLLER, held)
+    yield live
+    held.go_on.set()
+    live.close()
+
+
+def test_pushes_asked_for_before_a_reset_are_forgotten(held_run: Live, held: Held) -> None:
+    held_run.start()
+    held.hold()
     for _ in range(5):
-        run.push([0.0, 200.0, 0.0])
-    run.reset()
-    until(lambda: len(slices) > 3)
-    assert all(not s.pushes for s in slices[:3])
+        held_run.push([0.0, 200.0, 0.0])
+    held_run.reset()
+    count = len(held.slices)
+    held.go_on.set()
+    until(lambda: len(held.slices) > count + 3)
+    assert held.slices[count].time[0] == 0.0
+    assert all(not s.pushes for s in held.slices[count:])
+
+
+def test_a_push_asked_for_after_a_reset_that_is_still_to_come_acts(held_run: Live, held: Held) -> None:
+    held_run.start()
+    held.hold()
+    held_run.reset()
+    held_run.push([0.0, 30.0, 0.0])
+    count = len(held.slices)
+    held.go_on.set()
+    until(lambda: len(held.slices) > count)
+    assert [(p.start, p.force[1]) for p in held.slices[count].pushes] == [(0.0, 30.0)]
+
+
+HARD = ([0.0, 500.0, -200.0], 0.3)  # N, s: a push that no controller stands
+
+
+def test_the_same_push_after_a_fall_has_the_same_result_every_time(run: Live, slices: list[fb.Rollout]) -> None:
+    falls = []
+    for _ in range(25):
+        count = len(slices)
+        run.push(*HARD)
+        until(lambda: run.status != "running")
+        run.close()
+        assert run.status == "fell"
+        falls.append(slices[count:])
+    for fall in falls:
+        assert fall[0].time[0] == 0.0
+        assert [(p.start, *p.force) for p in fall[0].pushes] == [(0.0, *HARD[0])]
+        assert fall[-1].time[-1] == falls[0][-1].time[-1]
+        np.testing.assert_allclose(fall[-1].final.q, falls[0][-1].final.q, atol=1e-9)
+
+
+def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(
+    run: Live, slices: list[fb.Rollout], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run.push(*HARD)
+    until(lambda: run.status == "fell")
+    run.close()
+    work = run._slice
+
+    def late(stop: threading.Event) -> None:
+        time.sleep(0.05)
+        work(stop)
+
+    monkeypatch.setattr(run, "_slice", late)
+    count = len(slices)
+    run.start()  # resets; the push comes before the thread has done so
+    run.push([0.0, 30.0, 0.0])
+    until(lambda: len(slices) > count)
+    assert [p.force[1] for p in slices[count].pushes] == [30.0]
+
+
+def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(held_run: Live, held: Held) -> None:
+    def fall() -> None:
+        held_run.push(*HARD)
+        until(lambda: held_run._sim.fallen)
+        assert held.inside.wait(15.0)
+
+    def hold_at_the_fall(record: fb.Rollout) -> None:
+        held.slices.append(record)
+        if record.outcome == "fell":
+            held.inside.set()
+            assert held.go_on.wait(15.0)
+
+    held_run._show = hold_at_the_fall
+    held.go_on.clear()
+    fall()
+    held_run.reset()
+    count = len(held.slices)
+    held.go_on.set()
+    until(lambda: len(held.slices) > count)
+    assert (held_run.status, held.slices[count].time[0]) == ("running", 0.0)
+
+    held.go_on.clear()
+    held.inside.clear()
+    fall()
+    held_run.pause()
+    held.go_on.set()
+    until(lambda: held_run.status == "fell")
+
+    held.go_on.clear()
+    held.inside.clear()
+    fall()
+    held_run.pause()
+    held_run.start()
+    count = len(held.slices)
+    held.go_on.set()
+    until(lambda: len(held.slices) > count)
+    assert (held_run.status, held.slices[count].time[0]) == ("running", 0.0)
 
 
 def threads() -> list[threading.Thread]:

@@ -71,7 +71,17 @@ def limp(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
             "a push at 'base' moves nothing: ur5 is bolted to the ground there. Push a link that moves: shoulder_link, ",
         ),
         (lambda: fb.rollout(SIM, limp, 1.0, [3]), InputError, r"pushes must hold fb\.Push values; 3 is none"),
-        (lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0), InputError, r"must answer with \.tau .* got None"),
+        (
+            lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0),
+            InputError,
+            r"must answer with \.tau, shape \(12,\), N·m, .* got None\. .* will do: types\.SimpleNamespace\(tau=…\)",
+        ),
+        (
+            lambda: fb.rollout(SIM, lambda q, v: None, 1.0),
+            InputError,
+            r"calls controller\(q, v, t\) .* <lambda> takes \(q, v\) \(too many positional arguments\)",
+        ),
+        (lambda: fb.rollout(SIM, lambda q, v, t, gain: None, 1.0), InputError, "missing a required argument: 'gain'"),
         (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), UnknownNameError, "'bse'; near names: base"),
     ],
 )
