@@ -30,6 +30,10 @@ FIRST := /lab/tree/my/00_start_here.ipynb
 # which tabs were open is kept with this copy of the course, so that tabs of another copy do not open here
 TABS := $(CURDIR)/$(VENV)/workspaces
 
+# how often JupyterLab saves, s; its own is every two minutes
+SAVING := {"@jupyterlab/docmanager-extension:plugin": {"autosaveInterval": 30}}
+SETTINGS := $(VENV)/share/jupyter/lab/settings
+
 help:
 	@echo "make lab     open the course in JupyterLab"
 	@echo "make test    run ruff, mypy, the tests and the notebooks"
@@ -42,6 +46,7 @@ help:
 
 lab: setup
 	@$(BIN)/python -m floatbase.lessons.workspace
+	@mkdir -p $(SETTINGS) && echo '$(SAVING)' > $(SETTINGS)/overrides.json
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
 		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 

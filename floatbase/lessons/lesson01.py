@@ -247,7 +247,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> widg
     """go2 in space with a thruster at every foot, (4): sliders for left, right and a twist, left against right."""
     eom = fb.equations_of_motion(state, contacts)
     left = np.array([name[1] == "L" for name in contacts.names])
-    gravity = np.array([0.0, 0.0, 9.81])
+    gravity, feet = np.array([0.0, 0.0, 9.81]), contacts.positions(state)
 
     def draw(left_feet: float, right_feet: float, twist: float) -> str:
         f = np.zeros((4, 3))
@@ -255,10 +255,14 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> widg
         f[:, 0] = np.where(left, twist, -twist)
         qdd = eom.acceleration(np.zeros(eom.d), f)
         rate = momentum_rate(state, qdd) + np.concatenate([state.robot.mass * gravity, np.zeros(3)])
-        picture = view.painter.picture(state, contacts, planned=f, wrench=rate, cones=False)
-        hidden = ("ground", "patch", "com/line", "com/projection")
-        drawn = {path: item for path, item in picture.items() if not path.startswith(hidden)}
-        view.draw({path.replace("planned/", "thrust/"): item for path, item in drawn.items()})
+        picture = view.painter.picture(state, wrench=rate)
+        drawn = {path: item for path, item in picture.items() if not path.startswith(("ground", "com/line", "com/projection"))}
+        for name, foot, force in zip(contacts.names, feet, f, strict=True):
+            if force.any():
+                vector = view.scale * force
+                start = foot - vector if force[2] > 0 else foot  # below the foot either way, where no leg hides it
+                drawn[f"thrust/{name}"] = shapes.arrow(start, vector, MEASURED, 2 * view.painter.size)
+        view.draw(drawn, title="blue arrows: thrusters")
         return f"f<sub>c</sub> = {_row(rate[:3])} N, τ<sub>c</sub> = {_row(rate[3:])} N·m"
 
     each = (-40.0, 30.0, 40.0, "N")

@@ -376,6 +376,12 @@ def _generalised_joints_only() -> Array:
     return wrong
 
 
+def _standing_go2() -> EquationsOfMotion:
+    """go2 standing on four feet."""
+    robot = fb.load("go2")
+    return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot))
+
+
 def _judge_holding(answer: Any) -> Verdict:
     """Torques and forces that keep a standing go2 still, by (4) row by row."""
     if answer is None or answer is Ellipsis or (isinstance(answer, tuple) and any(part is None for part in answer)):
@@ -428,6 +434,7 @@ EXERCISES = (
         stub="shape_of_J = (3, 8)  # replace this",
         solution="shape_of_J = (9, 14)",
         judge=Numeric(
+            count=True,
             right=lambda: (
                 fb.equations_of_motion(
                     fb.load("solo8").standing(), fb.Contacts.points(fb.load("solo8"), frames=["FL_FOOT", "FR_FOOT", "HL_FOOT"])
@@ -522,6 +529,7 @@ EXERCISES = (
         solution="both = np.linalg.lstsq(np.hstack([eom.S, eom.J.T]), eom.h, rcond=None)[0]\n"
         "hold_tau, hold_forces = both[:12], both[12:]",
         judge=_judge_holding,
+        names=lambda: {"go2": fb.load("go2"), "eom": _standing_go2()},
         explanation="Six more unknowns than equations: lstsq takes the smallest. The other answers differ by forces that "
         "squeeze the robot from within; lesson 03 is about them.",
     ),

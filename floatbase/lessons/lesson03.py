@@ -232,13 +232,19 @@ def _wrong_squeezes() -> dict[str, Any]:
     }
 
 
+def _standing_forces() -> Array:
+    """The smallest forces, shape (12,), N, world, that carry the standing robot."""
+    eom = standing_go2()
+    return np.asarray(np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0])
+
+
 def _judge_unloading(answer: Any) -> Verdict:
     """Any forces will do that balance the standing robot and give FL its 20 N."""
     forces = numbers(answer, (12,))
     if isinstance(forces, Verdict):
         return forces
     eom = standing_go2()
-    before = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0]
+    before = _standing_forces()
     if np.allclose(forces, before, atol=1e-3):
         return Verdict(False, f"Nothing has changed yet: the front left foot still carries {forces[2]:.0f} N.")
     off = eom.h[:6] - eom.J[:, :6].T @ forces
@@ -262,6 +268,7 @@ EXERCISES = (
         solution='two_feet = fb.equations_of_motion(state, contacts.only("FL_foot", "RR_foot"))\n'
         "moving = dimensions(two_feet).rank_V_qdd",
         judge=Numeric(
+            count=True,
             right=lambda: rank(fb.accelerations_from_torques(_on_diagonal()).A),
             praise="Two feet have one internal force, along the line between them; every other direction moves something.",
             mistakes={
@@ -305,6 +312,7 @@ EXERCISES = (
         "row = N[2]  # what each internal force does to the vertical force of FL\n"
         "new_forces = forces + N @ row * (20 - forces[2]) / (row @ row)",
         judge=_judge_unloading,
+        names=lambda: {"forces": _standing_forces()},
         explanation="Every λ = λ₀ + N x keeps the robot still; x is the shortest vector with row x = 20 - λ₀[2].",
     ),
 )

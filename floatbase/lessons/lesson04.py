@@ -191,6 +191,18 @@ def _flat_on_three_feet() -> int:
     return eta.n_in - rank(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]) @ eta.A)
 
 
+def _first_costs() -> dict[str, Any]:
+    """η and the lesson's three costs: on q̈ the centre of mass and the turning of the base, on τ the effort."""
+    eom = standing_go2()
+    J, drift = eom.state.frame_jacobian("base")[3:], eom.state.frame_drift("base")[3:]
+    return {
+        "eta": fb.accelerations_from_torques(eom),
+        "com": fb.Quadratic.from_residual(eom.state.com_jacobian, WANTED - eom.state.com_drift),
+        "turn": fb.Quadratic.from_residual(J, -drift),
+        "effort": fb.Quadratic.from_residual(np.eye(12), np.zeros(12)),
+    }
+
+
 def _judge_design(answer: Any) -> Verdict:
     """Any cost on torques whose least point does what was asked for."""
     eom = standing_go2()
@@ -255,6 +267,7 @@ EXERCISES = (
         solution='three = fb.feasible_space(fb.equations_of_motion(state, contacts.without("FL_foot")))\n'
         "flat = three.dimension - rank((com + turn).pullback(three.qdd).H)",
         judge=Numeric(
+            count=True,
             right=_flat_on_three_feet,
             praise="Again 6, but others: three squeezes, and three ways to move the free foot.",
             mistakes={
@@ -274,6 +287,7 @@ EXERCISES = (
         "friction = tangential_bias(contacts)  # on λ\n"
         "design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort + 1e-4 * friction.pullback(zeta)",
         judge=_judge_design,
+        names=_first_costs,
         explanation="Friction is easy to say in λ, so say it there and bring it to the torques through ζ. Its weight is small "
         "enough not to spoil the acceleration.",
     ),

@@ -199,9 +199,13 @@ def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str) -> No
 
 @pytest.mark.parametrize(
     ("name", "count", "hint"),
-    [("03.1", 5, "the legs move"), ("03.1", 10, "more than one internal force"), ("04.2", 0, "with effort")],
+    [
+        *(("03.1", 5, "the legs move"), ("03.1", 10, "more than one internal force"), ("04.2", 0, "with effort")),
+        *(("03.1", 8, "What is counted"), ("03.1", 7, "What is counted"), ("04.2", -6, "What is counted")),
+        ("02.1", (8, 13), "What is counted"),
+    ],
 )
-def test_a_wrong_count_gets_the_hint_that_fits(name: str, count: int, hint: str) -> None:
+def test_a_wrong_count_gets_the_hint_that_fits(name: str, count: Any, hint: str) -> None:
     said = exercises()[name].judge(count)
     assert not said.right
     assert hint in said.text

@@ -79,6 +79,21 @@ def test_sliders_of_every_picture_redraw_it(arm: Robot, go2: Robot) -> None:
             view.close()
 
 
+@pytest.mark.parametrize("thrust", [30.0, -30.0])
+def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(go2: Robot, thrust: float) -> None:
+    view, contacts = fb.Viewer(go2, scale=0.003), fb.Contacts.points(go2)
+    try:
+        left, right, _ = lesson01.thruster_panel(view, go2.standing(), contacts).children[2:]
+        left.value = right.value = thrust
+        arrows = [view.canvas.picture[f"thrust/{name}"].matrix for name in contacts.names]
+        for arrow, foot in zip(arrows, contacts.positions(go2.standing()), strict=True):
+            ends = arrow[2, 3], arrow[2, 3] + arrow[2, 2]
+            assert ends[1] - ends[0] == pytest.approx(0.003 * thrust)
+            assert max(ends) == pytest.approx(foot[2])
+    finally:
+        view.close()
+
+
 def hint(name: str, answer: Any) -> str:
     verdict = check(name, answer)
     assert not verdict.right
