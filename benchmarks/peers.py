@@ -81,10 +81,14 @@ def compare(pair: Sequence[Process], robot: str, peer: str, n: int, rounds: int)
     kept = {label: [i for i, both in enumerate(zip(*found[label], strict=True)) if None not in both] for label in SPREADS}
     for process in pair:
         process.ask("states", {label: [everything[label][i] for i in kept[label]] for label in SPREADS})
+    turns: dict[str, list[list[list[float]]]] = {label: [] for label in SPREADS}
+    for _ in range(rounds):  # all rows in every turn: a slow second of the machine is then a few turns of each, not one row
+        for label in SPREADS:
+            turns[label].append([process.ask("clock", label) for process in pair])
     for label in SPREADS:
         ours, theirs = ([np.array(torques[i]) for i in kept[label]] for torques in found[label])
         unanswered = tuple(sum(tau is None for tau in torques) for torques in found[label])
-        times = np.array([[process.ask("clock", label) for process in pair] for _ in range(rounds)])
+        times = np.array(turns[label])
         medians = np.median(times, axis=2)
         yield Row(
             robot,
@@ -246,7 +250,7 @@ def main() -> None:
     ask.add_argument("--env", type=Path, default=HERE.parent / "build" / "peers", help="folder of the peers' environments")
     ask.add_argument("--peers", nargs="+", choices=PACKAGES, default=list(PACKAGES))
     ask.add_argument("--states", type=int, default=200, help="random states for each row")
-    ask.add_argument("--rounds", type=int, default=20, help="turns that each side takes")
+    ask.add_argument("--rounds", type=int, default=100, help="turns that each side takes")
     options = ask.parse_args()
     rows: list[Row] = []
     plain: list[tuple[str, Row]] = []
