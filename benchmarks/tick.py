@@ -29,15 +29,14 @@ ROBOTS = ("go2", "solo12", "talos")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 
 
-def stance(robot: fb.robots.Robot, points: bool = False) -> fb.Contacts:
-    """All feet: flat where they are."""
-    flat = all(foot.is_flat for foot in robot.feet) and not points
-    return fb.Contacts.flat_feet(robot) if flat else fb.Contacts.points(robot)
+def two_points(robot: fb.robots.Robot) -> fb.Contacts:
+    """The first two feet, as points."""
+    return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:2]])
 
 
 def controller(robot: fb.robots.Robot, path: str = "compiled", **options: object) -> fb.WholeBodyController:
     """Keep standing on all feet."""
-    contacts = options.pop("contacts") if "contacts" in options else stance(robot)
+    contacts = options.pop("contacts") if "contacts" in options else fb.Contacts.feet(robot)
     return fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), path=path, **options)
 
 
@@ -137,7 +136,7 @@ def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
     families = {
         "facets (go2)": [(n_facets, controller(go2, facets=n_facets)) for n_facets in (4, 8, 16, 32, 64)],
         "contacts (go2)": [(i, controller(go2, contacts=fb.Contacts.points(go2, frames=frames[:i]))) for i in (1, 2, 3, 4)],
-        "joints": [(r.d, controller(r, contacts=stance(r, points=True))) for r in (go2, fb.load("anymal_kinova"), talos)],
+        "joints (two points)": [(r.d, controller(r, contacts=two_points(r))) for r in (go2, fb.load("anymal_kinova"), talos)],
     }
     found: dict[str, list[tuple[float, ...]]] = {}
     for family, members in families.items():
@@ -197,7 +196,7 @@ def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
     yield "|---|---|---|---|---|---|"
     for name in names or fb.robots():
         robot = fb.load(name)
-        whole = stance(robot) if robot.feet else fb.Contacts.none()
+        whole = fb.Contacts.feet(robot)
         for count in range(min(1, len(whole)), len(whole) + 1):
             contacts = whole.only(*whole.names[:count]) if count else whole
             fast, slow = (controller(robot, path, contacts=contacts) for path in ("compiled", "readable"))

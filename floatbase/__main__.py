@@ -86,12 +86,8 @@ class Playground:
         return fb.WholeBodyController(self.robot, self._contacts(), tasks, facets=self.facets)
 
     def _contacts(self) -> fb.Contacts:
-        feet = [foot for foot in self.robot.feet if self.stance[foot.frame]]
-        frames = [foot.frame for foot in feet]
-        if not feet:
-            return fb.Contacts.none()
-        make = fb.Contacts.flat_feet if feet[0].is_flat else fb.Contacts.points
-        return make(self.robot, mu=self.mu, frames=frames)
+        lifted = [frame for frame, stands in self.stance.items() if not stands]
+        return fb.Contacts.feet(self.robot, self.mu).without(*lifted)
 
     def _change(self) -> None:
         """Hand a new controller to the run, or say why there is none."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import nbformat
 import pytest
-from browsers import CHROMIUM, FLAGS, SCREENSHOTS, needs_chromium
+from browsers import SCREENSHOTS, launched, needs_chromium
 
 from floatbase.lessons.notebooks import FOLDER, read, without_outputs
 
@@ -84,12 +84,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
+    yield from launched()
 
 
 @pytest.mark.parametrize("name", LESSONS)

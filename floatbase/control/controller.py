@@ -210,7 +210,7 @@ class WholeBodyController:
     path: "readable" assembles and solves the QP as it is written; "compiled" solves the same problem in `kernel.py`, many
     times faster, where numba is installed and the problem is one of the package's own tasks and contacts; "auto" takes
     compiled where it can. The attribute `path` says which it is, `path_reason` why. The first controller ever compiles for
-    some twenty seconds, unless the set-up did (`python -m floatbase compile`); later ones load what was compiled.
+    about half a minute, unless the set-up did (`python -m floatbase compile`); later ones load what was compiled.
     A tick that the kernel cannot answer to its last digits, or that has no answer, is answered by the readable path, and
     its `Command.path` says so.
 
@@ -308,7 +308,7 @@ class WholeBodyController:
         """Run one tick, which compiles, or loads what was compiled, so that the loop need not wait for it."""
         if self._program is not None:
             standing = self.robot.standing()
-            with told_when_slow("floatbase compiles its controller, once: about 20 s."):
+            with told_when_slow("floatbase compiles its controller, once: about half a minute."):
                 self._program(np.array(standing.q), np.array(standing.v), 0.0)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from panels import assert_a_slider_redraws
 
 import floatbase as fb
 from floatbase.lessons import lesson01
@@ -67,16 +68,7 @@ def test_sliders_of_every_picture_redraw_it(arm: Robot, go2: Robot) -> None:
         (go2, lambda view: lesson01.stance_panel(view, go2.standing(), contacts)),
         (go2, lambda view: lesson01.thruster_panel(view, go2.standing(), contacts)),
     ):
-        view = fb.Viewer(robot)
-        try:
-            made = panel(view)
-            note, slider = made.children[1], made.children[2]
-            before = (note.value, view.static_html())
-            slider.value = slider.max
-            assert note.value != before[0]
-            assert view.static_html() != before[1]
-        finally:
-            view.close()
+        assert_a_slider_redraws(robot, panel)
 
 
 @pytest.mark.parametrize("thrust", [30.0, -30.0])

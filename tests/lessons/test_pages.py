@@ -12,7 +12,7 @@ from typing import Any
 import nbformat
 import numpy as np
 import pytest
-from browsers import CHROMIUM, FLAGS, SCREENSHOTS, needs_chromium
+from browsers import SCREENSHOTS, launched, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from PIL import Image
 
@@ -101,12 +101,7 @@ def test_a_page_says_what_the_lesson_says_and_what_a_slider_does(built: Path) ->
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
+    yield from launched()
 
 
 @needs_chromium

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
+from floatbase.dynamics.subspace import contact_space
 
 
 @cache
@@ -75,3 +76,23 @@ def test_under_the_push_the_ground_pushes_back() -> None:
     before, during = (record.time > 0.2) & (record.time < 0.49), (record.time > 0.53) & (record.time < 0.59)
     assert np.abs(sideways[before]).max() < 1.0
     assert np.all(sideways[during] @ [0.5, 0.87] < -5.0)
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_solo8_pushed_out_of_its_singular_stance_stands_on(path: str) -> None:
+    """Beside the symmetric stance J has singular values that are small and of no use, and rows that contradict each other by
+    the noise of q and v. It does not come back: once it leans, its contacts hold the lean (J has one rank more)."""
+    if path == "compiled":
+        pytest.importorskip("numba")
+    robot = judges.load("solo8")
+    standing = robot.standing()
+    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(standing), path=path)
+    record = fb.rollout(fb.Simulation(robot), controller, 1.5, [fb.Push([0.0, 5.0, 0.0], start=0.1, duration=0.1)])
+    away = np.linalg.norm(record.com - standing.com, axis=1)
+    assert record.outcome == "completed"
+    assert 5e-3 < away.max() < 15e-3
+    assert np.linalg.norm(record.final.v) < 1e-2
+    assert record.slip().max() < 1e-3
+    leaning = fb.equations_of_motion(record.final, judges.stance(robot))
+    upright = fb.equations_of_motion(standing, judges.stance(robot))
+    assert (contact_space(upright).r, contact_space(leaning).r) == (10, 11)

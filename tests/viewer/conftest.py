@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from browsers import CHROMIUM, FLAGS
+from browsers import launched
 
 from floatbase.dynamics.contacts import Contacts
 from floatbase.robots import Robot, State, load
@@ -52,14 +52,7 @@ def viewer(go2: Robot) -> Iterator[Viewer]:
 
 @pytest.fixture(scope="module")
 def browser():
-    """A headless Chromium; ended with the module, because playwright keeps an event loop running in this thread."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    if CHROMIUM is None:
-        pytest.skip("no Chromium found on the path")
-    with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
+    yield from launched()
 
 
 @pytest.fixture
