@@ -76,7 +76,7 @@ def tick_times(n: int) -> Iterator[str]:
         fast, slow = controller(robot), controller(robot, "readable")
         for label, spread in SPREADS.items():
             at = states(robot, n, spread)
-            pushing = np.mean([len(fast._program(q, v, 0.0)[1]) for q, v in at])
+            pushing = np.mean([fast._program(q, v, 0.0)[1] for q, v in at])
             quick, plain = interleaved([fast, slow], at, 3)
             numbers = (*np.percentile(quick, [50, 99]), *np.percentile(plain, [50, 99]))
             text = " | ".join(f"{number:.1f} µs" for number in numbers)
@@ -84,46 +84,25 @@ def tick_times(n: int) -> Iterator[str]:
 
 
 def parts(n: int) -> Iterator[str]:
-    """The compiled tick taken apart: each part called alone on the same states, so that they add up to a little more."""
-    from floatbase.control import kernel as K
-
+    """The compiled tick taken apart: it is stopped after one part, two, ..., and the times are taken from each other."""
     yield "| robot | states | dynamics | rows | elimination | objective | optimum | Python around them |"
     yield "|---|---|---|---|---|---|---|---|"
     for name in ROBOTS:
         robot = fb.load(name)
         fast = controller(robot)
-        program, base = fast._program, 6
-        M, h, J, Ag, oMi = program.dynamics.views
-        tree, links, table, frames, points, cones, lengths, tasks, gains, poses, limits, least = K.unpacked(*program._packed)
+        program = fast._program
+        answer = np.empty(program.size + 2 * program.entries)
         for label, spread in SPREADS.items():
             spent = []
             for q, v in states(robot, n, spread):
-                program.dynamics.update(q, v)
-                velocity, drift = K.sweep(tree, J, v)
-                contact = (tree, oMi, J, velocity, drift, table, frames, points)
-                A, b, Jp = K.contact_rows(*contact)
-                V, beta_of, _ = K.motions(A, b, v, M.T, h, Jp, base)
-                T = K.torques(V, beta_of, M.T, h, Jp, base)
-                state = (q, v, oMi, J, Ag, tree, links, tasks, gains, poses, program.targets, velocity, drift)
-                cost = (*state, V, beta_of, T, base)
-                R, diagonal, aim, _ = K.objective(*cost)
-                search = (R, diagonal, aim, V, beta_of, T, cones, lengths, least, limits)
-                every = (q, v, program.targets, *program.dynamics.views, *program._packed)
-                calls = (
-                    (program.dynamics.update, (q, v)),
-                    (K.sweep, (tree, J, v)),
-                    (K.contact_rows, contact),
-                    (K.motions, (A, b, v, M.T, h, Jp, base)),
-                    (K.torques, (V, beta_of, M.T, h, Jp, base)),
-                    (K.objective, cost),
-                    (K.dual_search, search),
-                    (K.tick, every),
-                    (fast, (q, v)),
-                )
-                spent.append([np.min(clock(call, [args] * 5)) for call, args in calls])
-            update, sweep, rows, motions, torques, objective, optimum, tick, whole = np.median(spent, axis=0)
-            row = (update, sweep + rows, motions + torques, objective, optimum, whole - update - tick)
-            yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in row) + " |"
+                update = clock(program.dynamics.update, [(q, v)] * 5)
+                ticks = [
+                    clock(program.kernel, [(q, v, program.targets, *program.arrays, answer, last)] * 5)
+                    for last in range(1, program.parts + 1)
+                ]
+                ends = [np.min(times) for times in (update, *ticks, clock(fast, [(q, v)] * 5))]
+                spent.append([ends[0], *np.diff([0.0, *ends[1:-1]]), ends[-1] - ends[0] - ends[-2]])
+            yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0)) + " |"
 
 
 # growth --------------------------------------------------------------------------------------------------------------------

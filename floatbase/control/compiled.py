@@ -70,7 +70,7 @@ def _kernel_obstacle() -> str:
         return 'numba is not installed: pip install "floatbase[fast]"'
     try:
         import floatbase.control.kernel  # noqa: F401
-    except (ImportError, OSError, AttributeError) as error:
+    except (ImportError, OSError, AttributeError, KeyError) as error:  # KeyError: an option that this numba does not know
         return f"numba is installed and cannot be loaded ({error})"
     return ""
 
@@ -164,7 +164,7 @@ class Program:
     def __init__(self, robot: Robot, contacts: Contacts, tasks: Sequence[Task], limits: Limits):
         from floatbase.control import kernel
 
-        self.dynamics, self.solved, self._kernel = dynamics_of(robot), kernel.SOLVED, kernel.tick
+        self.dynamics, self.kernel, self.parts = dynamics_of(robot), kernel.tick, kernel.PARTS
         self.robot, self.q_shape, self.v_shape, self.nv, self.d = robot, (robot.nq,), (robot.nv,), robot.nv, robot.d
         self.fits = True
         self._tasks = tuple(tasks)
@@ -172,12 +172,16 @@ class Program:
         contact_tables = _stack_contacts(robot, contacts, limits)
         self.targets, task_tables = self._task_tables(robot, tasks, contacts.k)
         bounds = (np.array(limits.torque_limits), float(limits.min_normal_force))
-        self._packed = packed(self.dynamics, contact_tables, task_tables, bounds)
+        tables = packed(self.dynamics, contact_tables, task_tables, bounds)
+        real, whole = kernel.room_sizes(tables[0], sum(len(contact.row_names) for contact in contacts))
+        room = np.empty(real), np.empty(whole, np.int64)  # of one tick at a time: the dynamics' lock sees to it
+        self.arrays = *self.dynamics.views, *tables, *room
+        self.size, self.entries = self.nv + self.d + contacts.k, self.nv + contacts.k
         self._limited = np.isfinite(limits.torque_limits)
         self.force_rows = contact_tables[4].size
 
-    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, Array, Array, Array] | None:
-        """(q̈, τ, λ) of shape (nv + d + k,), the active rows, their multipliers, and the targets of time t.
+    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, Array] | None:
+        """The answer as `kernel.tick` lays it out, (q̈, τ, λ) first, how many rows hold it, and the targets of time t.
 
         None when the readable path must decide. q, v: writable float64 arrays.
         """
@@ -186,11 +190,11 @@ class Program:
         targets = self._targets_at(t) if self._moving else self.targets
         if targets is None:
             return None
-        dynamics = self.dynamics
+        dynamics, answer = self.dynamics, np.empty(self.size + 2 * self.entries)
         with dynamics.lock:
             dynamics.update(q, v)
-            x, active, mu, status = self._kernel(q, v, targets, *dynamics.views, *self._packed)
-        return (x, active, mu, targets) if status == self.solved else None
+            held = self.kernel(q, v, targets, *self.arrays, answer, self.parts)
+        return (answer, held, targets) if held >= 0 else None
 
     def tasks(self, targets: Array) -> tuple[Task, ...]:
         """The tasks with the targets of one tick, as `__call__` gave them: functions may answer otherwise when asked again."""
@@ -199,12 +203,13 @@ class Program:
             values.setdefault(i, {})[name] = targets[at : at + prod(shape)].reshape(shape)
         return tuple(replace(cast(Any, task), **values[i]) if i in values else task for i, task in enumerate(self._tasks))
 
-    def multipliers(self, active: Array, mu: Array, rows: int) -> Array:
+    def multipliers(self, answer: Array, held: int, rows: int) -> Array:
         """Multipliers of the readable problem's inequality rows, shape (rows,): there only limited joints have torque rows."""
         found = np.zeros(rows)
         place = np.cumsum(self._limited) - 1
         place = np.concatenate([place, place + np.sum(self._limited)])
-        for number, push in zip(active, mu, strict=True):
+        mu, numbers = answer[self.size :][:held], answer[self.size + self.entries :][:held].astype(np.int64)
+        for number, push in zip(numbers, mu, strict=True):
             at = number if number < self.force_rows else self.force_rows + place[number - self.force_rows]
             found[at] = max(push, 0.0)
         return found

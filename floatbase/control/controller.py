@@ -278,16 +278,16 @@ class WholeBodyController:
         answer = program(q, v, t)
         if answer is None:
             return None
-        x, active, mu, targets = answer
-        x.setflags(write=False)
-        nv, tail = program.nv, program.nv + program.d
+        numbers, held, targets = answer
+        numbers.setflags(write=False)
+        nv, tail, end = program.nv, program.nv + program.d, program.size
 
         def evidence() -> Solution:
             eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
             qp = build_qp(eom, program.tasks(targets), self.limits, t)
-            return finished(qp, x, program.multipliers(active, mu, len(qp.G)), "compiled", len(active))
+            return finished(qp, numbers[:end], program.multipliers(numbers, held, len(qp.G)), "compiled", held)
 
-        return Command(x[nv:tail], x[:nv], x[tail:], self.contacts, evidence, "compiled")
+        return Command(numbers[nv:tail], numbers[:nv], numbers[tail:end], self.contacts, evidence, "compiled")
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""

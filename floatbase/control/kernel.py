@@ -15,19 +15,23 @@ Symbols: n joints of the tree (0 is the world), nv, d, k as everywhere, P points
 which each entry *is* one entry of (q̈, λ) that the elimination left free. V maps β to (q̈, λ), shape (nv + k, nb + 1); its
 last column is the point at β = 0. T is the same for τ, shape (d, nb + 1).
 
-A tick answers SOLVED, or says that it is not the one to answer: REFUSED (a value is not finite, a quaternion or rotation is
-none), DOUBTFUL (the numbers do not carry to the last digits), INFEASIBLE. Then the readable path decides.
+A tick that is not the one to answer says why: REFUSED (a value is not finite, a quaternion or rotation is none), DOUBTFUL
+(the numbers do not carry to the last digits), INFEASIBLE. Then the readable path decides.
+
+A tick takes its memory from a room that was made once: the arrays a function fills are its last arguments.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numba
 import numpy as np
 
-SOLVED, REFUSED, DOUBTFUL, INFEASIBLE = 0, 1, 2, 3
+SOLVED, REFUSED, DOUBTFUL, INFEASIBLE, UNFINISHED = 0, -1, -2, -3, -4
+PARTS = 4  # of a tick: rows, elimination, objective, optimum
 POINT, FLAT = 0, 1  # kinds of contact
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = 0, 1, 2, 3, 4, 5  # kinds of task
 
@@ -43,13 +47,49 @@ _UNSETTLED = 1e-4  # part of β that the last of them may still move
 _PULLING = 1e-9  # part of the largest multiplier by which one may be negative
 
 
-def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile at the first call; kept on disk where a folder can be written to, and in memory alone elsewhere."""
-    options: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
+def _compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
+    """Compile at the first call; kept on disk where a folder can be written to, and in memory alone elsewhere.
+
+    Without numba's run time, which counts the references to every array that is made, cut or handed on: that took a quarter of
+    the tick. What is compiled so can neither make an array nor return one.
+    """
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "_nrt": False}
     try:
-        return numba.njit(cache=True, **options)(function)
+        return numba.njit(cache=True, **options | more)(function)
     except RuntimeError:  # numba found no folder for its cache
-        return numba.njit(**options)(function)
+        return numba.njit(**options | more)(function)
+
+
+_allocating = partial(_compiled, _nrt=True)
+_written_out = partial(_compiled, inline="always")  # put into the caller, so that it may return arrays
+
+
+# the room: its first number counts what is in use ------------------------------------------------------------------------
+
+
+@_written_out
+def line(room, n):
+    """The next free n numbers of the room, whatever stands there."""
+    first = int(room[0])
+    last = first + n
+    if last > room.size:
+        raise MemoryError("the room of the controller's tick is too small")
+    room[0] = last
+    return room[first:last]
+
+
+@_written_out
+def table(room, rows, columns):
+    """The next free piece of the room as an array (rows, columns), whatever stands there."""
+    return line(room, rows * columns).reshape(rows, columns)
+
+
+@_compiled
+def clear(array):
+    """Set every number of a C-contiguous array to zero."""
+    flat = array.reshape(array.size)
+    for i in range(flat.size):
+        flat[i] = 0.0
 
 
 @_compiled
@@ -116,15 +156,15 @@ def turned(R, a):
 
 
 @_compiled
-def sweep(tree, J, v):
-    """Spatial velocities and drifts (q̈ = 0) of all joints about the world's origin, shapes (n, 6): linear, then angular.
+def sweep(tree, J, v, velocity, drift):
+    """Spatial velocities and drifts (q̈ = 0) of all joints about the world's origin, (n, 6): linear, then angular.
 
     tree: (n, 5) parent, first index in v, length there, first index in q, length there. J: (6, nv) columns in the world.
     A joint's columns turn with it, so the drift is that of the parent + velocity × (J v of the joint).
     """
-    n = tree.shape[0]
-    velocity, drift = np.zeros((n, 6)), np.zeros((n, 6))
-    for i in range(1, n):
+    for r in range(6):
+        velocity[0, r], drift[0, r] = 0.0, 0.0
+    for i in range(1, tree.shape[0]):
         parent, first, count = tree[i, 0], tree[i, 1], tree[i, 2]
         linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for c in range(first, first + count):
@@ -183,19 +223,24 @@ def turning_rows(tree, J, joint, out, row):
 
 
 @_compiled
-def contact_rows(tree, oMi, J, velocity, drift, contacts, frames, points):
-    """(4)(5) A (m, nv), b (m,), and J of the points (k, nv), which is the same array as A where all contacts are points.
+def motion_rows(contacts):
+    """The number of motion rows of all contacts; contacts: (C, 4) joint, kind, ..."""
+    m = 0
+    for i in range(contacts.shape[0]):
+        m += 3 if contacts[i, 1] == POINT else 6
+    return m
+
+
+@_compiled
+def contact_rows(tree, oMi, J, velocity, drift, contacts, frames, points, A, b, Jp):
+    """(4)(5) A (m, nv), b (m,), and J of the points Jp (k, nv), which is the same array as A where all contacts are points.
 
     contacts: (C, 4) joint, kind, first point, number of points. frames: (C, 16) pose in the joint, normal, radius.
     points: (P, 3) ball centres or corners in the frame.
     """
-    nv, m = J.shape[1], 0
-    for i in range(contacts.shape[0]):
-        m += 3 if contacts[i, 1] == POINT else 6
-    Jp, b = np.zeros((3 * points.shape[0], nv)), np.empty(m)
-    all_points = contacts.shape[0] == points.shape[0] and m == Jp.shape[0]
-    A = Jp if all_points else np.zeros((m, nv))
-    row = 0
+    all_points, row = contacts.shape[0] == points.shape[0] and b.size == Jp.shape[0], 0
+    clear(A)
+    clear(Jp)
     for i in range(contacts.shape[0]):
         joint, kind, first, count = contacts[i, 0], contacts[i, 1], contacts[i, 2], contacts[i, 3]
         R, at = place(oMi, joint, frames, i)
@@ -216,7 +261,6 @@ def contact_rows(tree, oMi, J, velocity, drift, contacts, frames, points):
             b[row + 3], b[row + 4], b[row + 5] = times(-1.0, xyz(drift, joint, 3))
         b[row], b[row + 1], b[row + 2] = times(-1.0, along)
         row += 3 if kind == POINT else 6
-    return A, b, Jp
 
 
 # elimination -------------------------------------------------------------------------------------------------------------
@@ -256,25 +300,24 @@ def gauss_jordan(B, first, last, top, n, weights, pivots, sizes):
 
 
 @_compiled
-def row_sizes(B):
-    """Euclidean length of each row of B (m, n + 1), the last column left out, shape (m,)."""
-    sizes = np.empty(B.shape[0])
+def row_sizes(B, sizes):
+    """sizes (m,) = Euclidean length of each row of B (m, n + 1), the last column left out."""
     for row in range(B.shape[0]):
         square = 0.0
         for c in range(B.shape[1] - 1):
             square += B[row, c] * B[row, c]
         sizes[row] = np.sqrt(square)
-    return sizes
 
 
 @_compiled
-def equalities(A, b, M, h, Jp, base):
-    """(7) without its joint rows: [A 0 | b] above [M_b -J_bᵀ | -h_b], shape (m + base, nv + k + 1)."""
+def equalities(A, b, M, h, Jp, base, B):
+    """(7) without its joint rows: B (m + base, nv + k + 1) = [A 0 | b] above [M_b -J_bᵀ | -h_b]."""
     m, nv, k = A.shape[0], A.shape[1], Jp.shape[0]
-    B = np.zeros((m + base, nv + k + 1))
     for i in range(m):
         for c in range(nv):
             B[i, c] = A[i, c]
+        for c in range(nv, nv + k):
+            B[i, c] = 0.0
         B[i, nv + k] = b[i]
     for i in range(base):
         for c in range(nv):
@@ -282,74 +325,67 @@ def equalities(A, b, M, h, Jp, base):
         for c in range(k):
             B[m + i, nv + c] = -Jp[c, i]
         B[m + i, nv + k] = -h[i]
-    return B
 
 
-@_compiled
+@_allocating
 def contradict(A, v, U, b):
     """Whether rows of A q̈ = b contradict each other by more than the contacts' motion A v explains; U (m, r): of A's SVD."""
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
     return np.max(np.abs(gap)) > 1e-6 + _NOISE * np.max(np.abs(motion))
 
 
-@_compiled
-def independent_rows(A, b, v):
+@_allocating
+def independent_rows(A, b, v, resolved, right):
     """(5) Orthonormal rows (r, nv) and right-hand sides (r,) that say what A q̈ = b says along the directions A resolves.
 
-    The others are left out, as in `build_qp`. The last answer is False where b contradicts itself, v (nv,) being the velocity.
+    They are put into the first ones of resolved (m, nv) and right (m,); returns r. The other directions are left out, as in
+    `build_qp`. r is -1 where b contradicts itself, v (nv,) being the velocity.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
     while r < s.size and s[r] > _MOTION * s[0]:
         r += 1
     U = np.ascontiguousarray(U[:, :r])
-    return np.ascontiguousarray(Vt[:r]), np.dot(U.T, b) / s[:r], not contradict(A, v, U, b)
+    resolved[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
+    return -1 if contradict(A, v, U, b) else r
 
 
 @_compiled
-def motions(A, b, v, M, h, Jp, base):
-    """(13)(17) β -> (q̈, λ) as V (nv + k, nb + 1), which β each entry is (nv + k,), -1 for none, and how well it went.
+def motions(A, b, M, h, Jp, base, B, pivots, room):
+    """(13)(17) Solve the equalities for as many entries of (q̈, λ): B (m + base, nv + k + 1) ends reduced, pivots (m + base,)
+    holds the entry that each row is solved for. Returns the least part of a motion row and of any row that was left.
 
     Motion rows are solved for joints where that is possible, so that straight knees fall back to the base; the base rows
     for the base, and for λ where contacts already hold it.
     """
-    nv, k = A.shape[1], Jp.shape[0]
-    n = nv + k
-    by_motion, by_base = np.empty(nv), np.empty(n)
+    m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
+    by_motion, by_base, sizes = line(room, nv), line(room, n), line(room, m + base)
     for c in range(n):
         by_base[c] = 1.0 if c < base else (0.1 if c < nv else 0.01)
     for c in range(nv):
         by_motion[c] = 0.05 if c < base else 1.0
-    for attempt in range(2):
-        m = A.shape[0]
-        B = equalities(A, b, M, h, Jp, base)
-        pivots = np.empty(m + base, np.int64)
-        sizes = row_sizes(B)
-        least = gauss_jordan(B, 0, m, 0, nv, by_motion, pivots, sizes) if m else 1.0
-        if least > _DEPENDENT or attempt == 1:
-            break
-        A, b, agree = independent_rows(A, b, v)
-        if not agree:
-            return np.zeros((n, 1)), pivots, False
-    if least > 1e-11:
-        least = min(least, gauss_jordan(B, m, m + base, m, n, by_base, pivots, sizes)) if base else least
+    equalities(A, b, M, h, Jp, base, B)
+    row_sizes(B, sizes)
+    least = gauss_jordan(B, 0, m, 0, nv, by_motion, pivots, sizes)
     if least <= 1e-11:
-        return np.zeros((n, 1)), pivots, False
-    V, beta_of = parametrised(B, pivots, m, n)
-    return V, beta_of, True
+        return least, least
+    return least, min(least, gauss_jordan(B, m, m + base, m, n, by_base, pivots, sizes))
 
 
 @_compiled
-def parametrised(B, pivots, m, n):
-    """V (n, nb + 1) from reduced rows B (·, n + 1), each solved for its pivot; and which β each entry is (n,), -1 for none.
+def parametrised(B, pivots, m, V, beta_of, free):
+    """V (n, nb + 1) from reduced rows B (·, n + 1), each solved for its pivot; and which β each entry is, beta_of (n,), -1 for
+    none. free: (nb,), room.
 
     The pivots of rows from m on still stand in the rows before, and are put in here.
     """
-    nb = n - pivots.size
-    beta_of, free = np.zeros(n, np.int64), np.empty(nb, np.int64)
+    n, nb = V.shape[0], V.shape[1] - 1
+    for c in range(n):
+        beta_of[c] = 0
     for row in range(pivots.size):
         beta_of[pivots[row]] = -1
-    V, j = np.zeros((n, nb + 1)), 0
+    clear(V)
+    j = 0
     for c in range(n):
         if beta_of[c] == 0:
             beta_of[c], free[j], V[c, j] = j, c, 1.0
@@ -367,7 +403,6 @@ def parametrised(B, pivots, m, n):
             if factor != 0.0:
                 for j in range(nb + 1):
                     V[at, j] -= factor * V[source, j]
-    return V, beta_of
 
 
 @_compiled
@@ -387,10 +422,10 @@ def add_product(left, V, beta_of, first, out, row):
 
 
 @_compiled
-def torques(V, beta_of, M, h, Jp, base):
-    """(16) β -> τ = M_j q̈ + h_j - J_jᵀ λ as T (d, nb + 1), V as from `motions`."""
+def torques(V, beta_of, M, h, Jp, base, T):
+    """(16) β -> τ = M_j q̈ + h_j - J_jᵀ λ as T (d, nb + 1), V as from `parametrised`."""
     nv, k, nb = M.shape[0], Jp.shape[0], V.shape[1] - 1
-    T = np.zeros((nv - base, nb + 1))
+    clear(T)
     add_product(M[base:], V, beta_of, 0, T, 0)
     for c in range(k):
         for j in range(nv - base):
@@ -404,7 +439,6 @@ def torques(V, beta_of, M, h, Jp, base):
                     T[j, i] -= factor * V[nv + c, i]
     for j in range(nv - base):
         T[j, nb] += h[base + j]
-    return T
 
 
 # tasks -------------------------------------------------------------------------------------------------------------------
@@ -443,7 +477,7 @@ def motion_task(kind, joint, frames, i, targets, first, tree, oMi, J, Ag, links,
 
     targets: from `first` on the position (3) or the rotation (9), row by row, the velocity (3) and the acceleration (3).
     """
-    rows[:] = 0.0
+    clear(rows)
     wanted = targets.reshape(1, targets.size)
     after, valid = first + (9 if kind == ORIENTATION else 3), True
     if kind == COM:
@@ -482,20 +516,24 @@ def posture_task(tree, q, v, target, base, e, e_dot):
 
 
 @_compiled
-def objective(q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, beta_of, T, base):
-    """(18)(26) ½ Σ weight ‖residual‖² in β as R (rows, nb + 1), diagonal (nb,), aim (nb,), and whether all tasks could be read.
+def objective(
+    q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, beta_of, T, base, room, R, diagonal, aim
+):
+    """(18)(26) ½ Σ weight ‖residual‖² in β: R (·, nb + 1), diagonal (nb,), aim (nb,). Returns how many rows of R are in use,
+    which is a multiple of four, the last of them zero; or -1 where a task cannot be read.
 
-    It is ½ ‖R (β, 1)‖² + ½ Σ diagonal β² - aimᵀ β. R has a multiple of four rows, the last of them zero.
+    It is ½ ‖R (β, 1)‖² + ½ Σ diagonal β² - aimᵀ β.
 
     tasks: (N, 3) kind, joint, first target. gains: (N, 3) weight, kp, kd. frames: (N, 12). V, T: β -> (q̈, λ), τ.
     Entries of (q̈, λ) that are a β only touch the diagonal.
     """
     nv, d, nb = J.shape[1], T.shape[0], V.shape[1] - 1
     k = V.shape[0] - nv
-    R = np.zeros((3 * tasks.shape[0] + 2 * d + k + 3, nb + 1))
-    used, rows = 0, np.empty((3, nv))
-    ej, ej_dot = np.empty(d), np.empty(d)
-    weight, wanted = np.zeros(nv + k + d), np.zeros(nv + k + d)  # of the terms w/2 (x_i - wanted_i)² on single entries
+    clear(R)
+    used, rows, ej, ej_dot = 0, table(room, 3, nv), line(room, d), line(room, d)
+    weight, wanted = line(room, nv + k + d), line(room, nv + k + d)  # of the terms w/2 (x_i - wanted_i)² on single entries
+    clear(weight)
+    clear(wanted)
     for i in range(tasks.shape[0]):
         kind, at, w, kp, kd = tasks[i, 0], tasks[i, 2], gains[i, 0], gains[i, 1], gains[i, 2]
         if kind <= FRAME:
@@ -503,9 +541,11 @@ def objective(q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velo
                 kind, tasks[i, 1], frames, i, targets, at, tree, oMi, J, Ag, links, velocity, drift, rows
             )
             if not valid:
-                return R, weight, wanted, False
+                return -1
             root = np.sqrt(w)
-            rows *= root
+            for r in range(3):
+                for c in range(nv):
+                    rows[r, c] *= root
             add_product(rows, V, beta_of, 0, R, used)
             pull = times(root, plus(bias, plus(times(kp, e), times(kd, e_dot))))
             R[used, nb], R[used + 1, nb], R[used + 2, nb] = plus(column(R, used, nb), pull)
@@ -518,18 +558,19 @@ def objective(q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velo
                 goal = -kp * ej[j] - kd * ej_dot[j] if kind == POSTURE else targets[at + j]
                 weight[first + j] += w
                 wanted[first + j] += w * goal
-    diagonal, aim, used = single_entries(R, used, V, beta_of, T, weight, wanted)
-    return R[: 4 * ((used + 3) // 4)], diagonal, aim, True
+    used = single_entries(R, used, V, beta_of, T, weight, wanted, diagonal, aim)
+    return 4 * ((used + 3) // 4)
 
 
 @_compiled
-def single_entries(R, used, V, beta_of, T, weight, wanted):
+def single_entries(R, used, V, beta_of, T, weight, wanted, diagonal, aim):
     """Add Σ (weight / 2) (x - wanted / weight)² over single entries x of (q̈, λ, τ) to R, or to the diagonal where x is a β.
 
-    Returns the diagonal and the aim, each (nb,), and the number of rows of R in use.
+    Returns the number of rows of R in use. diagonal, aim: (nb,), as for `objective`.
     """
     nb, n = V.shape[1] - 1, V.shape[0]
-    diagonal, aim = np.zeros(nb), np.zeros(nb)
+    clear(diagonal)
+    clear(aim)
     for i in range(n + T.shape[0]):
         if i < n and beta_of[i] >= 0:
             diagonal[beta_of[i]], aim[beta_of[i]] = weight[i], wanted[i]
@@ -540,31 +581,29 @@ def single_entries(R, used, V, beta_of, T, weight, wanted):
                 R[used, c] = root * row[c]
             R[used, nb] -= wanted[i] / root
             used += 1
-    return diagonal, aim, used
+    return used
 
 
 @_compiled
-def normal_equations(R, diagonal, aim):
-    """Hessian (nb, nb), of which only the lower triangle is filled, and slope (nb,) at β = 0, of what `objective` gives."""
+def normal_equations(R, diagonal, aim, both, slope):
+    """Hessian, the lower triangle of the first nb rows of both (nb + 1, nb + 1), and slope (nb,) at β = 0, of what `objective`
+    gives."""
     nb = diagonal.size
-    both = np.zeros((nb + 1, nb + 1))
+    clear(both)
     for i in range(0, R.shape[0], 4):  # four rows at a time: each sum is fetched and stored once for all of them
         for r in range(nb + 1):
             a, b, c, d = R[i, r], R[i + 1, r], R[i + 2, r], R[i + 3, r]
             for s in range(r + 1):
                 both[r, s] += a * R[i, s] + b * R[i + 1, s] + c * R[i + 2, s] + d * R[i + 3, s]
-    slope = np.empty(nb)
     for r in range(nb):
         both[r, r] += diagonal[r]
         slope[r] = both[nb, r] - aim[r]
-    return both[:nb, :nb], slope
 
 
 @_compiled
-def gradient(R, diagonal, aim, beta):
+def gradient(R, diagonal, aim, beta, slope):
     """Slope (nb,) at β, residual by residual, which keeps the digits that the Hessian lost."""
     nb = beta.size
-    slope = np.empty(nb)
     for c in range(nb):
         slope[c] = diagonal[c] * beta[c] - aim[c]
     for i in range(R.shape[0]):
@@ -573,17 +612,16 @@ def gradient(R, diagonal, aim, beta):
             residual += R[i, c] * beta[c]
         for c in range(nb):
             slope[c] += residual * R[i, c]
-    return slope
 
 
 # rows and optimum --------------------------------------------------------------------------------------------------------
 
 
 @_compiled
-def cholesky(H):
-    """L (nb, nb) with L Lᵀ = H, of which the lower triangle is read; and whether every direction is curved."""
-    n = H.shape[0]
-    L = np.zeros((n, n))
+def cholesky(H, L):
+    """L (nb, nb) with L Lᵀ = H, of whose first nb rows the lower triangle is read; False where a direction is not curved."""
+    n = L.shape[0]
+    clear(L)
     for j in range(n):
         for i in range(j, n):
             total = H[i, j]
@@ -592,17 +630,16 @@ def cholesky(H):
             if i > j:
                 L[i, j] = total / L[j, j]
             elif total <= _CURVED * H[j, j]:
-                return L, False
+                return False
             else:
                 L[j, j] = np.sqrt(total)
-    return L, True
+    return True
 
 
 @_compiled
-def minimum(L, slope):
-    """β = -(L Lᵀ)⁻¹ slope, shape (nb,)."""
+def minimum(L, slope, x):
+    """x (nb,) = -(L Lᵀ)⁻¹ slope."""
     n = slope.size
-    x = np.empty(n)
     for i in range(n):
         total = -slope[i]
         for c in range(i):
@@ -612,14 +649,13 @@ def minimum(L, slope):
         x[i] /= L[i, i]
         for c in range(i):
             x[c] -= L[i, c] * x[i]
-    return x
 
 
 @_compiled
-def inverse(L):
-    """L⁻¹ (nb, nb), lower triangular."""
+def inverse(L, W):
+    """W (nb, nb) = L⁻¹, lower triangular."""
     n = L.shape[0]
-    W = np.zeros((n, n))
+    clear(W)
     for i in range(n):
         for j in range(i):
             for c in range(j + 1):
@@ -627,7 +663,6 @@ def inverse(L):
         W[i, i] = 1.0
         for c in range(i + 1):
             W[i, c] /= L[i, i]
-    return W
 
 
 @_compiled
@@ -659,20 +694,23 @@ def row_of(cones, i, j):
 
 
 @_compiled
-def worst_facet(cones, i, f, least):
-    """(28) The facet that the force f of point i is furthest beyond, or -1 where it is beyond none by more than `least`.
+def worst_facet(cones, i, f):
+    """(28) The facet that the force f of point i is furthest beyond, and by how much; -1 where it is beyond none.
 
-    cones: (P, F + 1, 3) rows, the last -normal. Facets look along evenly turned tangents, the first along t1, so the
-    tangential force itself points at the worst one.
+    cones: (P, F + 1, 3) rows, the last -normal. Forces in the circle that the facets touch are beyond none.
     """
     facets = cones.shape[1] - 1
     first, normal = row_of(cones, i, 0), times(-1.0, row_of(cones, i, facets))
-    mu = -dot(first, normal)
-    t1 = plus(first, times(mu, normal))
-    along, across, room = dot(t1, f), dot(cross(normal, t1), f), mu * dot(normal, f) + least
-    if room >= 0.0 and along * along + across * across <= room * room:
-        return -1
-    return int(np.rint(np.arctan2(across, along) * facets / (2.0 * np.pi))) % facets
+    mu, along = -dot(first, normal), dot(normal, f)
+    across = minus(f, times(along, normal))
+    if along >= 0.0 and dot(across, across) <= mu * mu * along * along:
+        return -1, 0.0
+    worst, found = 0.0, -1
+    for j in range(facets):
+        excess = dot(row_of(cones, i, j), f)
+        if excess > worst:
+            worst, found = excess, j
+    return found, worst
 
 
 @_compiled
@@ -685,11 +723,9 @@ def violated_force_row(forces, cones, lengths, least_normal):
     facets = cones.shape[1] - 1
     for i in range(cones.shape[0]):
         f = forces[3 * i], forces[3 * i + 1], forces[3 * i + 2]
-        facet = worst_facet(cones, i, f, worst * lengths[i, 0])
-        if facet >= 0:
-            excess = dot(row_of(cones, i, facet), f)
-            if excess > worst * lengths[i, facet]:
-                worst, found = excess / lengths[i, facet], i * (facets + 1) + facet
+        facet, excess = worst_facet(cones, i, f)
+        if facet >= 0 and excess > worst * lengths[i, facet]:
+            worst, found = excess / lengths[i, facet], i * (facets + 1) + facet
         excess = dot(row_of(cones, i, facets), f) + least_normal
         if excess > worst * lengths[i, facets]:
             worst, found = excess / lengths[i, facets], i * (facets + 1) + facets
@@ -727,7 +763,7 @@ def violated_row(V, beta_of, T, beta, cones, lengths, least_normal, limits, forc
 def row_in_beta(row, V, T, cones, least_normal, limits, out):
     """One row of (27)(28) on β: out (nb,) = G_row, and returns its bound h_row, as in G β ≤ h."""
     nb, d, force_rows = V.shape[1] - 1, T.shape[0], cones.shape[0] * cones.shape[1]
-    out[:] = 0.0
+    clear(out)
     if row < force_rows:
         point, facet = row // cones.shape[1], row % cones.shape[1]
         first = V.shape[0] - 3 * cones.shape[0] + 3 * point
@@ -810,13 +846,17 @@ def in_factor(W, row, d):
 @_compiled
 def directions(W, U, d, q, z, r):
     """Goldfarb-Idnani: the step z in β and r in the q multipliers as the new row's multiplier grows by 1; d (nb,) = W row."""
-    n = d.size
+    n, j = d.size, q
     for i in range(n):
         z[i] = 0.0
-    for j in range(q, n):
-        factor = d[j]
+    while j + 4 <= n:  # four rows at a time, as in `normal_equations`
+        a, b, c, e = d[j], d[j + 1], d[j + 2], d[j + 3]
         for i in range(n):
-            z[i] -= factor * W[j, i]
+            z[i] -= a * W[j, i] + b * W[j + 1, i] + c * W[j + 2, i] + e * W[j + 3, i]
+        j += 4
+    for late in range(j, n):
+        for i in range(n):
+            z[i] -= d[late] * W[late, i]
     for i in range(q - 1, -1, -1):
         total = d[i]
         for j in range(i + 1, q):
@@ -857,7 +897,8 @@ def enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, d, z, r
         if full <= longest:
             add_row(W, U, d, z, q)
             active[q], mu[q], bounds[q] = number, push, bound
-            rows[q] = row
+            for j in range(n):
+                rows[q, j] = row[j]
             return q + 1, SOLVED
         drop_row(W, U, active, mu, rows, bounds, drop, q)
         q -= 1
@@ -865,22 +906,33 @@ def enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, d, z, r
 
 
 @_compiled
-def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
+def largest(vector):
+    """The largest size of an entry of a vector (n,)."""
+    size = 0.0
+    for i in range(vector.size):
+        size = max(size, abs(vector[i]))
+    return size
+
+
+@_compiled
+def polish(beta, mu, q, slope, L, W, U, rows, bounds, d, move, y):
     """One step of Newton's method from (β, mu) that are right but for rounding; slope: the gradient there, shape (nb,).
 
     Returns the largest change of an entry of β.
     rows: (q, nb), bounds: (q,) of the active rows. W, U: the factors of Goldfarb and Idnani: rows @ Wᵀ = [Uᵀ 0] and W H Wᵀ = 1.
+    d, move, y: (nb,), room.
     """
     nb = beta.size
     if q == 0:
-        move = minimum(L, slope)
-        beta += move
-        return np.max(np.abs(move))
+        minimum(L, slope, move)
+        for i in range(nb):
+            beta[i] += move[i]
+        return largest(move)
     for a in range(q):
         for c in range(nb):
             slope[c] += mu[a] * rows[a, c]
-    d, y = np.zeros(nb), np.empty(q)
     for j in range(nb):
+        d[j], move[j] = 0.0, 0.0
         for i in range(nb):
             d[j] -= W[j, i] * slope[i]
     for a in range(q):  # back to the bounds: Uᵀ y = h - G β
@@ -890,19 +942,19 @@ def polish(beta, mu, active, q, slope, L, W, U, rows, bounds):
         for j in range(a):
             y[a] -= U[j, a] * y[j]
         y[a] /= U[a, a]
-    move = np.zeros(nb)
     for j in range(nb):
         step = y[j] if j < q else d[j]
         for i in range(nb):
             move[i] += step * W[j, i]
-    beta += move
+    for i in range(nb):
+        beta[i] += move[i]
     for a in range(q - 1, -1, -1):  # the slope that the way to the bounds leaves is held by the multipliers
         d[a] -= y[a]
         for j in range(a + 1, q):
             d[a] -= U[a, j] * d[j]
         d[a] /= U[a, a]
         mu[a] += d[a]
-    return np.max(np.abs(move))
+    return largest(move)
 
 
 @_compiled
@@ -917,31 +969,33 @@ def pulling_row(mu, q):
 
 
 @_compiled
-def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, limits):
-    """(27) β (nb,) with the least objective that keeps all rows; the active rows, their multipliers, and a status.
+def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, limits, room, beta, active, mu):
+    """(27) β (nb,) with the least objective that keeps all rows; returns how many rows hold it, or what kept it from one.
+
+    active, mu: (nb,) receive their numbers and multipliers.
 
     The dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): start at the optimum without rows,
     bring a violated one to its bound, again and again. Rows that are never violated are only looked at. The end is
     polished; where that shows it to be none, since a row pulls or is violated, the search goes on.
     """
-    H, slope = normal_equations(R, diagonal, aim)
-    nb, q, polished, moved = slope.size, 0, 0, 0.0
-    active, mu, bounds, rows = np.empty(nb, np.int64), np.empty(nb), np.empty(nb), np.empty((nb, nb))
-    L, curved = cholesky(H)
-    if not curved:
-        return slope, active[:0], mu[:0], DOUBTFUL
-    beta = minimum(L, slope)
-    forces, tau = np.empty(3 * cones.shape[0]), np.empty(T.shape[0])
-    row, d, z, r = np.empty(nb), np.empty(nb), np.empty(nb), np.empty(nb)
-    W, U, made = L, L, False  # made when the first row is violated
-    number = 0
+    nb, d = beta.size, T.shape[0]
+    H, slope, L = table(room, nb + 1, nb + 1), line(room, nb), table(room, nb, nb)
+    W, U, rows, bounds = table(room, nb, nb), table(room, nb, nb), table(room, nb, nb), line(room, nb)
+    row, step, z, r = line(room, nb), line(room, nb), line(room, nb), line(room, nb)
+    forces, tau = line(room, 3 * cones.shape[0]), line(room, d)
+    normal_equations(R, diagonal, aim, H, slope)
+    if not cholesky(H, L):
+        return DOUBTFUL
+    minimum(L, slope, beta)
+    q, polished, moved, number, made = 0, 0, 0.0, 0, False
     for _ in range(100 + 10 * nb):
         number = violated_row(V, beta_of, T, beta, cones, lengths, least_normal, limits, forces, tau)
         if number < 0:
             if polished == _POLISHED:
                 break
-            moved = polish(beta, mu, active, q, gradient(R, diagonal, aim, beta), L, W, U, rows, bounds)
-            polished = polished + 1 if moved > _SETTLED * (1.0 + np.max(np.abs(beta))) else _POLISHED
+            gradient(R, diagonal, aim, beta, slope)
+            moved = polish(beta, mu, q, slope, L, W, U, rows, bounds, step, z, r)
+            polished = polished + 1 if moved > _SETTLED * (1.0 + largest(beta)) else _POLISHED
             pulling = pulling_row(mu, q)
             if pulling >= 0:
                 drop_row(W, U, active, mu, rows, bounds, pulling, q)
@@ -951,17 +1005,19 @@ def dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, l
             continue
         polished = 0
         if not made:
-            W, U, made = inverse(L), np.zeros((nb, nb)), True
+            inverse(L, W)
+            clear(U)
+            made = True
         bound = row_in_beta(number, V, T, cones, least_normal, limits, row)
-        q, status = enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, d, z, r)
+        q, status = enforce(number, row, bound, beta, W, U, active, mu, rows, bounds, q, step, z, r)
         if status != SOLVED:
-            return beta, active[:0], mu[:0], status
-    if number >= 0 or polished == 0 or not moved <= _UNSETTLED * (1.0 + np.max(np.abs(beta))):
-        return beta, active[:0], mu[:0], DOUBTFUL
-    return beta, active[:q], mu[:q], SOLVED
+            return status
+    if number >= 0 or polished == 0 or not moved <= _UNSETTLED * (1.0 + largest(beta)):
+        return DOUBTFUL
+    return q
 
 
-@_compiled
+@_written_out
 def unpacked(sizes, indices, numbers):
     """The tables of robot, contacts and tasks as `packed` laid them out, in the order in which `tick` takes them.
 
@@ -987,40 +1043,94 @@ def unpacked(sizes, indices, numbers):
     return tree, links, contacts, contact_frames, points, cones, lengths, tasks, gains, frames, limits, least_normal
 
 
+def room_sizes(sizes, m):
+    """How many real and how many whole numbers the memory of a tick must hold; sizes: as for `unpacked`, m: motion rows."""
+    n_joints, _, n_points, _, n_tasks, d = (int(size) for size in sizes)
+    base, k = 6, 3 * n_points
+    nv = d + base
+    n = nv + k  # and no more β than that
+    contact = 12 * n_joints + (k + m) * nv + m
+    elimination = (m + base) * (n + 1) + 2 * (nv + n + m + base) + m * nv + m
+    maps = (n + d) * (n + 1)
+    cost = (3 * n_tasks + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
+    search = (n + 1) ** 2 + 4 * n * n + 7 * n + k + d
+    return 1 + contact + elimination + maps + cost + search, 1 + (m + base) + 3 * n
+
+
 @_compiled
-def tick(q, v, targets, M, h, J, Ag, oMi, sizes, indices, numbers):
-    """(26)(27) x = (q̈, τ, λ) of shape (nv + d + k,), the active rows (a,), their multipliers (a,), and a status.
+def readable(q, v, targets, base):
+    """Whether all numbers are finite, and the base's quaternion, where there is a base, has length 1."""
+    if not (finite(q) and finite(v) and finite(targets)):
+        return False
+    return base == 0 or abs(np.sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]) - 1.0) <= 1e-6
+
+
+@_compiled
+def write_answer(V, T, beta, active, count, nv, answer):
+    """(16) The first parts of `answer`, and the numbers of the active rows (count,) in its last; False if it is not finite."""
+    n, d = V.shape[0], T.shape[0]
+    image(V, beta, 0, nv, answer[:nv])
+    image(T, beta, 0, d, answer[nv : nv + d])
+    image(V, beta, nv, n, answer[nv + d : n + d])
+    for i in range(count):
+        answer[2 * n + d + i] = active[i]
+    return finite(answer[: n + d])
+
+
+@_compiled
+def tick(q, v, targets, M, h, J, Ag, oMi, sizes, indices, numbers, room, whole, answer, parts):
+    """(26)(27) answer = (q̈, τ, λ), then the multipliers and the numbers of the rows that hold it, each (nv + k,), of which
+    the first ones count. Returns how many, or what kept it from an answer.
 
     q: (nq,). v: (nv,). targets: those of all tasks, one after the other. M, h, J, Ag, oMi: Pinocchio's results for q and v.
     sizes, indices, numbers: the tables of robot, contacts and tasks, as for `unpacked`; few arrays, since each costs.
+    room, whole: memory for real and for whole numbers, as large as `room_sizes` says. parts: how many of PARTS to run, for
+    benchmarks; the answer needs all.
     """
     tree, links, contacts, contact_frames, points, cones, lengths, tasks, gains, frames, limits, least_normal = unpacked(
         sizes, indices, numbers
     )
-    nv, d, k = v.size, limits.size, 3 * points.shape[0]
-    base = nv - d
-    x, none = np.empty(nv + d + k), np.zeros(0, np.int64)
-    if not (finite(q) and finite(v) and finite(targets)):
-        return x, none, x[:0], REFUSED
-    if base and abs(np.sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]) - 1.0) > 1e-6:
-        return x, none, x[:0], REFUSED
-    velocity, drift = sweep(tree, J, v)
-    A, b, Jp = contact_rows(tree, oMi, J, velocity, drift, contacts, contact_frames, points)
-    Mc = np.ascontiguousarray(M.T)  # symmetric; Pinocchio's is stored by columns
-    V, beta_of, regular = motions(A, b, v, Mc, h, Jp, base)
-    if not regular:
-        return x, none, x[:0], DOUBTFUL
-    T = torques(V, beta_of, Mc, h, Jp, base)
-    R, diagonal, aim, readable = objective(
-        q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, beta_of, T, base
-    )
-    if not readable:
-        return x, none, x[:0], REFUSED
-    beta, active, mu, status = dual_search(R, diagonal, aim, V, beta_of, T, cones, lengths, least_normal, limits)
-    if status == SOLVED:
-        image(V, beta, 0, nv, x[:nv])
-        image(T, beta, 0, d, x[nv : nv + d])
-        image(V, beta, nv, nv + k, x[nv + d :])
-        if not finite(x):
-            status = DOUBTFUL
-    return x, active, mu, status
+    nv, d, k, m = v.size, limits.size, 3 * points.shape[0], motion_rows(contacts)
+    base, n = nv - d, nv + k
+    if not readable(q, v, targets, base):
+        return REFUSED
+    room[0], whole[0] = 1, 1
+    velocity, drift = table(room, tree.shape[0], 6), table(room, tree.shape[0], 6)
+    sweep(tree, J, v, velocity, drift)
+    Jp, b = table(room, k, nv), line(room, m)
+    A = Jp if contacts.shape[0] == points.shape[0] and m == k else table(room, m, nv)
+    contact_rows(tree, oMi, J, velocity, drift, contacts, contact_frames, points, A, b, Jp)
+    if parts == 1:
+        return UNFINISHED
+    by_rows = M.T  # symmetric; Pinocchio's is stored by columns
+    B, pivots = table(room, m + base, n + 1), line(whole, m + base)
+    least_motion, least = motions(A, b, by_rows, h, Jp, base, B, pivots, room)
+    if least_motion <= _DEPENDENT:
+        resolved, right = table(room, m, nv), line(room, m)
+        m = independent_rows(A, b, v, resolved, right)
+        if m < 0:
+            return DOUBTFUL
+        B, pivots = B[: m + base], pivots[: m + base]
+        _, least = motions(resolved[:m], right[:m], by_rows, h, Jp, base, B, pivots, room)
+    if least <= 1e-11:
+        return DOUBTFUL
+    nb = n - m - base
+    V, beta_of, T = table(room, n, nb + 1), line(whole, n), table(room, d, nb + 1)
+    parametrised(B, pivots, m, V, beta_of, line(whole, nb))
+    torques(V, beta_of, by_rows, h, Jp, base, T)
+    if parts == 2:
+        return UNFINISHED
+    R, diagonal, aim = table(room, 3 * tasks.shape[0] + 2 * d + k + 3, nb + 1), line(room, nb), line(room, nb)
+    used = objective(
+        q, v, oMi, J, Ag, tree, links, tasks, gains, frames, targets, velocity, drift, V, beta_of, T, base, room,
+        R, diagonal, aim,
+    )  # fmt: skip
+    if used < 0:
+        return REFUSED
+    if parts == 3:
+        return UNFINISHED
+    beta, active, mu = line(room, nb), line(whole, nb), answer[n + d : n + d + nb]
+    count = dual_search(R[:used], diagonal, aim, V, beta_of, T, cones, lengths, least_normal, limits, room, beta, active, mu)
+    if count < 0:
+        return count
+    return count if write_answer(V, T, beta, active, count, nv, answer) else DOUBTFUL

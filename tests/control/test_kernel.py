@@ -347,7 +347,7 @@ def test_a_replaced_controller_is_like_a_new_one_and_compiles_nothing() -> None:
 
     robot = judges.load("go2")
     both = pair(robot, judges.stance(robot), facets=6)
-    before = len(kernel.tick.signatures)
+    before = len(kernel.tick.signatures)  # one: no array of any kind makes it compile again
     state = robot.random_state(3, 0.1)
     for frames in (["FL_foot"], ["FR_foot", "RL_foot"], ["FL_foot", "FR_foot", "RR_foot"]):
         contacts = fb.Contacts.points(robot, frames=frames)
@@ -356,6 +356,42 @@ def test_a_replaced_controller_is_like_a_new_one_and_compiles_nothing() -> None:
     with pytest.raises(InputError, match="target forces has shape"):
         aimed = both[0].replace(tasks=[*both[0].tasks[:3], fb.ForceTask(np.zeros(12))])
         aimed.replace(contacts=fb.Contacts.points(robot, frames=["FL_foot"]))
+
+
+@pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
+def test_a_tick_reads_nothing_of_its_room_that_it_did_not_write(name: str) -> None:
+    robot = judges.load(name)
+    fast, _ = pair(robot, judges.stance(robot))
+    room, whole = fast._program.arrays[-2:]  # type: ignore[union-attr]
+    for seed in range(20):
+        state = robot.random_state(seed, 0.3)
+        answers = []
+        for rest in (0.0, np.nan, 1e300):
+            room[:], whole[:] = rest, 10**15
+            answers.append(fast(state.q, state.v))
+        assert all(np.array_equal(answer.tau, answers[0].tau) for answer in answers)
+
+
+def test_a_tick_makes_no_array_and_says_when_its_room_is_too_small() -> None:
+    """Real-time code must not ask for memory; only near-singular contacts do, for an SVD."""
+    from numba.core.runtime import _nrt_python as counts
+    from numba.core.runtime import rtsys
+
+    robot = judges.load("go2")
+    program = pair(robot, judges.stance(robot))[0]._program
+    assert program is not None
+    state = robot.random_state(5, 0.3)
+    q, v = np.array(state.q), np.array(state.v)
+    program.dynamics.update(q, v)
+    *arrays, room, whole = program.arrays
+    answer = np.empty(program.size + 2 * program.entries)
+    counts.memsys_enable_stats()
+    before = rtsys.get_allocation_stats()
+    assert program.kernel(q, v, program.targets, *arrays, room, whole, answer, program.parts) > 0
+    assert rtsys.get_allocation_stats() == before
+    counts.memsys_disable_stats()
+    with pytest.raises(MemoryError, match="room of the controller"):
+        program.kernel(q, v, program.targets, *arrays, room[:2000], whole, answer, program.parts)
 
 
 def test_both_paths_keep_the_same_tolerances() -> None:
@@ -499,7 +535,7 @@ def test_polish_is_newtons_step_it_reaches_the_optimum_from_anywhere() -> None:
     W, U = turn.T @ np.linalg.inv(L), np.zeros((4, 4))
     U[:2, :2] = upper[:2]
     beta, mu = rng.standard_normal(4), rng.standard_normal(2)
-    kernel.polish.py_func(beta, mu, np.arange(2), 2, H @ beta + g, L, W, U, rows, bounds)
+    kernel.polish(beta, mu, 2, H @ beta + g, L, W, U, rows, bounds, *np.empty((3, 4)))
     K = np.block([[H, rows.T], [rows, np.zeros((2, 2))]])
     assert np.allclose(np.concatenate([beta, mu]), np.linalg.solve(K, np.concatenate([-g, bounds])), rtol=0.0, atol=1e-12)
 
