@@ -61,15 +61,6 @@ def unit_vector(name: str, value: Any) -> Array:
     return read_only(vector / length)
 
 
-def unit_quaternion(name: str, value: Array, hint: str = "") -> None:
-    """Check that a quaternion x y z w, shape (4,), has length 1; `InputError` otherwise."""
-    length = float(np.linalg.norm(value))
-    if abs(length - 1.0) > 1e-6:
-        raise InputError(
-            f"the base quaternion {name} (x y z w) has length {length:.6g}; it must be 1. Divide it by its length{hint}."
-        )
-
-
 def cross(a: Array, b: Array) -> Array:
     """a × b of two vectors, shape (3,); numpy's own takes twenty times as long on three numbers."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -1058,11 +1058,18 @@ def room_sizes(sizes, m):
 
 
 @_compiled
-def readable(q, v, targets, base):
-    """Whether all numbers are finite, and the base's quaternion, where there is a base, has length 1."""
+def readable(q, v, targets, tree):
+    """Whether all numbers are finite, and what stands for turns in q, a quaternion or (cos, sin), has length 1."""
     if not (finite(q) and finite(v) and finite(targets)):
         return False
-    return base == 0 or abs(np.sqrt(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6]) - 1.0) <= 1e-6
+    for i in range(1, tree.shape[0]):
+        if tree[i, 4] > tree[i, 2]:
+            square = 0.0
+            for at in range(tree[i, 3] + (3 if tree[i, 4] == 7 else 0), tree[i, 3] + tree[i, 4]):
+                square += q[at] * q[at]
+            if abs(np.sqrt(square) - 1.0) > 1e-6:
+                return False
+    return True
 
 
 @_compiled
@@ -1092,7 +1099,7 @@ def tick(q, v, targets, M, h, J, Ag, oMi, sizes, indices, numbers, room, whole, 
     )
     nv, d, k, m = v.size, limits.size, 3 * points.shape[0], motion_rows(contacts)
     base, n = nv - d, nv + k
-    if not readable(q, v, targets, base):
+    if not readable(q, v, targets, tree):
         return REFUSED
     room[0], whole[0] = 1, 1
     velocity, drift = table(room, tree.shape[0], 6), table(room, tree.shape[0], 6)

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only, unit_quaternion
+from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.errors import InputError, UnknownNameError, unknown_name
-from floatbase.robots.robot import Foot, Robot, torque_limits_of
+from floatbase.robots.robot import Foot, Robot, check_turns, torque_limits_of
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def _robot(
         package_dirs=loader.package_dirs,
         feet=_feet(name, entry, feet, foot_radius, loader.free_flyer),
         torque_limits=_torque_limits(model, loader.free_flyer, entry, torque_limits),
-        posture=start if posture is None else _checked_posture(name, model, loader.free_flyer, posture),
+        posture=start if posture is None else _checked_posture(model, posture),
         description=entry.description if entry else "",
         sources=entry.sources if entry else {},
     )
@@ -226,10 +226,9 @@ def _reference(model: pin.Model, loader: _Loader, entry: Entry | None) -> Array:
     return read_only(pin.normalize(model, q))
 
 
-def _checked_posture(name: str, model: pin.Model, floating: bool, asked: npt.ArrayLike) -> Array:
+def _checked_posture(model: pin.Model, asked: npt.ArrayLike) -> Array:
     q = checked("posture", asked, (model.nq,))
-    if floating:
-        unit_quaternion(f"posture[3:7] of {name}", q[3:7])
+    check_turns(model, "posture", q)
     return q
 
 

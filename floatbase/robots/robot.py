@@ -197,6 +197,26 @@ class Robot:
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
 
 
+def check_turns(model: pin.Model, name: str, q: Array, hint: str = "") -> None:
+    """Check that what stands for a turn in q, shape (nq,), has length 1: quaternions, and (cos, sin) of joints without limits.
+
+    Raises `InputError` with the place in `name`, what to divide by, and the hint.
+    """
+    if pin.isNormalized(model, q, 1e-6):
+        return
+    for i in range(1, model.njoints):
+        places = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # they come first
+        turn = slice(model.idx_qs[i] + places, model.idx_qs[i] + model.nqs[i])
+        length = float(np.linalg.norm(q[turn]))
+        if model.nqs[i] == model.nvs[i] or abs(length - 1.0) <= 1e-6:
+            continue
+        place = f"{name}[{turn.start}:{turn.stop}]"
+        what = f"the base quaternion {place} (x y z w)"
+        if i > 1 or places != 3:
+            what = f"{place}, {'cosine and sine' if turn.stop - turn.start == 2 else 'the quaternion'} of {model.names[i]!r},"
+        raise InputError(f"{what} has length {length:.6g}; it must be 1. Divide it by its length{hint}.")
+
+
 def spread_corners(frame: str, corners: Array) -> Array:
     """The corners, after checking that they span an area: on a line they cannot hold all six motions of a foot."""
     if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=1e-6) < 2:

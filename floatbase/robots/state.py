@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, read_only, unit_quaternion
+from floatbase._arrays import Array, checked, read_only
 from floatbase.errors import InputError
-from floatbase.robots.robot import Robot
+from floatbase.robots.robot import Robot, check_turns
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -21,7 +21,8 @@ class State:
     q: shape (nq,): base position [m, world], base quaternion x y z w, joints [rad or m].
     v: shape (nv,): base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint velocities.
     Jacobians, velocities and drifts of frames are given in the world-aligned frame at the point asked for.
-    Raises `InputError` for wrong shapes, entries that are not finite and quaternions that are not of unit length.
+    Raises `InputError` for wrong shapes, entries that are not finite, and turns (the base's quaternion, (cos, sin) of joints
+    without limits) that are not of unit length.
     """
 
     robot: Robot
@@ -34,8 +35,7 @@ class State:
         vars(self)["robot"] = robot
         vars(self)["q"] = checked("q", q, (robot.nq,))
         vars(self)["v"] = checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,))
-        if robot.is_floating:
-            unit_quaternion("q[3:7]", self.q[3:7], ", or use robot.standing()")
+        check_turns(robot.model, "q", self.q, ", or use robot.standing()")
 
     def __setattr__(self, name: str, value: object) -> None:
         raise InputError(f"a State does not change; state.at({name}=…) makes a new one." if name in "qv" else f"no {name}.")

@@ -205,6 +205,9 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
     both = pair(robot, fb.Contacts.none(), tasks)
     for seed in range(5):
         assert difference(both, robot.random_state(seed, 0.8)) < TORQUE
+    for controller in both:
+        with pytest.raises(InputError, match=r"q\[0:2\], cosine and sine of 'j0', has length 2; it must be 1"):
+            controller([2.0, 0.0, 0.1], np.zeros(2))
 
 
 # the same verdicts and words -----------------------------------------------------------------------------------------------
