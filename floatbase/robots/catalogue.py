@@ -166,7 +166,7 @@ def _robot(
         model=model,
         urdf=loader.urdf,
         package_dirs=loader.package_dirs,
-        feet=_feet(name, entry, feet, foot_radius, loader.free_flyer),
+        feet=_feet(name, model, entry, feet, foot_radius, loader.free_flyer),
         torque_limits=_torque_limits(model, loader.free_flyer, entry, torque_limits),
         posture=start if posture is None else _checked_posture(model, posture),
         description=entry.description if entry else "",
@@ -242,8 +242,20 @@ def _torque_limits(model: pin.Model, free_flyer: bool, entry: Entry | None, aske
     return read_only(np.where(effort > 0, effort, np.inf))  # URDF writers put 0 where they do not know
 
 
+def limb_ends(model: pin.Model) -> tuple[str, ...]:
+    """Names of the links that carry no other link, behind the last joint of a limb: feet, fingers, heads."""
+    inner = set(model.parents)
+    bodies = {i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}
+    above: set[int] = set()
+    for i in bodies:
+        while i:
+            i = int(model.frames[i].parentFrame)
+            above.add(i)
+    return tuple(str(model.frames[i].name) for i in sorted(bodies - above) if model.frames[i].parentJoint not in inner)
+
+
 def _feet(
-    name: str, entry: Entry | None, asked: Sequence[str | Foot] | None, radius: float | None, free_flyer: bool
+    name: str, model: pin.Model, entry: Entry | None, asked: Sequence[str | Foot] | None, radius: float | None, free_flyer: bool
 ) -> tuple[Foot, ...]:
     if asked is None:
         if radius is not None:
@@ -251,7 +263,8 @@ def _feet(
         if entry is None and free_flyer:
             raise InputError(
                 f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be given: "
-                f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02).'
+                f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
+                f"Its limbs end with {', '.join(limb_ends(model))}."
             )
         return entry.feet if entry else ()
     if isinstance(asked, str):

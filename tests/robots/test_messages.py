@@ -36,6 +36,7 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
             r"'my/robot.urdf' is no robot's name but a file's; fb.load_urdf\('my/robot.urdf', feet=\[…\]\).*: go2, solo12, ",
         ),
         (lambda: fb.load(Path("x.urdf")), UnknownNameError, r"fb.load_urdf\('x.urdf'"),
+        (lambda: fb.load("anymal"), InputError, r"limbs end with .*LF_FOOT.*, RH_FOOT"),
         (lambda: fb.load("anymal"), InputError, r'so its feet must be given: fb.load\("anymal", feet=\["name of a foot frame'),
         (lambda: fb.load("cassie"), InputError, "cassie comes as an SDF file; floatbase reads URDF. Choose one of go2"),
         (lambda: fb.load("go2", feet="FL_foot"), InputError, r'must be a list of frames, as in feet=\["FL_foot"\]'),
