@@ -304,18 +304,25 @@ def _is_possible(body: mujoco.MjsBody) -> bool:
 
 def _hand_inertia_on(body: mujoco.MjsBody) -> None:
     """Add a placeholder link's impossible inertia to a welded neighbour's: their sum, which is all that moves, is possible."""
-    welded = [child for child in body.bodies if not child.joints and np.isfinite(child.fullinertia[0])]
-    if not welded:
+    welded = {child.name: (child, _placement(child).inverse()) for child in body.bodies if not child.joints}
+    if not body.joints and body.parent.name != "world":
+        welded[body.parent.name] = (body.parent, _placement(body))
+    neighbours = [found for found in welded.values() if np.isfinite(found[0].fullinertia[0])]
+    if not neighbours:
         return  # MuJoCo will say what is wrong with it
-    child = max(welded, key=lambda c: float(c.mass))
-    R = np.zeros(9)
-    mujoco.mju_quat2Mat(R, np.array(child.quat))
-    placement = pin.SE3(R.reshape(3, 3), np.array(child.pos))
-    total = _inertia(child) + placement.actInv(_inertia(body))
+    neighbour, placement = max(neighbours, key=lambda found: float(found[0].mass))
+    total = _inertia(neighbour) + placement.act(_inertia(body))
     tensor = total.inertia
-    child.mass, child.ipos = total.mass, total.lever
-    child.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+    neighbour.mass, neighbour.ipos = total.mass, total.lever
+    neighbour.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     body.mass, body.fullinertia, body.explicitinertial = 0.0, [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], False
+
+
+def _placement(body: mujoco.MjsBody) -> pin.SE3:
+    """A body's frame in its parent's."""
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, np.array(body.quat))
+    return pin.SE3(R.reshape(3, 3), np.array(body.pos))
 
 
 def _add_ground(spec: mujoco.MjSpec, ground: Ground) -> None:

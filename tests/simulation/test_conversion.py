@@ -86,3 +86,12 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and
     for _ in range(100):
         sim.step(np.ones(6), (lift,))
     assert sim.state.com_velocity[2] - state.com_velocity[2] == pytest.approx(0.1 * loose.gravity, rel=0.01)
+
+
+def test_a_foot_without_a_possible_inertia_is_joined_to_the_leg_that_carries_it() -> None:
+    """hyq's feet are links of a small mass without inertia, which MuJoCo refuses; nothing is welded to them from below."""
+    robot = fb.load("hyq", feet=["lf_foot", "lh_foot", "rf_foot", "rh_foot"], foot_radius=0.02)
+    state = robot.random_state(0)
+    judge = judges.Mujoco(robot).at(state)
+    assert judges.relative(state.M, judge.M) < 1e-9
+    assert judges.relative(state.h, judge.h) < 1e-9
