@@ -291,7 +291,9 @@ def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
     """A body's inertia in its own frame, as the URDF gives it."""
     ixx, iyy, izz, ixy, ixz, iyz = body.fullinertia
     tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    return pin.Inertia(float(body.mass), np.array(body.ipos), tensor)
+    inertia = pin.Inertia.Zero()  # its constructor refuses tensors that are not positive, and we look for those
+    inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), tensor
+    return inertia
 
 
 def _is_possible(body: mujoco.MjsBody) -> bool:

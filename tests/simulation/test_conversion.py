@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import floatbase as fb
+from floatbase.errors import SimulationError
 
 seeds = st.integers(0, 100_000)
 any_robot = st.sampled_from(judges.ROBOTS)
@@ -95,3 +96,8 @@ def test_a_foot_without_a_possible_inertia_is_joined_to_the_leg_that_carries_it(
     judge = judges.Mujoco(robot).at(state)
     assert judges.relative(state.M, judge.M) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
+
+
+def test_a_moving_link_with_an_impossible_inertia_is_named() -> None:
+    with pytest.raises(SimulationError, match=r"(?s)MuJoCo cannot build icub .*inertia.*'r_hip_2'"):
+        fb.Simulation(fb.load("icub", feet=["l_sole", "r_sole"]))
