@@ -1,12 +1,14 @@
-"""What stands between `WholeBodyController` and its compiled kernel: does the problem fit, and its tables of numbers.
+"""What stands between `WholeBodyController` and its fast paths: does the problem fit, and its tables of numbers.
 
-`obstacle` says in words why a problem does not fit. `Program` holds the tables of one controller and runs one tick. Rows of
-tables that belong to one robot or one contact are made once and kept, so that a controller with other contacts is cheap.
+`obstacle` says in words why a problem does not fit, `kernel_obstacle` why nothing can be compiled. A `Program` holds the tables
+of one controller and runs one tick: `Compiled` by the kernel, `floatbase.control.reduced.Reduced` by numpy. Rows of tables that
+belong to one robot or one contact are made once and kept, so that a controller with other contacts is cheap.
 """
 
 from __future__ import annotations
 
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -14,7 +16,7 @@ from functools import lru_cache
 from importlib.util import find_spec
 from math import prod
 from threading import Lock, Timer
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -29,10 +31,14 @@ from floatbase.robots.robot import Robot
 if TYPE_CHECKING:
     from floatbase.control.controller import Limits
 
-_MOTION = {CoMTask: 0, OrientationTask: 1, FrameTask: 2}
-_KINDS: dict[type, int] = {**_MOTION, PostureTask: 3, ForceTask: 4, TorqueTask: 5}
+COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)  # kinds of task, and
+POINT, FLAT = range(2)  # of contact, as in the kernel
+_KINDS: dict[type, int] = {
+    CoMTask: COM, OrientationTask: ORIENTATION, FrameTask: FRAME, PostureTask: POSTURE, ForceTask: FORCE, TorqueTask: TORQUE
+}  # fmt: skip
 # their axes stand still in the joint's own frame
 _JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
+_WORLD = pin.Convention.WORLD
 _POSE = 12  # numbers of a pose: rotation column by column, then the place
 
 
@@ -49,22 +55,19 @@ def told_when_slow(text: str, after: float = 6.0) -> Iterator[None]:
 
 
 def obstacle(robot: Robot, contacts: Contacts, tasks: Sequence[Task], solver: str) -> str:
-    """Why the compiled path cannot serve this problem, or "" when it can."""
-    missing = _kernel_obstacle()
-    if missing:
-        return missing
+    """Why the fast paths cannot serve this problem, or "" when they can."""
     if solver != "daqp":
-        return f"solver {solver!r} was asked for, and the compiled path has its own"
+        return f"solver {solver!r} was asked for, and the fast paths have their own"
     for contact in contacts:
         if type(contact) not in (PointContact, FlatFootContact):
-            return f"contact {contact.name!r} is a {type(contact).__name__}; compiled are point contacts and flat feet"
+            return f"contact {contact.name!r} is a {type(contact).__name__}; the fast paths take point contacts and flat feet"
     for task in tasks:
         if type(task) not in _KINDS:
-            return f"task {task.name!r} is a {type(task).__name__}; compiled are the tasks of the package"
+            return f"task {task.name!r} is a {type(task).__name__}; the fast paths take the tasks of the package"
     return _robot_obstacle(robot)
 
 
-def _kernel_obstacle() -> str:
+def kernel_obstacle() -> str:
     """Why the kernel cannot be had at all: numba is not there, or does not fit the packages beside it."""
     if find_spec("numba") is None:
         return 'numba is not installed: pip install "floatbase[fast]"'
@@ -82,7 +85,7 @@ def _robot_obstacle(robot: Robot) -> str:
     for i, joint in enumerate(robot.model.joints):
         kind = joint.shortname()
         if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
-            return f"joint {robot.model.names[i]!r} is a {kind}; compiled are revolute and prismatic joints"
+            return f"joint {robot.model.names[i]!r} is a {kind}; the fast paths take revolute and prismatic joints"
     return dynamics_of(robot).check()
 
 
@@ -90,29 +93,43 @@ def _robot_obstacle(robot: Robot) -> str:
 class Dynamics:
     """Pinocchio's results of one robot as live views, and the tables that say how its joints hang together.
 
-    M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), oMi (n, 12): overwritten by every `update`. tree: (n, 5), links: (n, 4) as in
-    the kernel. lock: held from `update` until the views have been read.
+    views: M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), oMi (n, 12), overwritten by every `update`. rates: dJ/dt (6, nv), twists
+    (6 n,), by `update_rates`. tree: (n, 5), links: (n, 4) as in the kernel. lock: held from `update` until the views have been
+    read.
     """
 
     robot: Robot
     data: pin.Data
     views: tuple[Array, ...]
+    rates: tuple[Array, Array]
     tree: npt.NDArray[np.int64]
     links: Array
     lock: Any
 
+    @property
+    def mass(self) -> float:
+        """Of all links, kg."""
+        return float(self.links[1:, 0].sum())
+
     def update(self, q: Array, v: Array) -> None:
         """Fill the views for a configuration and a velocity: all that a tick needs from Pinocchio."""
         pin.nonLinearEffects(self.robot.model, self.data, q, v)
-        pin.crba(self.robot.model, self.data, q, pin.Convention.WORLD)
+        pin.crba(self.robot.model, self.data, q, _WORLD)
+
+    def update_rates(self, q: Array, v: Array) -> None:
+        """Fill `rates`: how J moves, and the world's view of how all joints move, about its origin."""
+        pin.computeJointJacobiansTimeVariation(self.robot.model, self.data, q, v)
 
     def check(self) -> str:
         """What is wrong with the views here, or ""."""
-        q = self.robot.posture
+        q, v = self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv)
         with self.lock:
-            self.update(q, np.zeros(self.robot.nv))
+            self.update(q, v)
+            self.update_rates(q, v)
             poses = np.array([_pose(placement) for placement in self.data.oMi])
+            twists = np.concatenate([twist.vector for twist in self.data.ov])
             fits = np.array_equal(poses, self.views[-1]) and np.array_equal(self.views[0], self.views[0].T)
+            fits &= np.array_equal(twists, self.rates[1])
         return "" if fits else "this Pinocchio lays its results out in another way in memory"
 
 
@@ -125,12 +142,13 @@ def dynamics_of(robot: Robot) -> Dynamics:
     tree = [(model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i]) for i in range(model.njoints)]
     links = [(inertia.mass, *inertia.lever) for inertia in model.inertias]
     views = (data.M, data.nle, data.J, data.Ag, oMi)
-    return Dynamics(robot, data, views, np.array(tree, dtype=np.int64), np.array(links), Lock())
+    rates = (data.dJ, np.lib.stride_tricks.as_strided(data.ov[0].linear, (6 * model.njoints,), (8,)))
+    return Dynamics(robot, data, views, rates, np.array(tree, dtype=np.int64), np.array(links), Lock())
 
 
 @dataclass(frozen=True, eq=False)
 class _ContactTable:
-    """One contact as the kernel takes it: joint and kind, frame (16,), points (p, 3), cones (p, F + 1, 3)."""
+    """One contact as programs take it: joint and kind, frame (16,), points (p, 3), cones (p, F + 1, 3)."""
 
     joint: int
     kind: int
@@ -151,20 +169,21 @@ def _contact_table(robot: Robot, contact: PointContact | FlatFootContact, facets
     return _ContactTable(joint, int(flat), frame, np.array(points), np.tile(cone, (len(points), 1, 1)))
 
 
+Answer = tuple[Array, int]  # numbers, and how many rows hold them
 Target = tuple[int, int, tuple[int, ...], str, Callable[[float], npt.ArrayLike]]  # task, place in the table, shape, attribute
 
 
-class Program:
+class Program(ABC):
     """The tables of one controller, and its tick.
 
     Raises `UnknownNameError` for a frame that does not exist; `fits` is False when a target has the wrong length, which the
     readable path puts into words.
     """
 
-    def __init__(self, robot: Robot, contacts: Contacts, tasks: Sequence[Task], limits: Limits):
-        from floatbase.control import kernel
+    path: ClassVar[Literal["compiled", "reduced"]]
 
-        self.dynamics, self.kernel, self.parts = dynamics_of(robot), kernel.tick, kernel.PARTS
+    def __init__(self, robot: Robot, contacts: Contacts, tasks: Sequence[Task], limits: Limits):
+        self.dynamics = dynamics_of(robot)
         self.robot, self.q_shape, self.v_shape, self.nv, self.d = robot, (robot.nq,), (robot.nv,), robot.nv, robot.d
         self.fits = True
         self._tasks = tuple(tasks)
@@ -172,13 +191,11 @@ class Program:
         contact_tables = _stack_contacts(robot, contacts, limits)
         self.targets, task_tables = self._task_tables(robot, tasks, contacts.k)
         bounds = (np.array(limits.torque_limits), float(limits.min_normal_force))
-        tables = packed(self.dynamics, contact_tables, task_tables, bounds)
-        real, whole = kernel.room_sizes(tables[0], sum(len(contact.row_names) for contact in contacts))
-        room = np.empty(real), np.empty(whole, np.int64)  # of one tick at a time: the dynamics' lock sees to it
-        self.arrays = *self.dynamics.views, *tables, *room
         self.size, self.entries = self.nv + self.d + contacts.k, self.nv + contacts.k
+        self.motion_rows = sum(len(contact.row_names) for contact in contacts)
         self._limited = np.isfinite(limits.torque_limits)
         self.force_rows = contact_tables[4].size
+        self._prepare(contact_tables, task_tables, bounds)
 
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, Array] | None:
         """The answer as `kernel.tick` lays it out, (q̈, τ, λ) first, how many rows hold it, and the targets of time t.
@@ -190,11 +207,19 @@ class Program:
         targets = self._targets_at(t) if self._moving else self.targets
         if targets is None:
             return None
-        dynamics, answer = self.dynamics, np.empty(self.size + 2 * self.entries)
-        with dynamics.lock:
-            dynamics.update(q, v)
-            held = self.kernel(q, v, targets, *self.arrays, answer, self.parts)
-        return (answer, held, targets) if held >= 0 else None
+        answer = self._answer(q, v, targets)
+        return None if answer is None else (*answer, targets)
+
+    @abstractmethod
+    def _prepare(self, contact_tables: tuple[Any, ...], task_tables: tuple[Any, ...], bounds: tuple[Array, float]) -> None:
+        """Take the tables of contacts and tasks, the torque limits (d,) and the least normal force."""
+
+    @abstractmethod
+    def _answer(self, q: Array, v: Array, targets: Array) -> Answer | None:
+        """The answer for q (nq,), v (nv,) and all targets, and how many rows hold it; None as for the tick.
+
+        It is (q̈, τ, λ), from `size` on the multipliers of the rows that push, from `size` + `entries` on their numbers.
+        """
 
     def tasks(self, targets: Array) -> tuple[Task, ...]:
         """The tasks with the targets of one tick, as `__call__` gave them: functions may answer otherwise when asked again."""
@@ -248,6 +273,28 @@ class Program:
         return np.concatenate([np.zeros(0), *parts]), (table, gains, frames)
 
 
+class Compiled(Program):
+    """The tick by the kernel."""
+
+    path = "compiled"
+
+    def _prepare(self, contact_tables: tuple[Any, ...], task_tables: tuple[Any, ...], bounds: tuple[Array, float]) -> None:
+        from floatbase.control import kernel
+
+        self.kernel, self.parts = kernel.tick, kernel.PARTS
+        tables = packed(self.dynamics, contact_tables, task_tables, bounds)
+        real, whole = kernel.room_sizes(tables[0], self.motion_rows)
+        room = np.empty(real), np.empty(whole, np.int64)  # of one tick at a time: the dynamics' lock sees to it
+        self.arrays = *self.dynamics.views, *tables, *room
+
+    def _answer(self, q: Array, v: Array, targets: Array) -> Answer | None:
+        dynamics, answer = self.dynamics, np.empty(self.size + 2 * self.entries)
+        with dynamics.lock:
+            dynamics.update(q, v)
+            held = self.kernel(q, v, targets, *self.arrays, answer, self.parts)
+        return (answer, held) if held >= 0 else None
+
+
 def _stack_contacts(robot: Robot, contacts: Contacts, limits: Limits) -> tuple[Any, ...]:
     """Tables contacts (C, 4), frames (C, 16), points (P, 3), cones (P, F + 1, 3), lengths (P, F + 1)."""
     parts = [_contact_table(robot, _known(contact), limits.facets, limits.inside) for contact in contacts]
@@ -279,7 +326,7 @@ def _known(contact: Contact) -> PointContact | FlatFootContact:
 
 
 def _targets(task: Task, robot: Robot, k: int) -> tuple[tuple[str, tuple[int, ...]], ...]:
-    """The targets of a task, in the order the kernel reads them: attribute and shape."""
+    """The targets of a task, in the order in which they are read: attribute and shape."""
     if isinstance(task, OrientationTask):
         return (("rotation", (3, 3)), ("angular_velocity", (3,)), ("angular_acceleration", (3,)))
     if isinstance(task, PostureTask):

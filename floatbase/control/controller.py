@@ -1,4 +1,4 @@
-"""`WholeBodyController`: (26)(27) assembled by `build_qp`, solved each tick; where it can, by the compiled kernel."""
+"""`WholeBodyController`: (26)(27) assembled by `build_qp`, solved each tick; where it can, on a fast path."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
-from floatbase.control.compiled import Program, obstacle, told_when_slow
+from floatbase.control.compiled import Compiled, Program, kernel_obstacle, obstacle, told_when_slow
 from floatbase.control.friction import FrictionPolyhedron
 from floatbase.control.qp import QP, Solution, check_solver, finished, solve
 from floatbase.dynamics.contacts import Contacts
@@ -23,7 +23,7 @@ from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
 
 MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
-Path: TypeAlias = Literal["auto", "compiled", "readable"]
+Path: TypeAlias = Literal["auto", "compiled", "reduced", "readable"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +53,8 @@ class Command:
 
     tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the contact
     forces planned with them, stacked as in `contacts`. active: names of the inequality rows that push; multipliers: theirs,
-    by name. path: which of the controller's two paths answered, "compiled" or "readable". evidence: makes `solution`, the
-    readable problem with this answer to it; it is put together when first asked for, which the tick need not wait for.
+    by name. path: which of the controller's paths answered, "compiled", "reduced" or "readable". evidence: makes `solution`,
+    the readable problem with this answer to it; it is put together when first asked for, which the tick need not wait for.
     """
 
     tau: Array
@@ -207,12 +207,12 @@ class WholeBodyController:
     torque_limits: N·m, one number or (d,), the robot's by default; np.inf switches them off. solver: one of
     `floatbase.control.qp.solvers()`.
 
-    path: "readable" assembles and solves the QP as it is written; "compiled" solves the same problem in `kernel.py`, many
-    times faster, where numba is installed and the problem is one of the package's own tasks and contacts; "auto" takes
-    compiled where it can. The attribute `path` says which it is, `path_reason` why. The first controller ever compiles for
-    about half a minute, unless the set-up did (`python -m floatbase compile`); later ones load what was compiled.
-    A tick that the kernel cannot answer to its last digits, or that has no answer, is answered by the readable path, and
-    its `Command.path` says so.
+    path: "readable" assembles and solves the QP as it is written. Where tasks and contacts are the package's own, two paths
+    solve the same problem many times faster: "reduced" by numpy in the document's β space (`reduced.py`), and "compiled" in
+    `kernel.py`, which is the fastest and needs numba. "auto" takes compiled where it can, else reduced, else readable. The
+    attribute `path` says which it is, `path_reason` why. The first compiled controller ever compiles for about half a minute,
+    unless the set-up did (`python -m floatbase compile`); later ones load what was compiled. A tick that a fast path cannot
+    answer to its last digits, or that has no answer, is answered by the readable path, and its `Command.path` says so.
 
     Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError` with the rows in conflict.
     """
@@ -257,7 +257,7 @@ class WholeBodyController:
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
         if self._program is not None:
-            command = self._compiled_tick(self._program, q, v, t)
+            command = self._fast_tick(self._program, q, v, t)
             if command is not None:
                 return command
         solution = solve(self.qp(State(self.robot, q, v), t), self.solver)
@@ -269,8 +269,8 @@ class WholeBodyController:
             evidence=lambda: solution,
         )
 
-    def _compiled_tick(self, program: Program, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
-        """The kernel's answer, or None where the readable path must give it, or say what is wrong."""
+    def _fast_tick(self, program: Program, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
+        """The program's answer, or None where the readable path must give it, or say what is wrong."""
         try:
             q, v = np.array(q, dtype=np.float64), np.array(v, dtype=np.float64)
         except (TypeError, ValueError):
@@ -285,9 +285,9 @@ class WholeBodyController:
         def evidence() -> Solution:
             eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
             qp = build_qp(eom, program.tasks(targets), self.limits, t)
-            return finished(qp, numbers[:end], program.multipliers(numbers, held, len(qp.G)), "compiled", held)
+            return finished(qp, numbers[:end], program.multipliers(numbers, held, len(qp.G)), program.path, held)
 
-        return Command(numbers[nv:tail], numbers[:nv], numbers[tail:end], self.contacts, evidence, "compiled")
+        return Command(numbers[nv:tail], numbers[:nv], numbers[tail:end], self.contacts, evidence, program.path)
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""
@@ -305,7 +305,7 @@ class WholeBodyController:
         return other
 
     def _warm_up(self) -> None:
-        """Run one tick, which compiles, or loads what was compiled, so that the loop need not wait for it."""
+        """Run one tick, which compiles or loads what it needs, so that the loop need not wait for it."""
         if self._program is not None:
             standing = self.robot.standing()
             with told_when_slow("floatbase compiles its controller, once: about half a minute."):
@@ -320,27 +320,39 @@ class WholeBodyController:
         self._warm_up()
 
     def _choose_path(self) -> None:
-        """Set `path`, `path_reason` and the tables of the kernel, or raise when compiled was asked for and cannot be."""
+        """Set `path`, `path_reason` and the tables of a fast path, or raise when one was asked for and cannot be."""
         self._program: Program | None = None
-        self.path: Literal["compiled", "readable"] = "readable"
+        self.path: Literal["compiled", "reduced", "readable"] = "readable"
         self.path_reason = "it was asked for"
         if self.asked_path == "readable":
             return
+        missing = "" if self.asked_path == "reduced" else kernel_obstacle()
         reason = obstacle(self.robot, self.contacts, self.tasks, self.solver)
-        if reason and self.asked_path == "compiled":
-            raise InputError(f'path="compiled" is not possible: {reason}. path="auto" would take the readable path.')
+        if self.asked_path == "compiled":
+            reason = missing or reason
+        if reason and self.asked_path != "auto":
+            raise InputError(f'path="{self.asked_path}" is not possible: {reason}. path="auto" takes the fastest that is.')
         if reason:
             self.path_reason = reason
             return
-        program = Program(self.robot, self.contacts, self.tasks, self.limits)
+        kind = _reduced() if missing or self.asked_path == "reduced" else Compiled
+        program = kind(self.robot, self.contacts, self.tasks, self.limits)
         if not program.fits:
             self.path_reason = "a target has the wrong shape"
             return
-        self._program, self.path = program, "compiled"
-        self.path_reason = "numba is installed, and the tasks and contacts are the package's own"
+        self._program, self.path = program, program.path
+        why = "it was asked for" if self.asked_path == "reduced" else missing or "numba is installed"
+        self.path_reason = f"the tasks and contacts are the package's own; {why}"
 
     def __repr__(self) -> str:
         return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"
+
+
+def _reduced() -> type[Program]:
+    """The path without a compiler, loaded when it is needed: scipy's linear algebra takes a while."""
+    from floatbase.control.reduced import Reduced
+
+    return Reduced
 
 
 def _checked_contacts(contacts: Contacts) -> Contacts:
