@@ -1,9 +1,9 @@
-"""How fast the controller's tick is, and that its two paths agree: one command, a table and a plot.
+"""How fast the controller's tick is, and that its paths agree: one command, a table and a plot.
 
     python benchmarks/tick.py                      times, growth, closed loop -> benchmarks/tick.md, benchmarks/tick.png
     python benchmarks/tick.py --agreement 2000     compares the paths on that many random states for each robot and stance
 
-Both paths take turns within one run, on the same states. Times are ratios to be trusted, microseconds to be taken with salt.
+All paths take turns within one run, on the same states. Times are ratios to be trusted, microseconds to be taken with salt.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from floatbase.errors import InfeasibleError
 
 HERE = Path(__file__).parent
 ROBOTS = ("go2", "solo12", "talos")
+FAST = ("compiled", "reduced")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 
 
@@ -68,19 +69,24 @@ def interleaved(
 
 
 def tick_times(n: int) -> Iterator[str]:
-    """Both paths, by robot and difficulty."""
-    yield "| robot | states | rows that push | compiled median | compiled p99 | readable median | readable p99 | ratio |"
-    yield "|---|---|---|---|---|---|---|---|"
+    """All paths, by robot and difficulty."""
+    paths = (*FAST, "readable")
+    yield (
+        "| robot | states | rows that push |"
+        + "".join(f" {path} median | {path} p99 |" for path in paths)
+        + " ratio to readable |"
+    )
+    yield "|---" * (4 + 2 * len(paths)) + "|"
     for name in ROBOTS:
         robot = fb.load(name)
-        fast, slow = controller(robot), controller(robot, "readable")
+        controllers = [controller(robot, path) for path in paths]
         for label, spread in SPREADS.items():
             at = states(robot, n, spread)
-            pushing = np.mean([fast._program(q, v, 0.0)[1] for q, v in at])
-            quick, plain = interleaved([fast, slow], at, 3)
-            numbers = (*np.percentile(quick, [50, 99]), *np.percentile(plain, [50, 99]))
-            text = " | ".join(f"{number:.1f} µs" for number in numbers)
-            yield f"| {name} | {label} | {pushing:.1f} | {text} | {numbers[2] / numbers[0]:.0f} × |"
+            pushing = np.mean([controllers[0]._program(q, v, 0.0)[1] for q, v in at])
+            numbers = [np.percentile(times, [50, 99]) for times in interleaved(controllers, at, 3)]
+            text = " | ".join(f"{number:.1f} µs" for number in np.concatenate(numbers))
+            ratios = ", ".join(f"{numbers[-1][0] / fast[0]:.0f} ×" for fast in numbers[:-1])
+            yield f"| {name} | {label} | {pushing:.1f} | {text} | {ratios} |"
 
 
 def parts(n: int) -> Iterator[str]:
@@ -102,6 +108,33 @@ def parts(n: int) -> Iterator[str]:
                 ]
                 ends = [np.min(times) for times in (update, *ticks, clock(fast, [(q, v)] * 5))]
                 spent.append([ends[0], *np.diff([0.0, *ends[1:-1]]), ends[-1] - ends[0] - ends[-2]])
+            yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0)) + " |"
+
+
+def reduced_parts(n: int) -> Iterator[str]:
+    """The reduced tick taken apart: each part called alone on the same states, so that they add up to a little less."""
+    yield "| robot | states | dynamics | rows | elimination | objective | optimum | Python around them |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for name in ROBOTS:
+        fast = controller(fb.load(name), "reduced")
+        program = fast._program
+        for label, spread in SPREADS.items():
+            spent = []
+            for q, v in states(fast.robot, n, spread):
+                if program(q, v, 0.0) is None:
+                    continue
+                dynamics = (program.dynamics.update, program.dynamics.update_rates, program._update)
+                ends = [np.min(clock(call, [(q, v)] * 5)) for call in dynamics]
+                space, given = program._reduced(), (q, v, program.targets)
+                rest = (
+                    (program._reduced, ()),
+                    (program._objective, (space, *given)),
+                    (program._optimum, (space,)),
+                    (fast, (q, v)),
+                )
+                update, rates, measured, *others = *ends, *(np.min(clock(call, [args] * 5)) for call, args in rest)
+                row = [update + rates, measured - update - rates, *others[:3]]
+                spent.append([*row, others[3] - sum(row)])
             yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0)) + " |"
 
 
@@ -156,9 +189,9 @@ def closed_loop(seconds: float = 4.0) -> Iterator[str]:
     """MuJoCo and the controller at 1 kHz, in the loop written out and in `rollout`, which keeps a record."""
     for name in ("go2", "solo12"):
         robot = fb.load(name)
-        for path in ("compiled", "readable"):
+        for path in (*FAST, "readable"):
             command, sim = controller(robot, path), fb.Simulation(robot)
-            ticks = round((seconds if path == "compiled" else seconds / 8) / sim.timestep)
+            ticks = round((seconds if path in FAST else seconds / 8) / sim.timestep)
             start = time.perf_counter()
             for _ in range(ticks):
                 sim.step(command(sim.q, sim.v, sim.time).tau)
@@ -170,33 +203,43 @@ def closed_loop(seconds: float = 4.0) -> Iterator[str]:
 
 
 def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
-    """Largest torque difference of the two paths on n random states of every robot and stance."""
-    yield "| robot | feet | states | infeasible | left to the readable path | largest difference |"
-    yield "|---|---|---|---|---|---|"
+    """Largest torque difference of each fast path from the readable one, on n random states of every robot and stance."""
+    paths = " | ".join(f"{path}: left to the readable path | largest difference" for path in FAST)
+    yield f"| robot | feet | states | infeasible | {paths} |"
+    yield "|---" * (4 + 2 * len(FAST)) + "|"
     for name in names or fb.robots():
         robot = fb.load(name)
         whole = fb.Contacts.feet(robot)
         for count in range(min(1, len(whole)), len(whole) + 1):
             contacts = whole.only(*whole.names[:count]) if count else whole
-            fast, slow = (controller(robot, path, contacts=contacts) for path in ("compiled", "readable"))
-            worst, infeasible, left = 0.0, 0, 0
+            *fast, slow = (controller(robot, path, contacts=contacts) for path in (*FAST, "readable"))
+            worst, left, infeasible = np.zeros(len(fast)), np.zeros(len(fast), int), 0
             for seed in range(n):
                 state = robot.random_state(seed, tuple(SPREADS.values())[seed % 3])
                 try:
                     wanted = slow(state.q, state.v)
                 except InfeasibleError as error:
                     infeasible += 1
-                    try:
-                        fast(state.q, state.v)
-                        raise SystemExit(f"{name}: only one path calls state {seed} infeasible")
-                    except InfeasibleError as other:
-                        if other.rows != error.rows:
-                            raise SystemExit(f"{name}: other rows on state {seed}") from None
+                    for each in fast:
+                        check_verdict(each, state, error.rows, f"{name}, state {seed}")
                     continue
-                found = fast(state.q, state.v)
-                left += found.path == "readable"
-                worst = max(worst, float(np.max(np.abs(found.tau - wanted.tau))))
-            yield f"| {name} | {count} | {n} | {infeasible} | {left} | {worst:.1e} N·m |"
+                for i, each in enumerate(fast):
+                    found = each(state.q, state.v)
+                    left[i] += found.path == "readable"
+                    worst[i] = max(worst[i], float(np.max(np.abs(found.tau - wanted.tau))))
+            text = " | ".join(f"{number} | {most:.1e} N·m" for number, most in zip(left, worst, strict=True))
+            yield f"| {name} | {count} | {n} | {infeasible} | {text} |"
+
+
+def check_verdict(fast: fb.WholeBodyController, state: fb.State, rows: Sequence[str], where: str) -> None:
+    """End with a message unless the controller calls the state infeasible, with the same rows."""
+    try:
+        fast(state.q, state.v)
+    except InfeasibleError as error:
+        if error.rows != rows:
+            raise SystemExit(f"{where}: other rows on the {fast.path} path") from None
+        return
+    raise SystemExit(f"{where}: not infeasible on the {fast.path} path")
 
 
 def long_run(ticks: int) -> Iterator[str]:
@@ -238,6 +281,10 @@ def main() -> None:
         "Compiled, part by part (each alone, best of 5, median over states):",
         "",
         *parts(options.states // 4),
+        "",
+        "Reduced, part by part (likewise):",
+        "",
+        *reduced_parts(options.states // 4),
         "",
     ]
     lines += ["Growth, median tick (tick.png):", "", "| what | number | easy | saturated |", "|---|---|---|---|"]

@@ -148,12 +148,10 @@ class Limits:
         self.G[:, k] = np.concatenate([(bound / lengths).ravel(), reach, reach])
         self.G[self.force_rows :, k + 1 :] = np.vstack([torques, -torques])
         self.lengths = np.concatenate([lengths.ravel(), np.ones(2 * d)])
-        # what DAQP sees: torques between two bounds, and no normal forces where facets keep them from pulling
-        kept = np.arange(self.force_rows).reshape(points, per_point)[:, : None if least else -1].ravel()
-        self.numbers = np.concatenate([kept, self.force_rows + np.arange(d)])
-        self.two_sided = self.G[self.numbers]
-        self.widths = np.concatenate([np.full(len(kept), 2.0 * _FAR), -2.0 * reach])
-        self.senses = np.zeros(len(self.numbers), np.int32)
+        # what DAQP sees: torques between two bounds
+        self.two_sided = np.ascontiguousarray(self.G[: self.force_rows + d])
+        self.widths = np.concatenate([np.full(self.force_rows, 2.0 * _FAR), -2.0 * reach])
+        self.senses = np.zeros(len(self.two_sided), np.int32)
 
 
 class Reduced(Program):
@@ -174,7 +172,12 @@ class Reduced(Program):
             q=self.q_shape[0], v=nv, places=2 * r + 2, moving=2 * r, curved=r, push=3,
             errors=3 * np.sum(kinds == ORIENTATION), loose=loose,
         )  # fmt: skip
-        self._q, self._v, self._quaternion = measured["q"], measured["v"], measured["q"][3:7]
+        self._q, self._v = measured["q"], measured["v"]
+        # what must have length 1: the base's quaternion, (cos, sin) of joints without limits
+        ends = [
+            (place + (3 if size == 7 else 0), place + size) for _, _, moves, place, size in dynamics.tree[1:] if size > moves
+        ]
+        self._turns = [self._q[first:end] for first, end in ends]
         self._state = measured.z[: self.q_shape[0] + nv]
         self._m, t = 3 * len(motion), 3 * len(tasks)
         self._rows = Rows(dynamics, triples, measured)
@@ -250,17 +253,24 @@ class Reduced(Program):
             self._v[:] = v
             if not isfinite(self._state.dot(self._state)):
                 return None
-            if self._base and not abs(self._quaternion.dot(self._quaternion) - 1.0) < 1e-6:
-                return None
+            for turn in self._turns:
+                if not abs(turn.dot(turn) - 1.0) < 1e-6:
+                    return None
             self._update(q, v)
             space = self._reduced()
-            shift = self._residuals.shift(q, v, targets)
-            if space is None or shift is None:
+            if space is None or not self._objective(space, q, v, targets):
                 return None
-            np.dot(self._other_equations, space.V1, space.low)
-            np.multiply(space.inner, space.roots, space.R)
-            space.R_last += shift
             return self._optimum(space)
+
+    def _objective(self, space: Space, q: Array, v: Array, targets: Array) -> bool:
+        """(16)(18)(26) τ and the residuals of all tasks over (β, 1); False where a target cannot be read."""
+        shift = self._residuals.shift(q, v, targets)
+        if shift is None:
+            return False
+        np.dot(self._other_equations, space.V1, space.low)
+        np.multiply(space.inner, space.roots, space.R)
+        space.R_last += shift
+        return True
 
     def _optimum(self, space: Space) -> Answer | None:
         """(26)(27) The optimum without rows, or where it breaks one, `_search`."""
@@ -272,13 +282,10 @@ class Reduced(Program):
         x, broken = self._look(space)
         if broken >= 0:
             return self._search(space, factor)
-        for _ in range(_POLISHED):
-            step, _ = lapack.dpotrs(factor, space.slope())
-            beta -= step
-            if step.dot(step) < _SETTLED * (1.0 + beta.dot(beta)):
-                x, broken = self._look(space)
-                return (x.take(self._order), 0) if broken < 0 else self._search(space, factor)
-        return None
+        if not _polished(space, factor):
+            return None
+        x, broken = self._look(space)
+        return (x.take(self._order), 0) if broken < 0 else self._search(space, factor)
 
     def _look(self, space: Space) -> tuple[Array, int]:
         """(q̈, λ, 1, τ) at β, and the row of (27)(28) that it breaks most, -1 for none."""
@@ -306,8 +313,8 @@ class Reduced(Program):
             return None
         space.beta[:] = beta
         lam: Array = info["lam"]
-        pushing = lam.nonzero()[0]
-        active, mu, rows = limits.numbers.take(pushing), lam.take(pushing), rows.take(pushing, 0)
+        active = lam.nonzero()[0]
+        mu, rows = lam.take(active), rows.take(active, 0)
         if mu.size and mu[mu.argmin()] < 0.0:
             active += limits.d * (mu < 0.0)  # lower limits
             rows, mu = limits.G.take(active, 0).dot(space.limited), np.abs(mu)
@@ -316,7 +323,7 @@ class Reduced(Program):
     def _settled(self, space: Space, factor: Array, active: Indices, rows: Array, mu: Array) -> Answer | None:
         """The optimum, started from rows (·, nb + 1) of G over (β, 1) that push there, or nearly all of them."""
         for _ in range(space.nb):
-            if not _newton(space, factor, rows, mu):
+            if not (_newton(space, factor, rows, mu) if mu.size else _polished(space, factor)):
                 return None
             x, broken = self._look(space)
             pulling = mu.argmin() if mu.size else -1
@@ -336,6 +343,17 @@ class Reduced(Program):
         np.multiply(mu, self._units.take(active), answer[mu_at : mu_at + len(active)])
         answer[mu_at + self.entries : mu_at + self.entries + len(active)] = active
         return answer
+
+
+def _polished(space: Space, factor: Array) -> bool:
+    """Newton's method without rows: H δβ = -slope. Changes β; False where steps do not shrink."""
+    beta = space.beta
+    for _ in range(_POLISHED):
+        step, _ = lapack.dpotrs(factor, space.slope())
+        beta -= step
+        if step.dot(step) < _SETTLED * (1.0 + beta.dot(beta)):
+            return True
+    return False
 
 
 def _newton(space: Space, factor: Array, rows: Array, mu: Array) -> bool:
@@ -377,5 +395,5 @@ def _task_triples(tasks: Array, gains: Array, frames: Array) -> list[Triple]:
     for (kind, joint, _), frame in zip(tasks, frames, strict=True):
         if kind <= FRAME:
             at = None if kind == ORIENTATION else frame[9:12]
-            found.append(Triple(0 if kind == COM else joint, at))
+            found.append(Triple(-1 if kind == COM else joint, at))
     return found

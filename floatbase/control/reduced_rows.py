@@ -34,7 +34,7 @@ class Measured:
 
 
 class Triple(NamedTuple):
-    """Three rows: of the velocity of a body's point, of its turning where `at` is None, or of all momentum where joint is 0.
+    """Three rows: of the velocity of a body's point, of its turning where `at` is None, or of all momentum where joint is -1.
 
     at: (3,) m, in the joint's frame. ball: (3,) m, world, radius × normal: the point itself is that much below `at`, and stays
     there as the body turns. sign: of the rows.
@@ -78,10 +78,11 @@ class Rows:
         self._turns, self._speeds = np.zeros(2 * r, np.intp), np.zeros(2 * r, np.intp)
         self._roll = np.zeros((2 * r, self._twists.size))
         for i, triple in enumerate(triples):
-            self._mask[3 * i : 3 * i + 3] = triple.sign * np.tile(_carriers(dynamics)[triple.joint], 2)
-            if triple.joint == 0:
+            if triple.joint < 0:
                 self._follow_mass(3 * i)
-            elif triple.at is None:
+                continue
+            self._mask[3 * i : 3 * i + 3] = triple.sign * np.tile(_carriers(dynamics)[triple.joint], 2)
+            if triple.at is None:
                 self._pick[3 * i + _XYZ, 3 + _XYZ] = 2 * r + 1
             else:
                 self._follow_point(3 * i, triple, triple.at)
@@ -92,7 +93,7 @@ class Rows:
         self._left, self._right, self._flat = self._both[:, :nv], self._both[:, nv:], self._out.reshape(-1, nv)
         self._half = r
         self.jacobian = self._out[:, :nv]
-        self._masses = [self.jacobian[3 * i : 3 * i + 3] for i, triple in enumerate(triples) if triple.joint == 0]
+        self._masses = [self.jacobian[3 * i : 3 * i + 3] for i, triple in enumerate(triples) if triple.joint < 0]
 
     def _add_place(self, row: int, joint: int, at: Array, share: float) -> None:
         """Places from `row` on follow a joint's point at `at`: columns of its rotation, then its own place."""

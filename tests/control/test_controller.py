@@ -438,7 +438,7 @@ def test_a_task_of_ones_own_is_checked(task: object, text: str) -> None:
         fb.WholeBodyController(robot, fb.Contacts.points(robot), [task])
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
+@pytest.mark.parametrize("path", ["compiled", "reduced", "readable"])
 def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(path: str) -> None:
     if path == "compiled":
         pytest.importorskip("numba")
