@@ -95,20 +95,20 @@ class Rows:
         self.jacobian = self._out[:, :nv]
         self._masses = [self.jacobian[3 * i : 3 * i + 3] for i, triple in enumerate(triples) if triple.joint < 0]
 
-    def _add_place(self, row: int, joint: int, at: Array, share: float) -> None:
-        """Places from `row` on follow a joint's point at `at`: columns of its rotation, then its own place."""
-        for column, factor in enumerate((*at, 1.0)):
-            self._place_map[row + _XYZ, 12 * joint + 3 * column + _XYZ] += share * factor
+    def _add_places(self, row: int, joint: int | slice, at: Array, share: Array | float) -> None:
+        """The place in `row` follows points (…, 3) of joints by share: columns of their rotations, then their own places."""
+        terms = share * np.concatenate([at, np.ones((*at.shape[:-1], 1))], axis=-1)
+        for axis in range(3):
+            self._place_map[row + axis].reshape(-1, 4, 3)[joint, :, axis] += terms
 
     def _follow_mass(self, row: int) -> None:
-        for joint, (mass, *at) in enumerate(self._dynamics.links):
-            if joint:
-                self._add_place(row, joint, np.array(at), mass / self._dynamics.mass)
+        links = self._dynamics.links[1:]
+        self._add_places(row, slice(1, None), links[:, 1:], links[:, :1] / self._dynamics.mass)
 
     def _follow_point(self, row: int, triple: Triple, at: Array) -> None:
         """[1 -p×] and ω × ṗ, with ṗ that of the ball's centre."""
         one, below, twist = len(self._place_map) - 1, len(self._pick), 6 * triple.joint
-        self._add_place(row, triple.joint, at, 1.0)
+        self._add_places(row, triple.joint, at, 1.0)
         self._place_map[row + _XYZ, 0] -= triple.ball
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
@@ -172,8 +172,8 @@ class Residuals:
         self._base_push = dynamics.views[1][:3]
         self._base_turn = dynamics.views[-1][1, :9].reshape(3, 3).T if self._base else None
         self._falls = any(self._tasks[:, 0] == COM) and not self._base
-        self._given = targets
-        self._still = self._constant + self._of_targets @ targets
+        self._given, self._still = targets, self._of_z[:, measured.first["places"] + len(measured["places"]) - 1]  # over the 1
+        self._still[:] = self._constant + self._of_targets @ targets
         self._goals = [self._goal(targets, turn) for turn in self._turning]
 
     def _motion(self, i: int, weights: Array) -> None:
@@ -233,11 +233,11 @@ class Residuals:
 
     def shift(self, q: Array, v: Array, targets: Array) -> Array | None:
         """√weight × what the residuals hold beside q̈, λ and τ, shape (rows,); None where a rotation asked for is none."""
-        still, goals = self._still, self._goals
+        goals = self._goals
         if targets is not self._given:
             if not self._valid(targets):
                 return None
-            still = self._constant + self._of_targets @ targets
+            np.add(self._constant, self._of_targets @ targets, self._still)
             goals = [self._goal(targets, turn) for turn in self._turning]
         for (error, turned, _, _), goal in zip(self._turning, goals, strict=True):
             error[:] = pin.log3(turned.dot(goal))
@@ -251,7 +251,6 @@ class Residuals:
             pin.centerOfMass(self._dynamics.robot.model, self._dynamics.data, q, v, np.zeros(v.size))
             self._push[:] = self._dynamics.data.acom[0]
         shift: Array = self._of_z.dot(self._z)
-        shift += still
         return shift
 
     def _valid(self, targets: Array) -> bool:
