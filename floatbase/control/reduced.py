@@ -67,6 +67,7 @@ class Reduced(Program):
         self._limits = Limits(cones, lengths, *bounds)
         self._views(k, r, t)
         self._spaces: dict[int, Space] = {}
+        self._held_before = False
         self._full = self._space(self._m)
         self._order = np.concatenate([np.arange(nv), nv + k + 1 + np.arange(d), nv + np.arange(k)])
         with dynamics.lock:
@@ -83,7 +84,7 @@ class Reduced(Program):
         equations = np.zeros((m + nv + t, n + 1))
         self._copies = (
             (equations[:m, :nv], jacobian[:m]),
-            (equations[m : m + nv, :nv], M),
+            (equations[m : m + nv, :nv], M.T),  # symmetric, and quicker to copy
             (equations[m : m + nv, nv:n], jacobian[first : first + k].T),
             (equations[m : m + nv, n], h),
             (equations[m + nv :, :nv], jacobian[r - t :]),
@@ -138,7 +139,9 @@ class Reduced(Program):
             space = self._reduced()
             if space is None or not self._objective(space, q, v, targets):
                 return None
-            return self._optimum(space)
+            answer = self._optimum(space)
+            self._held_before = answer is not None and answer[1] > 0
+            return answer
 
     def _objective(self, space: Space, q: Array, v: Array, targets: Array) -> bool:
         """(16)(18)(26) τ and the residuals of all tasks over (β, 1); False where a target cannot be read."""
@@ -151,12 +154,20 @@ class Reduced(Program):
         return True
 
     def _optimum(self, space: Space) -> Answer | None:
-        """(26)(27) The optimum without rows, or where it breaks one, `_search`."""
-        factor, minus, info = space.normal_equations()
+        """(26)(27) The optimum without rows, or where it breaks one, `_search`.
+
+        Where rows held the last answer they will mostly hold this one, and the search comes first. The answer is the same.
+        """
+        space.normal_equations()
+        if self._held_before:
+            factor, info = lapack.dpotrf(space.H)
+            answer = None if info else self._search(space, factor)
+            if answer is not None and answer[1]:
+                return answer
+        factor, minus, info = lapack.dposv(space.H, space.g)
         if info:
             return None
-        beta = space.beta
-        np.negative(minus, beta)
+        np.negative(minus, space.beta)
         x, broken = self._look(space)
         if broken >= 0:
             return self._search(space, factor)
@@ -179,7 +190,7 @@ class Reduced(Program):
         upper = -rows[:, nb]
         beta, _, flag, info = daqp.solve(
             space.H.copy(),
-            space.g.copy(),
+            space.g,
             rows[:, :nb].copy(),
             upper,
             upper - limits.widths,

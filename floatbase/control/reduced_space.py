@@ -6,8 +6,6 @@ Limits  G (λ, 1, τ) ≤ 0                                                     
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
@@ -53,7 +51,7 @@ class Space:
         self.R = np.zeros((len(roots), nb + 1))
         self.R_T, self.R_last = self.R.T, self.R[:, nb]
         self._both = np.zeros((nb + 1, nb + 1))
-        self.H, self.g = self._both[:nb, :nb], self._both[:nb, nb]
+        self.H, self.g = self._both[:nb, :nb], self._both[nb, :nb]
         self.beta1 = np.ones(nb + 1)
         self.beta, self.nb = self.beta1[:nb], nb
 
@@ -83,10 +81,9 @@ class Space:
         self._room.take(order, None, self.V, "clip")
         return True
 
-    def normal_equations(self) -> Any:
-        """H = Rᵀ R and g as in ½ βᵀ H β + gᵀ β, and the Cholesky factor of H, H⁻¹ g, and 0 where H is positive definite."""
+    def normal_equations(self) -> None:
+        """H = Rᵀ R and g as in ½ βᵀ H β + gᵀ β."""
         self.R_T.dot(self.R, self._both)
-        return lapack.dposv(self.H, self.g)
 
     def slope(self) -> Array:
         """H β + g, residual by residual, which keeps the digits that H lost."""

@@ -11,6 +11,7 @@ from threading import Thread
 import judges
 import numpy as np
 import pytest
+from scipy.linalg import lapack
 
 import floatbase as fb
 from floatbase.control import compiled
@@ -118,7 +119,7 @@ def test_a_row_that_is_broken_and_does_not_push_is_dropped_again() -> None:
     state = robot.standing()
     wanted = tick(np.array(state.q), np.array(state.v), 0.0)
     space = tick._full
-    factor, *_ = space.normal_equations()
+    factor, _ = lapack.dpotrf(space.H)
     assert wanted is not None
     for active in ([], [3], [3, 21]):  # none of them pushes while standing
         rows = tick._limits.G[active].dot(space.limited)
@@ -214,6 +215,22 @@ def test_rows_that_daqp_did_not_find_are_added_and_those_that_pull_are_dropped(m
             changed += 1
             assert np.allclose(answer[0][18:30], readable(state.q, state.v).tau, rtol=0.0, atol=1e-8)
     assert changed > 3
+
+
+def test_an_answer_does_not_depend_on_the_one_before() -> None:
+    """Though the search comes first where rows held the last answer."""
+    robot = judges.load("go2")
+    tick = program(robot, judges.stance(robot))
+    held = []
+    for state in judges.states("go2", 12, 0.05):
+        answers = []
+        for before in (False, True):
+            tick._held_before = before
+            answers.append(tick(np.array(state.q), np.array(state.v), 0.0))
+        assert answers[0] is not None and answers[1] is not None
+        held.append(answers[0][1])
+        assert np.array_equal(answers[0][0][: tick.size], answers[1][0][: tick.size])
+    assert 0 < np.count_nonzero(held) < len(held), "these states do not try both"
 
 
 def test_threads_may_share_a_controller() -> None:
