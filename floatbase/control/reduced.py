@@ -14,26 +14,28 @@ minus one entry of (q̈, λ). A tick that cannot be answered to its last digits 
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any
 
 import daqp
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import lapack
 
 from floatbase._arrays import Array
 from floatbase.control.compiled import COM, FLAT, FRAME, ORIENTATION, POSTURE, Answer, Program
 from floatbase.control.qp import FEASIBILITY_TOLERANCE
 from floatbase.control.reduced_rows import Measured, Residuals, Rows, Triple
-from floatbase.control.reduced_space import Indices, Limits, Space
+from floatbase.control.reduced_space import Limits, Space
 from floatbase.dynamics.subspace import MOTION_TOLERANCE
 
-_DEPENDENT = 2e-2  # a motion row of which elimination leaves less than this part may nearly depend on the others
-_LOST = 1e-6  # part of a row of (7) that must be left
+_DEPENDENT = 2e-2  # motion rows of which so small a part is left in some direction may nearly depend on each other
+_WILD = 1e4  # numbers of q and v from which on digits are lost
 _POLISHED = 3  # steps of Newton's method at most
 _SETTLED = 1e-12  # part of β, squared: what is left after a step so small is rounding
 _PULLING = 1e-9  # part of the largest multiplier by which one may be negative
 _NOISE = 100.0  # as MOTION_NOISE of the readable path
+
+Indices = npt.NDArray[np.intp]
 
 
 class Reduced(Program):
@@ -44,7 +46,7 @@ class Reduced(Program):
     def _prepare(self, contact_tables: tuple[Any, ...], task_tables: tuple[Any, ...], bounds: tuple[Array, float]) -> None:
         contacts, frames, points, cones, lengths = contact_tables
         dynamics, nv, d, k = self.dynamics, self.nv, self.d, 3 * len(points)
-        self._base = base = nv - d
+        self._base = nv - d
         motion, pushing = _contact_triples(contacts, frames, points)
         tasks = _task_triples(*task_tables)
         triples = (motion + pushing if np.any(contacts[:, 1] == FLAT) else motion) + tasks
@@ -72,8 +74,8 @@ class Reduced(Program):
         self._order = np.concatenate([np.arange(nv), nv + k + 1 + np.arange(d), nv + np.arange(k)])
         with dynamics.lock:
             self._update(np.array(self.robot.posture), np.zeros(nv))
-        sizes = np.linalg.norm(self._equalities, axis=1)
-        self._least = sizes * np.concatenate([np.full(self._m, _DEPENDENT), np.full(base, _LOST)])
+        sizes = np.linalg.norm(self._equalities[: self._m], axis=1)
+        self._most = float((_DEPENDENT * sizes.max(initial=1e-9)) ** -2)
 
     def _views(self, k: int, r: int, t: int) -> None:
         """Parts of arrays that are filled or read in every tick."""
@@ -110,7 +112,7 @@ class Reduced(Program):
 
     def _reduced(self) -> Space | None:
         """(13)(17) β -> (q̈, λ)."""
-        return self._full if self._full.solve(self._equalities, self._least) else self._resolved()
+        return self._full if self._full.solve(self._equalities, self._most) else self._resolved()
 
     def _resolved(self) -> Space | None:
         """The same from motion rows that stand for the directions which the contacts resolve, as in `build_qp`."""
@@ -124,13 +126,14 @@ class Reduced(Program):
         space, equalities = self._space(r), self._equalities[m - r :].copy()
         equalities[:r] = 0.0
         equalities[:r, :nv], equalities[:r, -1] = Vt[:r], U[:, :r].T @ right / s[:r]
-        return space if space.solve(equalities, np.concatenate([np.full(r, _LOST), self._least[m:]])) else None
+        return space if space.solve(equalities, np.inf) else None
 
     def _answer(self, q: Array, v: Array, targets: Array) -> Answer | None:
         with self.dynamics.lock:
             self._q[:] = q
             self._v[:] = v
-            if not isfinite(self._state.dot(self._state)):
+            sizes = np.abs(self._state)
+            if not sizes[sizes.argmax()] < _WILD:
                 return None
             for turn in self._turns:
                 if not abs(turn.dot(turn) - 1.0) < 1e-6:

@@ -7,16 +7,12 @@ Limits  G (λ, 1, τ) ≤ 0                                                     
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import lapack
 
 from floatbase._arrays import Array
 
-_TINY = 2.0**-40  # makes a column too small to be a pivot, and costs no digit
+_TINY = 2.0**-60  # makes a column too small to be a pivot, and costs no digit
 _FAR = 1e30  # a bound that DAQP takes for none
-
-Indices = npt.NDArray[np.intp]
-_NO_ORDER = np.zeros(0, np.intp)
 
 
 class Space:
@@ -29,22 +25,19 @@ class Space:
     def __init__(self, m: int, base: int, nv: int, k: int, below: int, roots: Array):
         rows, n, d = m + base, nv + k, nv - base
         nb = n - rows
-        self._n, self._rows = n, rows
+        self._rows = rows
         self._work, self._scales = np.zeros((rows, n + 1)), np.ones((rows, n + 1))
         self._scales[:, n] = _TINY
         self._factors = self._work.T  # as LAPACK lays matrices out
-        self._diagonal, self._free = np.einsum("ii->i", self._factors[:rows]), self._factors[rows:]
-        self._room = np.zeros(rows * (nb + 1) + 2)
-        self._room[-1] = -1.0
-        self._solved = self._room[:-2].reshape(rows, nb + 1, order="F")
-        self._transposed, self._point = self._solved.T, self._solved[:, nb]
+        self._motion, self._free = self._factors[:m, :m], self._factors[rows:]
+        # -I below what is solved for: each β is minus one of the unknowns that are left
+        self._room = np.asfortranarray(np.eye(n, nb + 1, -rows) * -1.0)
+        self._solved, self._point = self._room[:rows].T, self._room[:rows, nb]
         self.E = np.zeros((n + 1 + below, nb + 1))
         self.E[n, nb] = 1.0
         self.V, self.V1, self.low = self.E[:n], self.E[: n + 1], self.E[n + 1 :]
         self.shown, self.limited = self.E[: n + 1 + d], self.E[nv : n + 1 + d]
-        if not rows:
-            self.V[:, :nb] = -np.eye(n)
-        self._orders: dict[bytes, Indices | None] = {}
+        self.V[:] = self._room
         # objective
         self.inner = self.E[base:]
         self.roots = np.repeat(roots[:, None], nb + 1, axis=1)
@@ -55,30 +48,27 @@ class Space:
         self.beta1 = np.ones(nb + 1)
         self.beta, self.nb = self.beta1[:nb], nb
 
-    def solve(self, equalities: Array, least: Array) -> bool:
-        """Fill V; False where a row has less than `least` (m + base,) left when its turn comes.
+    def solve(self, equalities: Array, most: float) -> bool:
+        """Fill V; False where rows depend on each other, or motion rows (5) nearly do.
 
-        The factorisation chooses for each row the unknown to solve for. The right-hand side is carried along as one more
-        unknown, too small to be chosen.
+        The factorisation B^T = P L U chooses for each row the unknown to solve for. The right-hand side is carried along as one
+        more unknown, too small to be chosen. The singular values of A are hardly smaller than 1 / ‖U⁻¹‖, with U's part of the
+        motion rows; `most` is the largest ‖U⁻¹‖² that passes.
         """
         if not self._rows:
             return True
         np.multiply(equalities, self._scales, self._work)
-        _, pivots, _ = lapack.dgetrf(self._factors, overwrite_a=1)
-        left = abs(self._diagonal)
-        left -= least
-        if not left[left.argmin()] > 0.0:
+        _, pivots, info = lapack.dgetrf(self._factors, overwrite_a=1)
+        if info:
             return False
-        np.copyto(self._transposed, self._free)
-        lapack.dtrtrs(self._factors, self._solved, 1, 1, 1, overwrite_b=1)
+        if self._motion.size:
+            inverse = lapack.dtrtri(self._motion)[0].T.reshape(-1)  # L still stands below U⁻¹, and adds little
+            if not inverse.dot(inverse) <= most:
+                return False
+        np.copyto(self._solved, self._free)
+        lapack.dtrtrs(self._factors, self._room, 1, 1, 1, overwrite_b=1)
         self._point *= -1.0 / _TINY
-        key = pivots.tobytes()
-        order = self._orders.get(key, _NO_ORDER)
-        if order is _NO_ORDER:
-            order = self._remember(key, pivots.tolist())
-        if order is None:
-            return False
-        self._room.take(order, None, self.V, "clip")
+        self.V[:] = lapack.dlaswp(self._room, pivots, 0, self._rows - 1, 0, -1)
         return True
 
     def normal_equations(self) -> None:
@@ -89,23 +79,6 @@ class Space:
         """H β + g, residual by residual, which keeps the digits that H lost."""
         slope: Array = self.R_T.dot(self.R.dot(self.beta1))
         return slope[: self.nb]
-
-    def _remember(self, key: bytes, pivots: list[int]) -> Indices | None:
-        """Where each entry of V stands in the room of the solution, of which the last entries are 0 and -1; None if nowhere."""
-        order = list(range(self._n + 1))
-        for i, j in enumerate(pivots):
-            order[i], order[j] = order[j], order[i]
-        if len(self._orders) > 1000:
-            self._orders.clear()
-        self._orders[key] = self._places(order[:-1]) if order[-1] == self._n else None
-        return self._orders[key]
-
-    def _places(self, order: list[int]) -> Indices:
-        places = np.full(self.V.shape, len(self._room) - 2)
-        chosen = np.arange(self._rows)
-        places[order[: self._rows]] = chosen[:, None] + self._rows * np.arange(self.nb + 1)
-        places[order[self._rows :], np.arange(self.nb)] = len(self._room) - 1
-        return places
 
 
 class Limits:
