@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
 from math import prod
+from pickle import UnpicklingError
 from threading import Lock, Timer
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast
 
@@ -73,7 +74,7 @@ def kernel_obstacle() -> str:
         return 'numba is not installed: pip install "floatbase[fast]"'
     try:
         import floatbase.control.kernel  # noqa: F401
-    except (ImportError, OSError, AttributeError, KeyError) as error:  # KeyError: an option that this numba does not know
+    except (ImportError, OSError, AttributeError) as error:
         return f"numba is installed and cannot be loaded ({error})"
     return ""
 
@@ -82,6 +83,8 @@ def kernel_obstacle() -> str:
 def _robot_obstacle(robot: Robot) -> str:
     if robot.d == 0:
         return f"{robot.name} has no joints to drive"
+    if robot.nv == 1:  # Pinocchio drops one dimension of its Jacobians
+        return f"{robot.name} has a single joint and no base: the fast paths take two velocities or more"
     for i, joint in enumerate(robot.model.joints):
         kind = joint.shortname()
         if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
@@ -210,6 +213,11 @@ class Program(ABC):
         answer = self._answer(q, v, targets)
         return None if answer is None else (*answer, targets)
 
+    def warm_up(self) -> None:
+        """Run a tick, which compiles or loads what it needs, so that the loop need not wait for it."""
+        standing = self.robot.standing()
+        self(np.array(standing.q), np.array(standing.v), 0.0)
+
     @abstractmethod
     def _prepare(self, contact_tables: tuple[Any, ...], task_tables: tuple[Any, ...], bounds: tuple[Array, float]) -> None:
         """Take the tables of contacts and tasks, the torque limits (d,) and the least normal force."""
@@ -286,6 +294,15 @@ class Compiled(Program):
         real, whole = kernel.room_sizes(tables[0], self.motion_rows)
         room = np.empty(real), np.empty(whole, np.int64)  # of one tick at a time: the dynamics' lock sees to it
         self.arrays = *self.dynamics.views, *tables, *room
+
+    def warm_up(self) -> None:
+        try:
+            super().warm_up()
+        except (EOFError, UnpicklingError):  # the file that numba kept ends too early
+            from floatbase.control import kernel
+
+            kernel.compile_anew()
+            super().warm_up()
 
     def _answer(self, q: Array, v: Array, targets: Array) -> Answer | None:
         dynamics, answer = self.dynamics, np.empty(self.size + 2 * self.entries)

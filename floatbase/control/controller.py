@@ -305,11 +305,10 @@ class WholeBodyController:
         return other
 
     def _warm_up(self) -> None:
-        """Run one tick, which compiles or loads what it needs, so that the loop need not wait for it."""
+        """Run one tick of a fast path before the loop does."""
         if self._program is not None:
-            standing = self.robot.standing()
             with told_when_slow("floatbase compiles its controller, once: about half a minute."):
-                self._program(np.array(standing.q), np.array(standing.v), 0.0)
+                self._program.warm_up()
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "_program"}  # live views cannot be copied

@@ -45,6 +45,7 @@ _POLISHED = 3  # steps of Newton's method at most
 _SETTLED = 1e-6  # part of β: what is left after a step so small is rounding
 _UNSETTLED = 1e-4  # part of β that the last of them may still move
 _PULLING = 1e-9  # part of the largest multiplier by which one may be negative
+_FAR = 1e8  # m/s², N·m or N, beyond which an entry of the answer has lost its digits: next to nothing chooses it
 
 
 def _compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
@@ -62,6 +63,13 @@ def _compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
 
 _allocating = partial(_compiled, _nrt=True)
 _written_out = partial(_compiled, inline="always")  # put into the caller, so that it may return arrays
+
+
+def compile_anew() -> None:
+    """Forget what was compiled, on disk too, where a power cut may have left half a file; the next tick compiles again."""
+    for function in list(globals().values()):
+        if isinstance(function, numba.core.dispatcher.Dispatcher):
+            function.recompile()
 
 
 # the room: its first number counts what is in use ------------------------------------------------------------------------
@@ -1074,14 +1082,17 @@ def readable(q, v, targets, tree):
 
 @_compiled
 def write_answer(V, T, beta, active, count, nv, answer):
-    """(16) The first parts of `answer`, and the numbers of the active rows (count,) in its last; False if it is not finite."""
+    """(16) The first parts of `answer`, and the numbers of active rows (count,) in its last; False where it has no digits."""
     n, d = V.shape[0], T.shape[0]
     image(V, beta, 0, nv, answer[:nv])
     image(T, beta, 0, d, answer[nv : nv + d])
     image(V, beta, nv, n, answer[nv + d : n + d])
     for i in range(count):
         answer[2 * n + d + i] = active[i]
-    return finite(answer[: n + d])
+    for i in range(n + d):
+        if not abs(answer[i]) <= _FAR:  # nor is what is no number
+            return False
+    return True
 
 
 @_compiled

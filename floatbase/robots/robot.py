@@ -214,7 +214,7 @@ def check_turns(model: pin.Model, name: str, q: Array, hint: str = "") -> None:
         what = f"the base quaternion {place} (x y z w)"
         if i > 1 or places != 3:
             what = f"{place}, {'cosine and sine' if turn.stop - turn.start == 2 else 'the quaternion'} of {model.names[i]!r},"
-        raise InputError(f"{what} has length {length:.6g}; it must be 1. Divide it by its length{hint}.")
+        raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
 
 
 def spread_corners(frame: str, corners: Array) -> Array:

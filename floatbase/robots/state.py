@@ -75,7 +75,7 @@ class State:
     @cached_property
     def com_jacobian(self) -> Array:
         """Jacobian of the centre of mass, shape (3, nv): com_velocity = com_jacobian v."""
-        return read_only(self._data.Jcom)
+        return read_only(self._data.Jcom.reshape(3, self.robot.nv))  # of one joint Pinocchio gives (3,)
 
     @cached_property
     def com_drift(self) -> Array:
@@ -97,7 +97,8 @@ class State:
 
     def frame_jacobian(self, frame: str) -> Array:
         """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows, world-aligned."""
-        return read_only(pin.getFrameJacobian(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED))
+        J = pin.getFrameJacobian(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED)
+        return read_only(J.reshape(6, self.robot.nv))  # of one joint Pinocchio gives (6,)
 
     def frame_velocity(self, frame: str) -> Array:
         """Linear [m/s] and angular [rad/s] velocity of a frame's origin, shape (6,), world-aligned."""

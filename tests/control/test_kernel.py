@@ -99,6 +99,50 @@ def test_the_kernel_compiles_where_no_cache_can_be_kept(monkeypatch: pytest.Monk
     assert kernel._compiled(lambda: None) == ("compiled without a cache", "numpy")
 
 
+def test_a_cache_that_a_power_cut_left_half_written_is_compiled_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    import pickle
+
+    from floatbase.control import kernel
+
+    robot, tick = judges.load("go2"), kernel.tick
+    wanted = compiled_one(robot)(robot.posture, np.zeros(robot.nv)).tau
+    for error in (EOFError("Ran out of input"), pickle.UnpicklingError("pickle data was truncated")):
+        forgotten: list[bool] = []
+
+        def half(*given: object, error: Exception = error, forgotten: list[bool] = forgotten) -> int:
+            if not forgotten:
+                raise error
+            return tick(*given)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(kernel, "tick", half)
+            patch.setattr(kernel, "compile_anew", lambda forgotten=forgotten: forgotten.append(True))
+            controller = compiled_one(robot)
+        assert forgotten == [True]
+        assert np.array_equal(controller(robot.posture, np.zeros(robot.nv)).tau, wanted)
+
+
+def test_compiling_anew_forgets_every_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    from numba.core.dispatcher import Dispatcher
+
+    from floatbase.control import kernel
+
+    forgotten: list[Dispatcher] = []
+    monkeypatch.setattr(Dispatcher, "recompile", lambda self: forgotten.append(self))
+    kernel.compile_anew()
+    assert kernel.tick in forgotten and kernel.sweep in forgotten and kernel.independent_rows in forgotten
+
+
+def test_an_answer_out_of_reach_is_none() -> None:
+    """Where next to nothing chooses an entry, as with weights of 0, it may be anything: then the readable path decides."""
+    from floatbase.control import kernel
+
+    V, T, active = np.zeros((3, 2)), np.zeros((1, 2)), np.zeros(3, np.int64)
+    V[0, 0] = T[0, 0] = 1.0
+    for beta, good in ((1e6, True), (-1e6, True), (1e18, False), (-1e18, False), (np.nan, False), (np.inf, False)):
+        assert kernel.write_answer(V, T, np.array([beta]), active, 0, 2, np.empty(10)) is good
+
+
 def test_the_compiled_path_is_the_default_where_it_fits() -> None:
     robot = judges.load("go2")
     controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))

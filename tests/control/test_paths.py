@@ -211,6 +211,28 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(path: str, tmp_pat
             controller([2.0, 0.0, 0.1], np.zeros(2))
 
 
+def test_a_single_joint_takes_the_readable_path(tmp_path: Path) -> None:
+    """Pinocchio's Jacobians of one joint have one dimension less."""
+    link = (
+        '<link name="{}"><inertial><mass value="1"/><origin xyz="0.1 0 0.2"/>'
+        '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    )
+    urdf = tmp_path / "pendulum.urdf"
+    urdf.write_text(
+        f'<robot name="pendulum">{link.format("wall")}{link.format("bob")}'
+        '<joint name="pin" type="revolute"><parent link="wall"/><child link="bob"/><axis xyz="0 1 0"/>'
+        '<limit effort="50" velocity="9" lower="-3" upper="3"/></joint></robot>'
+    )
+    robot = fb.load_urdf(urdf, floating=False)
+    tasks = [fb.CoMTask([0.1, 0.0, 0.2]), fb.FrameTask("bob", np.zeros(3)), fb.OrientationTask("bob"), fb.PostureTask([0.0])]
+    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [*tasks, fb.TorqueTask(weight=0.0)])
+    assert controller.path == "readable" and "pendulum has a single joint" in controller.path_reason
+    state = robot.random_state(0, 0.5)
+    assert state.com_jacobian.shape == (3, 1) and state.frame_jacobian("bob").shape == (6, 1)
+    command = controller(state.q, state.v)
+    assert command.tau == pytest.approx(state.M @ command.qdd + state.h)
+
+
 # the same verdicts and words -----------------------------------------------------------------------------------------------
 
 
