@@ -291,8 +291,9 @@ def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
     """A body's inertia in its own frame, as the URDF gives it."""
     ixx, iyy, izz, ixy, ixz, iyz = body.fullinertia
     tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    R = _rotation(body.iquat)  # the tensor's axes may be turned from the body's
     inertia = pin.Inertia.Zero()  # its constructor refuses tensors that are not positive, and we look for those
-    inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), tensor
+    inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), R @ tensor @ R.T
     return inertia
 
 
@@ -315,16 +316,21 @@ def _hand_inertia_on(body: mujoco.MjsBody) -> None:
     neighbour, placement = max(neighbours, key=lambda found: float(found[0].mass))
     total = _inertia(neighbour) + placement.act(_inertia(body))
     tensor = total.inertia
-    neighbour.mass, neighbour.ipos = total.mass, total.lever
+    neighbour.mass, neighbour.ipos, neighbour.iquat = total.mass, total.lever, [1.0, 0.0, 0.0, 0.0]
     neighbour.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     body.mass, body.fullinertia, body.explicitinertial = 0.0, [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], False
 
 
 def _placement(body: mujoco.MjsBody) -> pin.SE3:
     """A body's frame in its parent's."""
+    return pin.SE3(_rotation(body.quat), np.array(body.pos))
+
+
+def _rotation(wxyz: np.ndarray) -> np.ndarray:
+    """The rotation matrix of one of MuJoCo's quaternions."""
     R = np.zeros(9)
-    mujoco.mju_quat2Mat(R, np.array(body.quat))
-    return pin.SE3(R.reshape(3, 3), np.array(body.pos))
+    mujoco.mju_quat2Mat(R, np.array(wxyz))
+    return R.reshape(3, 3)
 
 
 def _add_ground(spec: mujoco.MjSpec, ground: Ground) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import judges
 import mujoco
 import numpy as np
@@ -96,6 +98,31 @@ def test_a_foot_without_a_possible_inertia_is_joined_to_the_leg_that_carries_it(
     judge = judges.Mujoco(robot).at(state)
     assert judges.relative(state.M, judge.M) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
+
+
+def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_path: Path) -> None:
+    """<inertial> may have an rpy of its own, on the link that hands its inertia on and on the one that takes it."""
+
+    def link(name: str, inertia: str, rpy: str) -> str:
+        return (
+            f'<link name="{name}"><inertial><mass value="2"/><origin xyz="0.1 0 0.05" rpy="{rpy}"/>'
+            f'<inertia {inertia} ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        )
+
+    good, bad = 'ixx="0.1" iyy="0.12" izz="0.15"', 'ixx="0.05" iyy="0.02" izz="-0.001"'
+    links = link("trunk", good, "0 0 0") + link("leg", good, "0.3 -0.2 0.5") + link("toe", bad, "-0.4 0.1 0.8")
+    joints = "".join(
+        f'<joint name="{kind}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="0.1 0 -0.2"'
+        ' rpy="0.4 0.2 -0.3"/><axis xyz="0 1 0"/><limit effort="50" velocity="9" lower="-3" upper="3"/></joint>'
+        for kind, parent, child in (("revolute", "trunk", "leg"), ("fixed", "leg", "toe"))
+    )
+    urdf = tmp_path / "turned.urdf"
+    urdf.write_text(f'<robot name="turned">{links}{joints}</robot>')
+    robot = fb.load_urdf(urdf, feet=["toe"])
+    state = robot.random_state(0)
+    judge = judges.Mujoco(robot).at(state)
+    assert judges.relative(state.M, judge.M) < 1e-12
+    assert judges.relative(state.h, judge.h) < 1e-12
 
 
 def test_a_moving_link_with_an_impossible_inertia_is_named() -> None:
