@@ -191,6 +191,7 @@ class Program(ABC):
         self.fits = True
         self._tasks = tuple(tasks)
         self._moving: list[Target] = []
+        self._loose = [slice(place, place + 2) for _, _, _, place, size in self.dynamics.tree[1:] if size == 2]
         contact_tables = _stack_contacts(robot, contacts, limits)
         self.targets, task_tables = self._task_tables(robot, tasks, contacts.k)
         bounds = (np.array(limits.torque_limits), float(limits.min_normal_force))
@@ -250,15 +251,19 @@ class Program(ABC):
     def _targets_at(self, t: float) -> Array | None:
         """All targets at time t, in an array of their own: ticks of other threads may be under way. None for a wrong form."""
         targets = self.targets.copy()
-        for _, at, shape, _, target in self._moving:
+        for _, at, shape, name, target in self._moving:
             try:
                 value = np.asarray(target(t), dtype=np.float64)
             except (TypeError, ValueError):
                 return None
-            if value.shape != shape:
+            if value.shape != shape or (name == "q" and not self._turned(value)):
                 return None
             targets[at : at + value.size] = value.ravel()
         return targets
+
+    def _turned(self, q: Array) -> bool:
+        """Whether (cos, sin) of joints without limits have length 1 in a posture asked for."""
+        return all(abs(np.hypot(*q[turn]) - 1.0) <= 1e-6 for turn in self._loose)
 
     def _task_tables(self, robot: Robot, tasks: Sequence[Task], k: int) -> tuple[Array, tuple[Any, ...]]:
         """All targets in a row, and the tables tasks (N, 3), gains (N, 3), frames (N, 12)."""

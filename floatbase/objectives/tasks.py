@@ -21,6 +21,7 @@ from floatbase._arrays import Array, checked, positive
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import Block, EquationsOfMotion
 from floatbase.errors import InputError
+from floatbase.robots.robot import check_turns
 from floatbase.robots.state import State
 
 Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
@@ -176,7 +177,10 @@ class FrameTask:
 
 @dataclass(frozen=True, eq=False)
 class PostureTask:
-    """Bring the joints to those of a configuration q, shape (nq,) (its base part does not count); residual in q̈, rad/s²."""
+    """Bring the joints to those of a configuration q, shape (nq,) (its base part does not count); residual in q̈, rad/s².
+
+    (cos, sin) of joints without limits must be of length 1.
+    """
 
     q: Target
     kp: float = 100.0
@@ -193,7 +197,9 @@ class PostureTask:
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
         state, robot = eom.state, eom.robot
-        e = state.difference(_value("q of posture", self.q, t, (robot.nq,)))[-robot.d :]
+        wanted = _value("q of posture", self.q, t, (robot.nq,))
+        check_turns(robot.model, "q of posture", wanted, first=2 if robot.is_floating else 1)
+        e = state.difference(wanted)[-robot.d :]
         e_dot = state.v[-robot.d :]
         return _motion_residual(self, robot.S.T, np.zeros(robot.d), np.zeros(robot.d), e, e_dot)
 

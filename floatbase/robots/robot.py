@@ -197,14 +197,15 @@ class Robot:
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
 
 
-def check_turns(model: pin.Model, name: str, q: Array, hint: str = "") -> None:
+def check_turns(model: pin.Model, name: str, q: Array, hint: str = "", first: int = 1) -> None:
     """Check that what stands for a turn in q, shape (nq,), has length 1: quaternions, and (cos, sin) of joints without limits.
 
-    Raises `InputError` with the place in `name`, what to divide by, and the hint.
+    first: the first of Pinocchio's joints that counts. Raises `InputError` with the place in `name`, what to divide by, and the
+    hint.
     """
     if pin.isNormalized(model, q, 1e-6):
         return
-    for i in range(1, model.njoints):
+    for i in range(first, model.njoints):
         places = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # they come first
         turn = slice(model.idx_qs[i] + places, model.idx_qs[i] + model.nqs[i])
         length = float(np.linalg.norm(q[turn]))

@@ -209,6 +209,13 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(path: str, tmp_pat
     for controller in both:
         with pytest.raises(InputError, match=r"q\[0:2\], cosine and sine of 'j0', has length 2; it must be 1"):
             controller([2.0, 0.0, 0.1], np.zeros(2))
+    tasks = [fb.PostureTask(lambda t: [1.0 + t, 0.0, 0.1]), *tasks[1:]]
+    for controller in pair(path, robot, fb.Contacts.none(), tasks):
+        assert controller(robot.posture, np.zeros(2), 0.0).path == controller.path
+        with pytest.raises(InputError, match=r"q of posture\[0:2\], cosine and sine of 'j0', has length 1.5; it must be 1"):
+            controller(robot.posture, np.zeros(2), 0.5)
+    with pytest.raises(InputError, match=r"q of posture\[0:2\], cosine and sine of 'j0', has length 2"):
+        fb.WholeBodyController(robot, fb.Contacts.none(), [fb.PostureTask([2.0, 0.0, 0.1])], path=path)
 
 
 def test_a_single_joint_takes_the_readable_path(tmp_path: Path) -> None:
