@@ -30,6 +30,7 @@ from floatbase.dynamics.subspace import MOTION_TOLERANCE
 
 _DEPENDENT = 2e-2  # motion rows of which so small a part is left in some direction may nearly depend on each other
 _WILD = 1e4  # length of (q, v) from which on digits are lost
+_FAR = 1e16  # the square of an answer, (m/s²)², (N·m)² and N² together, from which on digits are lost
 _POLISHED = 3  # steps of Newton's method at most
 _SETTLED = 1e-12  # part of β, squared: what is left after a step so small is rounding
 _PULLING = 1e-9  # part of the largest multiplier by which one may be negative
@@ -144,6 +145,8 @@ class Reduced(Program):
             if space is None or not self._objective(space, q, v, targets):
                 return None
             answer = self._optimum(space)
+            if answer is not None and not answer[0][: self.size].dot(answer[0][: self.size]) < _FAR:
+                answer = None
             self._held_before = answer is not None and answer[1] > 0
             return answer
 

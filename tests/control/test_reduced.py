@@ -169,6 +169,17 @@ def test_a_state_too_wild_for_numbers_is_left_to_the_readable_path() -> None:
         assert tick(np.array(robot.posture), np.full(18, speed), 0.0) is None
 
 
+def test_forces_that_nothing_chooses_and_that_run_away_are_left_to_the_readable_path() -> None:
+    """A contact beside the arm's base carries forces that move nothing; with weight 0 they may be anything."""
+    robot = judges.load("ur5")
+    at = robot.standing()
+    tasks = [fb.CoMTask(at.com), fb.FrameTask("shoulder_link", at.point("shoulder_link")), fb.ForceTask(weight=0.0)]
+    tick = program(robot, fb.Contacts([PointContact("upper_arm_link")]), tasks, torque_limits=np.inf)
+    for state in judges.states("ur5", 40):
+        answer = tick(np.array(state.q), np.array(state.v), 0.0)
+        assert answer is None or np.max(np.abs(answer[0][: tick.size])) < 1e8
+
+
 def test_an_arm_that_touches() -> None:
     """Contacts and a base that is bolted down: motion rows, and none of a base."""
     robot = judges.load("ur5")
