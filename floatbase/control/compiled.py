@@ -26,7 +26,17 @@ import pinocchio as pin
 from floatbase._arrays import Array
 from floatbase.control.friction import FrictionPolyhedron
 from floatbase.dynamics.contacts import Contact, Contacts, FlatFootContact, PointContact
-from floatbase.objectives.tasks import CoMTask, ForceTask, FrameTask, OrientationTask, PostureTask, Task, TorqueTask
+from floatbase.errors import InputError
+from floatbase.objectives.tasks import (
+    CoMTask,
+    ForceTask,
+    FrameTask,
+    OrientationTask,
+    PostureTask,
+    Task,
+    TorqueTask,
+    nearest_rotation,
+)
 from floatbase.robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -253,11 +263,16 @@ class Program(ABC):
         targets = self.targets.copy()
         for _, at, shape, name, target in self._moving:
             try:
-                value = np.asarray(target(t), dtype=np.float64)
+                value: Array = np.asarray(target(t), dtype=np.float64)
             except (TypeError, ValueError):
                 return None
             if value.shape != shape or (name == "q" and not self._turned(value)):
                 return None
+            if name == "rotation":
+                try:
+                    value = nearest_rotation(name, value)
+                except InputError:
+                    return None
             targets[at : at + value.size] = value.ravel()
         return targets
 

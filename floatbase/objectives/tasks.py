@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive
+from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import Block, EquationsOfMotion
 from floatbase.errors import InputError
@@ -116,7 +116,7 @@ class OrientationTask:
         _set_gains(self)
         object.__setattr__(self, "rotation", _fixed(f"rotation of {self.name}", self.rotation, (3, 3)))
         if not callable(self.rotation):
-            _check_rotation(self.name, np.asarray(self.rotation))
+            object.__setattr__(self, "rotation", read_only(nearest_rotation(self.name, np.asarray(self.rotation))))
         for part in ("angular_velocity", "angular_acceleration"):
             object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
 
@@ -128,8 +128,7 @@ class OrientationTask:
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_ω q̈ + J̇_ω q̇ - α, shape (3,), rad/s², world-aligned."""
         state = eom.state
-        wanted = _value("rotation", self.rotation, t, (3, 3))
-        _check_rotation(self.name, wanted)
+        wanted = nearest_rotation(self.name, _value("rotation", self.rotation, t, (3, 3)))
         e = pin.log3(state.frame_pose(self.frame).rotation @ wanted.T)
         e_dot = state.frame_velocity(self.frame)[3:] - _value("angular velocity", self.angular_velocity, t, (3,))
         feed = _value("angular acceleration", self.angular_acceleration, t, (3,))
@@ -270,6 +269,16 @@ def _motion_residual(
     return Affine(J, drift - feed + task.kp * e + task.kd * e_dot)
 
 
-def _check_rotation(name: str, R: Array) -> None:
-    if not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
+def nearest_rotation(name: str, R: Array) -> Array:
+    """The rotation nearest to R (3, 3), which may be off by the rounding of printed digits or of float32.
+
+    Raises `InputError` where it is off by more than 1e-6.
+    """
+    left = np.max(np.abs(R @ R.T - np.eye(3))) if np.all(np.isfinite(R)) else np.inf
+    if not left <= 1e-6 or np.linalg.det(R) < 0:
         raise InputError(f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, determinant +1.")
+    if left < 1e-14:
+        return R
+    U, _, Vt = np.linalg.svd(R)
+    nearest: Array = U @ Vt
+    return nearest
