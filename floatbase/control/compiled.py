@@ -81,7 +81,7 @@ def obstacle(robot: Robot, contacts: Contacts, tasks: Sequence[Task], solver: st
 def kernel_obstacle() -> str:
     """Why the kernel cannot be had at all: numba is not there, or does not fit the packages beside it."""
     if find_spec("numba") is None:
-        return 'numba is not installed: pip install "floatbase[fast]"'
+        return "numba is not installed (pip install numba)"
     try:
         import floatbase.control.kernel  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
@@ -299,6 +299,15 @@ class Program(ABC):
                     self.fits &= np.shape(value) == shape
                     parts[-1] = np.ravel(value) if np.shape(value) == shape else parts[-1]
         return np.concatenate([np.zeros(0), *parts]), (table, gains, frames)
+
+
+def unkept() -> str:
+    """What to do where nothing that is compiled can be kept, or ""."""
+    from floatbase.control import kernel
+
+    if kernel.kept:
+        return ""
+    return "what is compiled cannot be kept here: set NUMBA_CACHE_DIR to a folder that can be written to"
 
 
 class Compiled(Program):

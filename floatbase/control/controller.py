@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
-from floatbase.control.compiled import Compiled, Program, kernel_obstacle, obstacle, told_when_slow
+from floatbase.control.compiled import Compiled, Program, kernel_obstacle, obstacle, told_when_slow, unkept
 from floatbase.control.friction import FrictionPolyhedron
 from floatbase.control.qp import QP, Solution, check_solver, finished, solve
 from floatbase.dynamics.contacts import Contacts
@@ -211,7 +211,8 @@ class WholeBodyController:
     solve the same problem many times faster: "reduced" by numpy in the document's β space (`reduced.py`), and "compiled" in
     `kernel.py`, which is the fastest and needs numba. "auto" takes compiled where it can, else reduced, else readable. The
     attribute `path` says which it is, `path_reason` why. The first compiled controller ever compiles for about half a minute,
-    unless the set-up did (`python -m floatbase compile`); later ones load what was compiled. A tick that a fast path cannot
+    unless the set-up did (`python -m floatbase compile`); later ones load what was compiled, from the package's folder, the
+    user's cache or NUMBA_CACHE_DIR, whichever can be written to. A tick that a fast path cannot
     answer to its last digits, or that has no answer, is answered by the readable path, and its `Command.path` says so.
 
     Raises `InputError` for arguments that do not fit; a call raises `InfeasibleError` with the rows in conflict.
@@ -307,7 +308,10 @@ class WholeBodyController:
     def _warm_up(self) -> None:
         """Run one tick of a fast path before the loop does."""
         if self._program is not None:
-            with told_when_slow("floatbase compiles its controller, once: about half a minute."):
+            often = unkept() if self.path == "compiled" else ""
+            with told_when_slow(
+                f"floatbase compiles its controller{'; ' + often if often else ', once: about half a minute'}."
+            ):
                 self._program.warm_up()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -340,7 +344,10 @@ class WholeBodyController:
             self.path_reason = "a target has the wrong shape"
             return
         self._program, self.path = program, program.path
-        why = "it was asked for" if self.asked_path == "reduced" else missing or "numba is installed"
+        if self.path == "compiled":
+            why = "; ".join(filter(None, ("numba is installed", unkept())))
+        else:
+            why = f"{missing}: numpy alone answers" if missing else "it was asked for"
         self.path_reason = f"the tasks and contacts are the package's own; {why}"
 
     def __repr__(self) -> str:

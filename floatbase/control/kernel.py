@@ -48,6 +48,9 @@ _PULLING = 1e-9  # part of the largest multiplier by which one may be negative
 _FAR = 1e8  # m/s², N·m or N, beyond which an entry of the answer has lost its digits: next to nothing chooses it
 
 
+kept = True  # whether what is compiled is kept for the next process
+
+
 def _compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
     """Compile at the first call; kept on disk where a folder can be written to, and in memory alone elsewhere.
 
@@ -58,6 +61,8 @@ def _compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
     try:
         return numba.njit(cache=True, **options | more)(function)
     except RuntimeError:  # numba found no folder for its cache
+        global kept
+        kept = False
         return numba.njit(**options | more)(function)
 
 

@@ -266,12 +266,15 @@ class Contacts:
         )
 
     @staticmethod
-    def feet(robot: Robot, mu: float = 0.7) -> Contacts:
-        """All feet of the robot as they are, flat ones with their corners, the others as points; none where it has none."""
+    def feet(robot: Robot, mu: PerFoot = 0.7) -> Contacts:
+        """All feet of the robot as they are, flat ones with their corners, the others as points; none where it has none.
+
+        mu: as for `points`.
+        """
         contacts = Contacts.none()
-        for foot in robot.feet:
+        for foot, each in zip(robot.feet, _mus(robot.feet, mu), strict=True):
             make = Contacts.flat_feet if foot.is_flat else Contacts.points
-            contacts = contacts + make(robot, mu, [foot.frame])
+            contacts = contacts + make(robot, each, [foot.frame])
         return contacts
 
     @property

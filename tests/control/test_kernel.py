@@ -96,7 +96,9 @@ def test_the_kernel_compiles_where_no_cache_can_be_kept(monkeypatch: pytest.Monk
         return lambda function: ("compiled without a cache", options["error_model"])
 
     monkeypatch.setattr(numba, "njit", njit)
+    monkeypatch.setattr(kernel, "kept", True)
     assert kernel._compiled(lambda: None) == ("compiled without a cache", "numpy")
+    assert not kernel.kept
 
 
 def test_a_cache_that_a_power_cut_left_half_written_is_compiled_anew(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,3 +181,12 @@ def test_polish_is_newtons_step_it_reaches_the_optimum_from_anywhere() -> None:
     kernel.polish(beta, mu, 2, H @ beta + g, L, W, U, rows, bounds, *np.empty((3, 4)))
     K = np.block([[H, rows.T], [rows, np.zeros((2, 2))]])
     assert np.allclose(np.concatenate([beta, mu]), np.linalg.solve(K, np.concatenate([-g, bounds])), rtol=0.0, atol=1e-12)
+
+
+def test_a_place_where_nothing_can_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    from floatbase.control import kernel
+
+    robot = judges.load("go2")
+    assert "cannot be kept" not in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
+    monkeypatch.setattr(kernel, "kept", False)
+    assert "set NUMBA_CACHE_DIR" in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason

@@ -42,7 +42,7 @@ def test_without_numba_auto_takes_it_and_says_so(monkeypatch: pytest.MonkeyPatch
     tasks = fb.standing_tasks(robot.standing())
     controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
     assert controller.path == controller(robot.posture, np.zeros(robot.nv)).path == "reduced"
-    assert controller.path_reason.endswith('numba is not installed: pip install "floatbase[fast]"')
+    assert controller.path_reason.endswith("numba is not installed (pip install numba): numpy alone answers")
     with pytest.raises(InputError, match='path="compiled" is not possible: numba is not installed'):
         fb.WholeBodyController(robot, judges.stance(robot), tasks, path="compiled")
     asked = fb.WholeBodyController(robot, judges.stance(robot), tasks, path="reduced")

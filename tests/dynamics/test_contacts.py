@@ -267,6 +267,9 @@ def test_feet_are_taken_as_they_are_flat_or_round() -> None:
         assert np.all(contacts.mus == 0.4)
     mixed = fb.load("go2", feet=[fb.Foot("FL_foot", 0.02), fb.Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])])
     assert [contact.k for contact in fb.Contacts.feet(mixed)] == [3, 9]
+    talos = fb.load("talos")
+    mixed = fb.Contacts.feet(talos, mu={"left_sole_link": 0.3})
+    assert np.array_equal(mixed.mus, [0.3] * 4 + [0.7] * 4)
 
 
 def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows() -> None:
