@@ -102,7 +102,9 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
     for _ in range(8):  # the arrow stays for half a second, in which a busy machine may draw no frame
         page.evaluate("viewer.gui_controllers['push'].fire()")
         with suppress(PlaywrightTimeoutError):
-            seen = f"{drawn}.children.length > 0 && Array.from({drawn}.matrix.elements.slice(8, 11))"
+            # its shape comes with one message, its direction, which is not up, with the next
+            turned = f"{drawn}.children.length > 0 && {drawn}.matrix.elements[10] < 0.5"
+            seen = f"{turned} && Array.from({drawn}.matrix.elements.slice(8, 11))"
             arrow = page.wait_for_function(seen, timeout=4000).json_value()
             break
     assert arrow is not None
