@@ -20,7 +20,7 @@ def daqp(qp: QP) -> Solution | None:
     """Eliminate the equalities, then DAQP's dual active set on what is left; what controllers use.
 
     Where weights are so far apart that DAQP finds no end, or one that two steps of Newton's method do not mend, `active_set`
-    answers, in some ten milliseconds, and `Solution.solver` says so.
+    answers, in 4 to 40 ms, and `Solution.solver` says so.
     """
     import daqp
 

@@ -11,18 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
-from floatbase.control.compiled import Compiled, Program, kernel_obstacle, obstacle, told_when_slow, unkept
+from floatbase.control.compiled import Compiled, kernel_obstacle, told_when_slow, unkept
 from floatbase.control.friction import FrictionPolyhedron
+from floatbase.control.programs import Program, obstacle
 from floatbase.control.qp import QP, Solution, check_solver, finished, solve
 from floatbase.dynamics.contacts import Contacts
 from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
-from floatbase.dynamics.subspace import resolved_motion
+from floatbase.dynamics.subspace import MOTION_NOISE, resolved_motion
 from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
 from floatbase.robots.robot import Robot, torque_limits_of
 from floatbase.robots.state import State
 
-MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
 Path: TypeAlias = Literal["auto", "compiled", "reduced", "readable"]
 
 

@@ -1,4 +1,4 @@
-"""The tick, compiled: (26)(27) written out over plain arrays, for `compiled.py` to fill and call.
+"""The tick, compiled: (26)(27) written out over plain arrays, which `compiled.py` fills, and calls it.
 
 The same problem as `controller.build_qp`, solved on another way that costs a fraction: where the readable path takes an
 SVD for the space of motions (13), this one eliminates variables one by one, and where that one hands every row to a
@@ -37,7 +37,7 @@ COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = 0, 1, 2, 3, 4, 5  # kinds of t
 
 _DEPENDENT = 2e-2  # a row of which elimination leaves less than this part may nearly depend on the others
 _MOTION = 1e-4  # as MOTION_TOLERANCE of `floatbase.dynamics.subspace`
-_NOISE = 100.0  # as MOTION_NOISE of the readable path
+_NOISE = 100.0  # as MOTION_NOISE there
 _CURVED = 1e-13  # least pivot of the objective's Cholesky factor, squared, relative to its diagonal
 _VIOLATED = 1e-9  # as FEASIBILITY_TOLERANCE of the readable path, on rows of unit length
 _PARALLEL = 1e-12  # a row's part outside the active rows, squared, below which it depends on them

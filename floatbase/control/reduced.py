@@ -2,11 +2,11 @@
 
 The same problem as `controller.build_qp`, for machines without numba, in the order of the document:
 
-    Rows        of all contacts and tasks, their velocities and drifts    (4)(5)              reduced_rows.py
-    Residuals   of all tasks                                              (26)                reduced_rows.py
-    Space       q̈, λ and τ as maps of β, the objective in β               (13)(16)(17)(18)    reduced_space.py
-    Limits      of forces and torques                                     (27)(28)            reduced_space.py
-    Reduced     the tick: the optimum without limits, and where it breaks one, DAQP's
+    Rows          of all contacts and tasks, their velocities and drifts    (4)(5)              reduced_rows.py
+    Residuals     of all tasks                                              (26)                reduced_rows.py
+    Space         q̈, λ and τ as maps of β, the objective in β               (13)(16)(17)(18)    reduced_space.py
+    Inequalities  limits of forces and torques                              (27)(28)            reduced_space.py
+    Reduced       the tick: the optimum without limits, and where it breaks one, DAQP's
 
 Symbols: nv, d, k as everywhere, n = nv + k, m motion rows, base 6 or 0, β of length nb = n - m - base, of which each entry is
 minus one entry of (q̈, λ). A tick that cannot be answered to its last digits is left to the readable path.
@@ -22,11 +22,11 @@ import numpy.typing as npt
 from scipy.linalg import blas, lapack
 
 from floatbase._arrays import Array
-from floatbase.control.compiled import COM, FLAT, FRAME, ORIENTATION, POSTURE, Answer, Program
+from floatbase.control.programs import COM, FLAT, FRAME, ORIENTATION, POSTURE, Answer, Program
 from floatbase.control.qp import FEASIBILITY_TOLERANCE
 from floatbase.control.reduced_rows import Measured, Residuals, Rows, Triple
-from floatbase.control.reduced_space import Limits, Space
-from floatbase.dynamics.subspace import MOTION_TOLERANCE
+from floatbase.control.reduced_space import Inequalities, Space
+from floatbase.dynamics.subspace import MOTION_NOISE, MOTION_TOLERANCE
 
 _DEPENDENT = 2e-2  # motion rows of which so small a part is left in some direction may nearly depend on each other
 _WILD = 1e4  # length of (q, v) from which on digits are lost
@@ -34,7 +34,6 @@ _FAR = 1e16  # the square of an answer, (m/s²)², (N·m)² and N² together, fr
 _POLISHED = 3  # steps of Newton's method at most
 _SETTLED = 1e-12  # part of β, squared: what is left after a step so small is rounding
 _PULLING = 1e-9  # part of the largest multiplier by which one may be negative
-_NOISE = 100.0  # as MOTION_NOISE of the readable path
 
 Indices = npt.NDArray[np.intp]
 
@@ -67,7 +66,7 @@ class Reduced(Program):
         self._m, t = 3 * len(motion), 3 * len(tasks)
         self._rows = Rows(dynamics, triples, measured)
         self._residuals = Residuals(dynamics, measured, k, task_tables, r - t, self.targets)
-        self._limits = Limits(cones, lengths, *bounds)
+        self._limits = Inequalities(cones, lengths, *bounds)
         self._views(k, r, t)
         self._spaces: dict[int, Space] = {}
         self._held_before = False
@@ -124,7 +123,7 @@ class Reduced(Program):
         U, s, Vt = np.linalg.svd(A, full_matrices=False)
         r = int(np.sum(s > MOTION_TOLERANCE * s.max(initial=0.0)))
         gap, motion = right - U[:, :r] @ (U[:, :r].T @ right), A @ self._v
-        if not np.max(np.abs(gap), initial=0.0) <= 1e-6 + _NOISE * np.max(np.abs(motion), initial=0.0):
+        if not np.max(np.abs(gap), initial=0.0) <= 1e-6 + MOTION_NOISE * np.max(np.abs(motion), initial=0.0):
             return None
         space, equalities = self._space(r), self._equalities[m - r :].copy()
         equalities[:r] = 0.0

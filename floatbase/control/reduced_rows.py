@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase._arrays import Array
-from floatbase.control.compiled import COM, FORCE, FRAME, ORIENTATION, POSTURE, Dynamics
+from floatbase.control.programs import COM, FORCE, FRAME, ORIENTATION, POSTURE, Dynamics
 
 _XYZ, _NO_BALL = np.arange(3), np.zeros(3)
 
@@ -232,10 +232,10 @@ class Residuals:
         return frame.T @ targets[at : at + 9].reshape(3, 3).T
 
     def shift(self, q: Array, v: Array, targets: Array) -> Array | None:
-        """√weight × what the residuals hold beside q̈, λ and τ, shape (rows,); None where a rotation asked for is none."""
+        """√weight × what the residuals hold beside q̈, λ and τ, shape (rows,); None where a target is no number."""
         goals = self._goals
         if targets is not self._given:
-            if not self._valid(targets):
+            if not np.all(np.isfinite(targets)):
                 return None
             np.add(self._constant, self._of_targets @ targets, self._still)
             goals = [self._goal(targets, turn) for turn in self._turning]
@@ -252,10 +252,3 @@ class Residuals:
             self._push[:] = self._dynamics.data.acom[0]
         shift: Array = self._of_z.dot(self._z)
         return shift
-
-    def _valid(self, targets: Array) -> bool:
-        """Whether targets are finite, and rotations among them orthonormal and none a reflection."""
-        if not np.all(np.isfinite(targets)):
-            return False
-        wanted = [targets[at : at + 9].reshape(3, 3) for _, _, _, at in self._turning]
-        return all(np.max(np.abs(R @ R.T - np.eye(3))) < 1e-10 and np.linalg.det(R) > 0.0 for R in wanted)

@@ -1,7 +1,7 @@
 """The document's β space as the tick without a compiler goes through it, and the rows that bound it: room laid out once.
 
-Space   q̈ and λ as maps of β by one LU factorisation of the equalities, and the objective in β   (13)(17)(18)
-Limits  G (λ, 1, τ) ≤ 0                                                                          (27)(28)
+Space         q̈ and λ as maps of β by one LU factorisation of the equalities, and the objective in β   (13)(17)(18)
+Inequalities  G (λ, 1, τ) ≤ 0                                                                          (27)(28)
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Space:
         return slope[: self.nb]
 
 
-class Limits:
+class Inequalities:
     """(27)(28) G (λ, 1, τ) ≤ 0: rows of unit length, P (F + 1) for forces, d upper and d lower torque limits."""
 
     def __init__(self, cones: Array, lengths: Array, limits: Array, least: float):

@@ -15,6 +15,7 @@ from floatbase.errors import InputError
 
 RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
 MOTION_TOLERANCE = 1e-4  # directions of motion that A holds by less than this part of the largest count as not held
+MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
 
 
 def rank(A: npt.ArrayLike, absolute: bool = False) -> int:

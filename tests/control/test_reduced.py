@@ -14,9 +14,9 @@ import pytest
 from scipy.linalg import lapack
 
 import floatbase as fb
-from floatbase.control import compiled, reduced
-from floatbase.control.compiled import dynamics_of
+from floatbase.control import compiled, programs, reduced
 from floatbase.control.controller import MOTION_NOISE, Limits
+from floatbase.control.programs import dynamics_of
 from floatbase.control.reduced import Reduced
 from floatbase.control.reduced_rows import Measured, Rows, Triple
 from floatbase.control.reduced_space import Space
@@ -73,7 +73,7 @@ def test_another_layout_of_pinocchios_results_leaves_the_readable_path(monkeypat
     robot = fb.load("go2")  # not the one that other tests share
     dynamics = dynamics_of(robot)
     monkeypatch.setattr(
-        compiled, "dynamics_of", lambda robot: compiled.replace(dynamics, rates=(dynamics.rates[0], np.zeros(84)))
+        programs, "dynamics_of", lambda robot: programs.replace(dynamics, rates=(dynamics.rates[0], np.zeros(84)))
     )
     controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
     assert (controller.path, controller.path_reason) == (
@@ -193,7 +193,7 @@ def test_an_arm_that_touches() -> None:
 
 
 def test_it_keeps_the_tolerances_of_the_readable_path() -> None:
-    assert reduced._NOISE == MOTION_NOISE
+    assert reduced.MOTION_NOISE == MOTION_NOISE
 
 
 def test_dependent_contact_rows_are_resolved_and_not_left_to_the_readable_path() -> None:
@@ -297,7 +297,7 @@ def test_kinds_are_numbered_as_in_the_kernel() -> None:
     from floatbase.control import kernel
 
     for name in ("COM", "ORIENTATION", "FRAME", "POSTURE", "FORCE", "TORQUE", "POINT", "FLAT"):
-        assert getattr(kernel, name) == getattr(compiled, name)
+        assert getattr(kernel, name) == getattr(programs, name)
 
 
 def test_limits_are_rows_of_unit_length() -> None:
