@@ -29,7 +29,7 @@ TOOK: dict[str, float] = {}  # what each run of a lesson took
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
-    """The controller is compiled before a lesson is measured or compared: where it was not yet, that takes half a minute and is told."""
+    """The controller is compiled before a lesson is measured or compared: where it was not yet, that takes long and is told."""
     robot = fb.load("go2")
     fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
 
