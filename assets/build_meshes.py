@@ -18,8 +18,8 @@ import fast_simplification
 import numpy as np
 import trimesh
 
-from floatbase.robots import Robot, load, robots
-from floatbase.viewer.visuals import Piece, urdf_visuals
+from floatbase.robots import Robot, catalogue, load
+from floatbase.viewer import Piece, urdf_visuals
 
 OUT = Path(__file__).parent / "meshes"
 FACES = 36_000  # wanted for a robot, fewer where the file would be larger than SIZE
@@ -116,5 +116,5 @@ def write(robot: Robot, pieces: list[Piece], total: float) -> Path:
 
 
 if __name__ == "__main__":
-    for robot_name in sys.argv[1:] or robots():
+    for robot_name in sys.argv[1:] or catalogue():
         build(robot_name)

@@ -17,8 +17,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import floatbase as fb
-from floatbase.viewer.figures import FIGURES
-from floatbase.viewer.scene import Viewer
+from floatbase.viewer import FIGURES, Viewer
 
 OUT = Path(__file__).parent / "pictures"
 FLAGS = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -41,7 +40,7 @@ def standing(name: str, facets: int | None = None) -> Viewer:
 
 SCENES: dict[str, Callable[[], Viewer]] = {
     **FIGURES,
-    **{name: partial(standing, name) for name in fb.robots()},
+    **{name: partial(standing, name) for name in fb.catalogue()},
     "go2_facets": partial(standing, "go2", 4),
     "talos_feet": lambda: standing("talos").camera("feet"),
 }

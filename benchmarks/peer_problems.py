@@ -54,7 +54,7 @@ REGULARISATION = {
 class Problem:
     """One robot's problem as one peer can state it."""
 
-    robot: fb.robots.Robot
+    robot: fb.Robot
     peer: str
 
     @property
@@ -131,7 +131,7 @@ def problem(robot: str, peer: str) -> Problem:
     return Problem(fb.load(robot, feet=[foot if foot.is_flat else foot.frame for foot in feet]), peer)
 
 
-def level_soles(robot: fb.robots.Robot, q: np.ndarray) -> np.ndarray:
+def level_soles(robot: fb.Robot, q: np.ndarray) -> np.ndarray:
     """q with its leg joints changed until every foot's frame is that of the world: Newton's method with least steps."""
     model, data, q = robot.model, robot.model.createData(), np.array(q)
     frames = [robot.frame_id(foot.frame) for foot in robot.feet]

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 import floatbase as fb
-from floatbase.control.compiled import kernel_obstacle
+from floatbase.control.tick import kernel_obstacle
 from floatbase.errors import InfeasibleError
 
 HERE = Path(__file__).parent
@@ -32,18 +32,18 @@ FAST = ("compiled", "reduced")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 
 
-def two_points(robot: fb.robots.Robot) -> fb.Contacts:
+def two_points(robot: fb.Robot) -> fb.Contacts:
     """The first two feet, as points."""
     return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:2]])
 
 
-def controller(robot: fb.robots.Robot, path: str = "compiled", **options: object) -> fb.WholeBodyController:
+def controller(robot: fb.Robot, path: str = "compiled", **options: object) -> fb.WholeBodyController:
     """Keep standing on all feet."""
     contacts = options.pop("contacts") if "contacts" in options else fb.Contacts.feet(robot)
     return fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), path=path, **options)
 
 
-def states(robot: fb.robots.Robot, n: int, spread: float) -> list[tuple[np.ndarray, np.ndarray]]:
+def states(robot: fb.Robot, n: int, spread: float) -> list[tuple[np.ndarray, np.ndarray]]:
     """Configurations and velocities, the same ones every time."""
     found = [robot.random_state(seed, spread) for seed in range(n)]
     return [(np.array(s.q), np.array(s.v)) for s in found]
@@ -212,7 +212,7 @@ def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
     paths = " | ".join(f"{path}: left to the readable path | largest difference" for path in FAST)
     yield f"| robot | feet | states | infeasible | {paths} |"
     yield "|---" * (4 + 2 * len(FAST)) + "|"
-    for name in names or fb.robots():
+    for name in names or fb.catalogue():
         robot = fb.load(name)
         whole = fb.Contacts.feet(robot)
         for count in range(min(1, len(whole)), len(whole) + 1):

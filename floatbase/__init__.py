@@ -9,11 +9,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from floatbase.affine import Affine, Quadratic
-from floatbase.control.controller import Command, WholeBodyController
-from floatbase.dynamics import Contacts, equations_of_motion
-from floatbase.dynamics.subspace import accelerations_from_torques, feasible_space, forces_from_torques
+from floatbase.control import WholeBodyController
+from floatbase.dynamics import (
+    Contacts,
+    accelerations_from_torques,
+    equations_of_motion,
+    feasible_space,
+    forces_from_torques,
+)
 from floatbase.errors import FloatbaseError, InfeasibleError
-from floatbase.objectives.tasks import (
+from floatbase.objectives import (
     CoMTask,
     ForceTask,
     FrameTask,
@@ -22,32 +27,31 @@ from floatbase.objectives.tasks import (
     TorqueTask,
     standing_tasks,
 )
-from floatbase.robots import Foot, State, load, load_urdf, robots
+from floatbase.qp import QP, solve
+from floatbase.robots import Robot, State, catalogue, load, load_urdf
 
 if TYPE_CHECKING:
-    from floatbase.simulation.physics import Ground, Push, Simulation
-    from floatbase.simulation.rollout import Rollout, rollout
-    from floatbase.viewer.scene import Viewer
+    from floatbase.simulation import Ground, Push, Rollout, Simulation, rollout
+    from floatbase.viewer import Viewer
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # heavy rooms, imported at first use: mujoco behind Simulation, meshcat behind Viewer
 _LAZY = {
-    "Ground": "floatbase.simulation.physics",
-    "Push": "floatbase.simulation.physics",
-    "Simulation": "floatbase.simulation.physics",
-    "Rollout": "floatbase.simulation.rollout",
-    "rollout": "floatbase.simulation.rollout",
-    "Viewer": "floatbase.viewer.scene",
+    "Ground": "floatbase.simulation",
+    "Push": "floatbase.simulation",
+    "Rollout": "floatbase.simulation",
+    "Simulation": "floatbase.simulation",
+    "Viewer": "floatbase.viewer",
+    "rollout": "floatbase.simulation",
 }
 
 __all__ = [
+    "QP",
     "Affine",
     "CoMTask",
-    "Command",
     "Contacts",
     "FloatbaseError",
-    "Foot",
     "ForceTask",
     "FrameTask",
     "Ground",
@@ -56,6 +60,7 @@ __all__ = [
     "PostureTask",
     "Push",
     "Quadratic",
+    "Robot",
     "Rollout",
     "Simulation",
     "State",
@@ -63,13 +68,14 @@ __all__ = [
     "Viewer",
     "WholeBodyController",
     "accelerations_from_torques",
+    "catalogue",
     "equations_of_motion",
     "feasible_space",
     "forces_from_torques",
     "load",
     "load_urdf",
-    "robots",
     "rollout",
+    "solve",
     "standing_tasks",
 ]
 

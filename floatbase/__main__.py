@@ -14,10 +14,10 @@ from contextlib import suppress
 
 import floatbase as fb
 from floatbase.errors import ViewerError
-from floatbase.objectives.tasks import Task
-from floatbase.robots.robot import Robot
-from floatbase.simulation.live import SEEN, Live, advice
-from floatbase.viewer.recording import push_at
+from floatbase.objectives import Task
+from floatbase.robots import Robot
+from floatbase.simulation import SEEN, Live, advice
+from floatbase.viewer import push_at
 
 PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller; all of them stand and are pushed
 
@@ -120,7 +120,7 @@ class Playground:
 
     def _cut(self, facets: float) -> None:
         self.facets = round(facets)
-        self.view.painter = self.view.painter.with_facets(self.facets)
+        self.view.painter = self.view.painter.replace(self.facets)
         self._change()
 
     def _stand(self, foot: str, on: bool) -> None:
@@ -202,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands.add_parser("compile", help="compile the controller's tick, so that the first controller need not")
     asked = parser.parse_args(arguments)
     if asked.command == "robots":
-        print("\n".join(f"{name:14} {text}" for name, text in fb.robots().items()))
+        print("\n".join(f"{name:14} {text}" for name, text in fb.catalogue().items()))
         return 0
     if asked.command == "compile":
         go2 = fb.load("go2")

@@ -14,14 +14,13 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import floatbase as fb
-from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.robots.robot import Robot
-from floatbase.robots.state import State
-from floatbase.simulation.conversion import Conversion
+from floatbase.dynamics import EquationsOfMotion
+from floatbase.robots import Robot, State
+from floatbase.simulation import Conversion
 
 Array = npt.NDArray[np.float64]
 
-ROBOTS = tuple(fb.robots())
+ROBOTS = tuple(fb.catalogue())
 
 
 @cache
@@ -141,7 +140,7 @@ def mujoco_of(name: str) -> Mujoco:
 
 def along(state: State, direction: npt.ArrayLike, step: float) -> State:
     """The state moved along a velocity direction for a time `step`; v stays as it is."""
-    return state.at(q=state.integrate(step * np.asarray(direction, dtype=np.float64)))
+    return state.replace(q=state.integrate(step * np.asarray(direction, dtype=np.float64)))
 
 
 def derivative(f: Callable[[State], Array], state: State, direction: npt.ArrayLike, step: float = 1e-5) -> Array:
@@ -161,7 +160,7 @@ def drift_of(J: Callable[[State], Array], state: State) -> Array:
 
 def moved(state: State, qdd: Array, t: float) -> State:
     """The configuration a short time t away (either way) when the robot accelerates with q̈: right to third order in t."""
-    return state.at(q=state.integrate(t * state.v + 0.5 * t * t * qdd))
+    return state.replace(q=state.integrate(t * state.v + 0.5 * t * t * qdd))
 
 
 def acceleration_of(f: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4) -> Array:

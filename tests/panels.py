@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import floatbase as fb
-from floatbase.robots.robot import Robot
+from floatbase.robots import Robot
 
 
 def assert_a_slider_redraws(robot: Robot, panel: Callable[[fb.Viewer], Any]) -> None:

@@ -16,7 +16,7 @@ import nbformat
 import pytest
 from browsers import SCREENSHOTS, launched, needs_chromium
 
-from floatbase.lessons.notebooks import FOLDER, read, without_outputs
+from floatbase.lessons.publish import FOLDER, read, without_outputs
 
 LESSONS = [path.stem for path in sorted(FOLDER.glob("*.ipynb"))]
 IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push

@@ -17,9 +17,8 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
 import floatbase as fb
-from floatbase.lessons import progress
-from floatbase.lessons.exercises import check, exercises
-from floatbase.lessons.notebooks import FOLDER, execute, read, run, solved
+from floatbase.lessons import all_exercises, check, progress
+from floatbase.lessons.publish import FOLDER, execute, read, run, solved
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 LESSONS = sorted(FOLDER.glob("*.ipynb"))
@@ -117,7 +116,7 @@ def test_a_stored_lesson_is_small_has_short_cells_and_holds_no_picture(path: Pat
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
-    known = exercises()
+    known = all_exercises()
     cells = {c.metadata["exercise"]: c.source for c in read(path).cells if "exercise" in c.metadata}
     number = path.stem.split("_")[0]
     assert set(cells) == {name for name in known if name.startswith(f"{number}.")}
@@ -125,7 +124,7 @@ def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
         assert source == known[name].stub
 
 
-@pytest.mark.parametrize("name", exercises())
+@pytest.mark.parametrize("name", all_exercises())
 def test_an_exercise_has_no_answer_at_first_and_says_so(name: str) -> None:
     verdict = check(name, None)
     assert not verdict.right

@@ -10,14 +10,10 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Quadratic
-from floatbase.dynamics.contacts import Contacts
-from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
-from floatbase.dynamics.subspace import feasible_space
+from floatbase.dynamics import Contacts, EquationsOfMotion, equations_of_motion, feasible_space
 from floatbase.errors import InputError
-from floatbase.objectives.centroidal import force_bias, rotational_inertia, wanted_wrench, wrench_objective
-from floatbase.objectives.pullback import cost_on_space
-from floatbase.robots.robot import Robot
-from floatbase.robots.state import State
+from floatbase.objectives import cost_on_space, force_bias, rotational_inertia, wanted_wrench, wrench_objective
+from floatbase.robots import Robot, State
 
 
 @dataclass(frozen=True, eq=False)

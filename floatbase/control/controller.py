@@ -11,19 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
-from floatbase.control.compiled import Compiled, kernel_obstacle, told_when_slow, unkept
-from floatbase.control.friction import FrictionPolyhedron
-from floatbase.control.programs import Program, obstacle
-from floatbase.control.qp import QP, Solution, check_solver, finished, solve
-from floatbase.dynamics.contacts import Contacts
-from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
-from floatbase.dynamics.subspace import MOTION_NOISE, resolved_motion
+from floatbase.control.tick import Compiled, Program, kernel_obstacle, obstacle, told_when_slow, unkept
+from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError, unknown_name
-from floatbase.objectives.tasks import ForceTask, Task, TorqueTask
-from floatbase.robots.robot import Robot, torque_limits_of
-from floatbase.robots.state import State
+from floatbase.friction import FrictionPolyhedron
+from floatbase.objectives import ForceTask, Task, TorqueTask
+from floatbase.qp import QP, Solution, check_solver, finished, solve
+from floatbase.robots import Robot, State, torque_limits_of
 
-Path: TypeAlias = Literal["auto", "compiled", "reduced", "readable"]
+Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +49,7 @@ class Command:
 
     tau: (d,) N·m, joint torques to apply. qdd: (nv,), the acceleration planned with them. forces: (k,) N, world, the contact
     forces planned with them, stacked as in `contacts`. active: names of the inequality rows that push; multipliers: theirs,
-    by name. path: which of the controller's paths answered, "compiled", "reduced" or "readable". evidence: makes `solution`,
+    by name. path: which of the controller's paths answered, "compiled" or "readable". evidence: makes `solution`,
     the readable problem with this answer to it; it is put together when first asked for, which the tick need not wait for.
     """
 
@@ -110,7 +106,7 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
 
     Where A of (5) loses rank, or nearly (solo8 on four feet), its rows repeat each other, and a measured velocity that is not
     quite one the contacts allow makes them contradict each other: met to the letter they would ask for any acceleration.
-    So the rows count along the directions that A resolves well, as everywhere (`floatbase.dynamics.subspace.resolved_motion`).
+    So the rows count along the directions that A resolves well, as everywhere (`floatbase.dynamics.resolved_motion`).
     """
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
@@ -205,11 +201,10 @@ class WholeBodyController:
     torques, a `ForceTask()` and a `TorqueTask()` with their small default weights are added, so that the answer is
     unique; `tasks` shows all. facets, inside: the friction polyhedron. min_normal_force: N, at every contact point.
     torque_limits: N·m, one number or (d,), the robot's by default; np.inf switches them off. solver: one of
-    `floatbase.control.qp.solvers()`.
+    `floatbase.qp.solvers()`.
 
-    path: "readable" assembles and solves the QP as it is written. Where tasks and contacts are the package's own, two paths
-    solve the same problem many times faster: "reduced" by numpy in the document's β space (`reduced.py`), and "compiled" in
-    `kernel.py`, which is the fastest and needs numba. "auto" takes compiled where it can, else reduced, else readable. The
+    path: "readable" assembles and solves the QP as it is written. Where tasks and contacts are the package's own, "compiled"
+    solves the same problem many times faster (`floatbase.control.tick`). "auto" takes compiled where it can, else readable. The
     attribute `path` says which it is, `path_reason` why. The first compiled controller ever compiles for about half a minute,
     unless the set-up did (`python -m floatbase compile`); later ones load what was compiled, from the package's folder, the
     user's cache or NUMBA_CACHE_DIR, whichever can be written to. A tick that a fast path cannot
@@ -308,7 +303,7 @@ class WholeBodyController:
     def _warm_up(self) -> None:
         """Run one tick of a fast path before the loop does."""
         if self._program is not None:
-            often = unkept() if self.path == "compiled" else ""
+            often = unkept()
             with told_when_slow(
                 f"floatbase compiles its controller{'; ' + often if often else ', once: about half a minute'}."
             ):
@@ -325,40 +320,25 @@ class WholeBodyController:
     def _choose_path(self) -> None:
         """Set `path`, `path_reason` and the tables of a fast path, or raise when one was asked for and cannot be."""
         self._program: Program | None = None
-        self.path: Literal["compiled", "reduced", "readable"] = "readable"
+        self.path: Literal["compiled", "readable"] = "readable"
         self.path_reason = "it was asked for"
         if self.asked_path == "readable":
             return
-        missing = "" if self.asked_path == "reduced" else kernel_obstacle()
-        reason = obstacle(self.robot, self.contacts, self.tasks, self.solver)
-        if self.asked_path == "compiled":
-            reason = missing or reason
-        if reason and self.asked_path != "auto":
-            raise InputError(f'path="{self.asked_path}" is not possible: {reason}. path="auto" takes the fastest that is.')
+        reason = kernel_obstacle() or obstacle(self.robot, self.contacts, self.tasks, self.solver)
+        if reason and self.asked_path == "compiled":
+            raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
         if reason:
             self.path_reason = reason
             return
-        kind = _reduced() if missing or self.asked_path == "reduced" else Compiled
-        program = kind(self.robot, self.contacts, self.tasks, self.limits)
+        program = Compiled(self.robot, self.contacts, self.tasks, self.limits)
         if not program.fits:
             self.path_reason = "a target has the wrong shape"
             return
         self._program, self.path = program, program.path
-        if self.path == "compiled":
-            why = "; ".join(filter(None, ("numba is installed", unkept())))
-        else:
-            why = f"{missing}: numpy alone answers" if missing else "it was asked for"
-        self.path_reason = f"the tasks and contacts are the package's own; {why}"
+        self.path_reason = "; ".join(filter(None, ("the tasks and contacts are the package's own", unkept())))
 
     def __repr__(self) -> str:
         return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"
-
-
-def _reduced() -> type[Program]:
-    """The path without a compiler, loaded when it is needed: scipy's linear algebra takes a while."""
-    from floatbase.control.reduced import Reduced
-
-    return Reduced
 
 
 def _checked_contacts(contacts: Contacts) -> Contacts:

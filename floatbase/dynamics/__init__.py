@@ -1,6 +1,77 @@
-"""Constrained equations of motion and the space of motions they leave (§2 and Appendix A of the document)."""
+"""Constrained equations of motion and the space of motions they leave (§2 and App. A of the document)."""
 
-from floatbase.dynamics.contacts import Contacts, FlatFootContact, PointContact
-from floatbase.dynamics.equations import EquationsOfMotion, equations_of_motion
+from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
+from floatbase.dynamics.contacts import UP, Contact, Contacts, FlatFootContact, PointContact, point_jacobian
+from floatbase.dynamics.equations import Block, EquationsOfMotion, equations_of_motion
+from floatbase.dynamics.fictitious import (
+    BiasForces,
+    TurningView,
+    bias_forces,
+    coriolis_matrix,
+    inertia_rate,
+    inward_acceleration,
+    power_identity,
+    seen_from_turning_frame,
+)
+from floatbase.dynamics.subspace import (
+    MOTION_NOISE,
+    MOTION_TOLERANCE,
+    ContactSpace,
+    Dimensions,
+    FeasibleSpace,
+    accelerations_from_torques,
+    contact_inertia_inverse,
+    contact_space,
+    dimensions,
+    feasible_space,
+    forces_are_unique,
+    forces_from_torques,
+    internal_forces,
+    motion_matrix,
+    resolved_motion,
+    torque_force_matrix,
+    torque_force_space,
+    undetermined_forces,
+)
 
-__all__ = ["Contacts", "EquationsOfMotion", "FlatFootContact", "PointContact", "equations_of_motion"]
+__all__ = [
+    "MOTION_NOISE",
+    "MOTION_TOLERANCE",
+    "UP",
+    "BiasForces",
+    "Block",
+    "Contact",
+    "ContactSpace",
+    "Contacts",
+    "Dimensions",
+    "EquationsOfMotion",
+    "FeasibleSpace",
+    "FlatFootContact",
+    "LinearConstraint",
+    "PointContact",
+    "RollingWheel",
+    "TurningView",
+    "accelerations_from_torques",
+    "bias_forces",
+    "contact_inertia_inverse",
+    "contact_space",
+    "coriolis_matrix",
+    "dimensions",
+    "equations_of_motion",
+    "feasible_space",
+    "fixed_frame",
+    "forces_are_unique",
+    "forces_from_torques",
+    "inertia_rate",
+    "internal_forces",
+    "inward_acceleration",
+    "motion_matrix",
+    "moving_frame",
+    "point_jacobian",
+    "power_identity",
+    "resolved_motion",
+    "seen_from_turning_frame",
+    "torque_force_matrix",
+    "torque_force_space",
+    "undetermined_forces",
+]

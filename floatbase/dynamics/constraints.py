@@ -10,7 +10,7 @@ import numpy as np
 from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
 from floatbase.dynamics.contacts import UP, point_jacobian
 from floatbase.errors import InputError
-from floatbase.robots.state import State
+from floatbase.robots import State
 
 Rows = Callable[[State, float], tuple[Array, Array]]
 

@@ -19,8 +19,7 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
 from floatbase.errors import InputError, unknown_name
-from floatbase.robots.robot import Foot, Robot, spread_corners
-from floatbase.robots.state import State
+from floatbase.robots import Foot, Robot, State, spread_corners
 
 UP = read_only([0.0, 0.0, 1.0])
 _MU = 0.7
@@ -255,7 +254,7 @@ class Contacts:
             if foot.corners is None:
                 raise InputError(
                     f"{foot.frame} of {robot.name} is not a flat foot; use fb.Contacts.points, or load the robot with "
-                    "feet=[fb.Foot(frame, corners=…)]."
+                    "feet=[floatbase.robots.Foot(frame, corners=…)]."
                 )
         return Contacts(
             [

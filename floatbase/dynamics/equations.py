@@ -11,8 +11,7 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked
 from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InputError
-from floatbase.robots.robot import Robot
-from floatbase.robots.state import State
+from floatbase.robots import Robot, State
 
 Block: TypeAlias = Literal["qdd", "tau", "forces"]  # the three unknowns of (7): q̈, τ, λ
 

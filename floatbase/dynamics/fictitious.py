@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, read_only
 from floatbase.errors import InputError
-from floatbase.robots.state import State
+from floatbase.robots import State
 
 Turning: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 _LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up

@@ -12,28 +12,10 @@ from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
+from floatbase.linear_algebra import RANK_TOLERANCE, null_space, rank
 
-RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
 MOTION_TOLERANCE = 1e-4  # directions of motion that A holds by less than this part of the largest count as not held
 MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
-
-
-def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
-    """Number of singular values of A above `RANK_TOLERANCE` times the largest.
-
-    absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding altogether.
-    """
-    s = np.linalg.svd(np.asarray(A, dtype=np.float64), compute_uv=False)
-    largest = 1.0 if absolute else float(s.max(initial=0.0))
-    return int(np.sum(s > RANK_TOLERANCE * largest))
-
-
-def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
-    """Orthonormal columns that span {x : A x = 0}, shape (n, n - rank); absolute as for `rank`."""
-    A = np.asarray(A, dtype=np.float64)
-    if A.size == 0:
-        return np.eye(A.shape[1])
-    return read_only(np.linalg.svd(A)[2][rank(A, absolute) :].T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,7 +139,7 @@ class Shaped:
         return Verdict(False, hint) if hint else self.judge(answer)
 
 
-def exercises() -> dict[str, Exercise]:
+def all_exercises() -> dict[str, Exercise]:
     """All exercises by name, such as "00.1"."""
     found: dict[str, Exercise] = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
@@ -175,7 +175,7 @@ def reveal(name: str) -> None:
 
 def show_progress() -> None:
     """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried."""
-    kept, known = progress.load(), exercises()
+    kept, known = progress.load(), all_exercises()
     marks = {name: _mark(kept.get(name)) for name in known}
     for lesson in sorted({name.split(".")[0] for name in known}):
         here = [name for name in known if name.startswith(f"{lesson}.")]
@@ -197,7 +197,7 @@ def _mark(kept: dict[str, int] | None) -> str:
 
 
 def _exercise(name: str) -> Exercise:
-    known = exercises()
+    known = all_exercises()
     if name not in known:
         raise unknown_name("exercise", name, known)
     return known[name]

@@ -9,11 +9,8 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from floatbase.simulation.live import SEEN, Live, advice
-from floatbase.simulation.physics import Simulation
-from floatbase.simulation.rollout import Controller, Rollout
-from floatbase.viewer.recording import push_at
-from floatbase.viewer.scene import Viewer
+from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
+from floatbase.viewer import Viewer, push_at
 
 
 def live(sim: Simulation, controller: Controller, view: Viewer, **options: Any) -> Live:

@@ -11,11 +11,10 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Affine, Quadratic
-from floatbase.dynamics.contacts import Contacts
-from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.dynamics.subspace import RANK_TOLERANCE, null_space, rank, resolved_motion, torque_force_space
+from floatbase.dynamics import Contacts, EquationsOfMotion, resolved_motion, torque_force_space
 from floatbase.errors import InputError
-from floatbase.robots.state import State
+from floatbase.linear_algebra import RANK_TOLERANCE, null_space, rank
+from floatbase.robots import State
 
 
 def grasp_matrix(points: Array, about: Array) -> Array:

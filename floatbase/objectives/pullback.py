@@ -6,8 +6,8 @@ import numpy as np
 
 from floatbase._arrays import Array
 from floatbase.affine import Affine, Quadratic
-from floatbase.dynamics.equations import Block, EquationsOfMotion
-from floatbase.dynamics.subspace import FeasibleSpace, accelerations_from_torques, null_space, rank
+from floatbase.dynamics import Block, EquationsOfMotion, FeasibleSpace, accelerations_from_torques
+from floatbase.linear_algebra import null_space, rank
 
 
 def pullback(cost: Quadratic, f: Affine) -> Quadratic:

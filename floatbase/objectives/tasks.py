@@ -19,10 +19,9 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Affine
-from floatbase.dynamics.equations import Block, EquationsOfMotion
+from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
-from floatbase.robots.robot import check_turns
-from floatbase.robots.state import State
+from floatbase.robots import State, check_turns
 
 Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 _ZERO3 = (0.0, 0.0, 0.0)

@@ -38,7 +38,7 @@ class State:
         check_turns(robot.model, "q", self.q, ", or use robot.standing()")
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise InputError(f"a State does not change; state.at({name}=…) makes a new one." if name in "qv" else f"no {name}.")
+        raise InputError(f"a State does not change; state.replace({name}=…) makes a new one." if name in "qv" else name)
 
     @cached_property
     def _data(self) -> pin.Data:
@@ -117,7 +117,7 @@ class State:
         """The dv, shape (nv,), that leads from configuration q to this state's: `State(robot, q).integrate(dv)` = self.q."""
         return read_only(pin.difference(self.robot.model, checked("q", q, (self.robot.nq,)), self.q))
 
-    def at(self, q: npt.ArrayLike | None = None, v: npt.ArrayLike | None = None) -> State:
+    def replace(self, q: npt.ArrayLike | None = None, v: npt.ArrayLike | None = None) -> State:
         """A new state with q or v replaced."""
         return State(self.robot, self.q if q is None else q, self.v if v is None else v)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from floatbase._arrays import Array
 from floatbase.errors import SimulationError
-from floatbase.robots.robot import Robot
+from floatbase.robots import Robot
 
 
 def body_name(link: str) -> str:

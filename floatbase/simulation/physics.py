@@ -12,10 +12,9 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive, read_only, unit_vector
-from floatbase.dynamics.contacts import UP
+from floatbase.dynamics import UP
 from floatbase.errors import InputError, SimulationError
-from floatbase.robots.robot import Foot, Robot
-from floatbase.robots.state import State
+from floatbase.robots import Foot, Robot, State
 from floatbase.simulation.conversion import Conversion, body_name
 
 _CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
@@ -187,7 +186,7 @@ class Simulation:
             return state
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(self.ground.normal))
         attitude = (turn * pin.Quaternion(*state.q[[6, 3, 4, 5]])).normalized()
-        return state.at(q=np.concatenate([turn.matrix() @ state.q[:3], attitude.coeffs(), state.q[7:]]))
+        return state.replace(q=np.concatenate([turn.matrix() @ state.q[:3], attitude.coeffs(), state.q[7:]]))
 
     def _base_pose(self) -> tuple[float, Array]:
         """Height of the base's origin over the ground, m, and its vertical in the world, shape (3,)."""

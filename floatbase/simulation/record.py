@@ -9,10 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from floatbase._arrays import Array, read_only
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
-from floatbase.robots.robot import Robot
-from floatbase.robots.state import State
+from floatbase.robots import Robot, State
 from floatbase.simulation.physics import Push, Simulation
 
 Outcome = Literal["completed", "fell", "diverged", "controller failed"]

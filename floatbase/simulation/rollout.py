@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.record import Outcome, Rollout, Row, joined, recorded
@@ -168,7 +168,7 @@ class _Run:
         if not hasattr(command, "tau"):
             d = self.sim.robot.d
             raise InputError(
-                f"a controller must answer with .tau, shape ({d},), N·m, as fb.Command does; got {command!r}. Any object "
+                f"a controller must answer with .tau, shape ({d},), N·m, as a Command does; got {command!r}. Any object "
                 f"with .tau will do: types.SimpleNamespace(tau=…)."
             )
         return self._finite("the controller's torques", command.tau)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from floatbase.control.friction import FrictionPolyhedron
+from floatbase.friction import FrictionPolyhedron
 
 NEAR = 0.02  # of the friction limit: nearer than this, the surface counts as reached
 

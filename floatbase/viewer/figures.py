@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.robots import load
 from floatbase.viewer import geometry, marks, props, shapes
 from floatbase.viewer.camera import View
 from floatbase.viewer.colours import ALARM, CALM, COM, MEASURED, PATCH, RGB
 from floatbase.viewer.painter import below
-from floatbase.viewer.scene import Viewer
 from floatbase.viewer.shapes import Picture
+from floatbase.viewer.viewer import Viewer
 
 MU = 0.7
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from floatbase._arrays import Array
-from floatbase.control.friction import tangents
+from floatbase.friction import tangents
 from floatbase.viewer.colours import RGB
 from floatbase.viewer.shapes import Item, ground, placed
 

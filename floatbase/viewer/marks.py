@@ -10,11 +10,11 @@ import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
 from floatbase._arrays import checked, positive
-from floatbase.viewer import geometry, three
+from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.ground import LEVEL, Plane
+from floatbase.viewer.lowering import Shape
 from floatbase.viewer.shapes import ARROW, Item, Picture, arrow, arrow_width, directed, flat_polygon, label, placed
-from floatbase.viewer.three import Shape
 
 OUTLINE = 0.6  # how wide a push's outline is, over the radius of its shaft
 
@@ -86,7 +86,7 @@ def _unit_curl(colour: RGB) -> Shape:
     at = np.array([np.cos(end - 0.3), np.sin(end - 0.3), 0.0])
     along = np.array([-at[1], at[0], 0.0])
     turned = head @ geometry.frame_along(along).T + at
-    return three.mesh(*geometry.merged([ring, (turned, faces)]), colour)
+    return lowering.mesh(*geometry.merged([ring, (turned, faces)]), colour)
 
 
 @lru_cache(maxsize=64)
@@ -103,7 +103,7 @@ def _outlined_arrow(colour: RGB, outline: RGB, slender: int) -> Shape:
     around = geometry.revolved([(0.0, -back), (wide, -back), (wide, low), (opening * slender * (top - low), low), (0.0, top)])
     parts = [around, geometry.revolved(ARROW)]
     colours = [np.tile(np.round(255 * np.array(c)), (len(p), 1)) for c, (p, _) in zip((outline, colour), parts, strict=True)]
-    return three.mesh(*geometry.merged(parts), colours=np.vstack(colours), lit=False, through=True)
+    return lowering.mesh(*geometry.merged(parts), colours=np.vstack(colours), lit=False, through=True)
 
 
 @lru_cache(maxsize=1)
@@ -114,4 +114,4 @@ def _axes() -> Shape:
         np.tile(np.round(255 * np.array(colour)), (len(vertices), 1))
         for colour, (vertices, _) in zip((X_AXIS, Y_AXIS, Z_AXIS), rods, strict=True)
     ]
-    return three.mesh(*geometry.merged(rods), colours=np.vstack(colours), through=True)
+    return lowering.mesh(*geometry.merged(rods), colours=np.vstack(colours), through=True)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._assets import assets_root
-from floatbase.robots.robot import Robot
+from floatbase.robots import Robot
 from floatbase.viewer import geometry
 from floatbase.viewer.colours import ROBOT
 

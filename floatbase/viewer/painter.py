@@ -12,12 +12,11 @@ import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
 from floatbase._arrays import Array, checked
-from floatbase.control.friction import FrictionPolyhedron
-from floatbase.dynamics.contacts import Contacts, FlatFootContact
+from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
-from floatbase.robots.robot import Robot
-from floatbase.robots.state import State
-from floatbase.viewer import marks, shapes, three
+from floatbase.friction import FrictionPolyhedron
+from floatbase.robots import Robot, State
+from floatbase.viewer import lowering, marks, shapes
 from floatbase.viewer.colours import GHOST, MEASURED, PLANNED, RGB
 from floatbase.viewer.cones import cone_status, polyhedron_status
 from floatbase.viewer.ground import LEVEL, Plane, plane_under
@@ -111,7 +110,7 @@ class Painter:
             picture |= self._scale_bar(ground)
         return picture | dict(extra or {})
 
-    def with_facets(self, facets: int | None) -> Painter:
+    def replace(self, facets: int | None) -> Painter:
         """The same with other friction polyhedra; what was computed for the robot is kept."""
         other = replace(self, facets=facets)
         for name in ("home", "box", "feet_box", "size", "scale", "_meshes", "_shapes", "_ghosts", "_scale_bars"):
@@ -173,19 +172,19 @@ class Painter:
         return robot_meshes(self.robot)
 
     @cached_property
-    def _shapes(self) -> list[three.Shape]:
-        return [three.mesh(mesh.vertices, mesh.faces, colours=mesh.colours) for mesh in self._meshes]
+    def _shapes(self) -> list[lowering.Shape]:
+        return [lowering.mesh(mesh.vertices, mesh.faces, colours=mesh.colours) for mesh in self._meshes]
 
     @cached_property
-    def _ghosts(self) -> list[three.Shape]:
-        return [three.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, veil=True) for mesh in self._meshes]
+    def _ghosts(self) -> list[lowering.Shape]:
+        return [lowering.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, veil=True) for mesh in self._meshes]
 
     @cached_property
     def _paths(self) -> list[tuple[int, str]]:
         """Joint of every mesh, and its name as a part of a path."""
         return [(mesh.joint, plain(self.robot.model.names[mesh.joint])) for mesh in self._meshes]
 
-    def _robot(self, state: State, root: str, looks: list[three.Shape]) -> Picture:
+    def _robot(self, state: State, root: str, looks: list[lowering.Shape]) -> Picture:
         poses = state.joint_transforms
         return {f"{root}/{name}": Item(look, poses[joint]) for (joint, name), look in zip(self._paths, looks, strict=True)}
 

@@ -13,7 +13,7 @@ from floatbase._arrays import Array
 from floatbase.viewer.colours import ALARM, COM, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
 
 if TYPE_CHECKING:
-    from floatbase.simulation.rollout import Rollout
+    from floatbase.simulation import Rollout
 
 
 def plot(rollout: Rollout) -> Figure:

@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from floatbase._arrays import checked, positive, unit_vector
 from floatbase.errors import InputError
-from floatbase.viewer import geometry, three
+from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import MEASURED, PLANNED, RGB, WARNING
+from floatbase.viewer.lowering import Shape
 from floatbase.viewer.shapes import Item, Picture, directed, placed
-from floatbase.viewer.three import Shape
 
 STEEL: RGB = (0.55, 0.58, 0.62)
 RUBBER: RGB = (0.16, 0.17, 0.18)
@@ -100,24 +100,24 @@ def _unit_wheel() -> Shape:
     spokes = [geometry.rod(np.zeros(3), [0.85 * np.cos(a), 0.85 * np.sin(a), 0.0], 0.06) for a in angles]
     parts = [(tyre, RUBBER), (hub, STEEL), (spokes[0], WARNING), *((spoke, STEEL) for spoke in spokes[1:])]
     colours = [np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts]
-    return three.mesh(*geometry.merged([mesh for mesh, _ in parts]), colours=np.vstack(colours))
+    return lowering.mesh(*geometry.merged([mesh for mesh, _ in parts]), colours=np.vstack(colours))
 
 
 @lru_cache(maxsize=1)
 def _tube() -> Shape:
     """Along z, 1 long, of radius 1, seen through."""
-    return three.mesh(*geometry.revolved([(1.0, 0.0), (1.0, 1.0)], 32), STEEL, opacity=0.35)
+    return lowering.mesh(*geometry.revolved([(1.0, 0.0), (1.0, 1.0)], 32), STEEL, opacity=0.35)
 
 
 @lru_cache(maxsize=1)
 def _fluid() -> Shape:
     profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
-    return three.mesh(*geometry.revolved(profile, 24), (1.0, 1.0, 1.0), opacity=0.5)
+    return lowering.mesh(*geometry.revolved(profile, 24), (1.0, 1.0, 1.0), opacity=0.5)
 
 
 @lru_cache(maxsize=8)
 def _rod(colour: RGB) -> Shape:
-    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 24), colour)
+    return lowering.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 24), colour)
 
 
 @lru_cache(maxsize=8)
@@ -125,10 +125,10 @@ def _unit_box(colour: RGB) -> Shape:
     """A cube of side 1 around the origin."""
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return three.mesh(*geometry.merged([geometry.fan(corners[list(side)]) for side in sides]), colour, flat=True)
+    return lowering.mesh(*geometry.merged([geometry.fan(corners[list(side)]) for side in sides]), colour, flat=True)
 
 
 @lru_cache(maxsize=1)
 def _bolt() -> Shape:
     head = geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 0.9), (0.0, 0.9)], 6)
-    return three.mesh(*head, (0.25, 0.26, 0.28), flat=True)
+    return lowering.mesh(*head, (0.25, 0.26, 0.28), flat=True)

@@ -15,7 +15,7 @@ from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture
 
 if TYPE_CHECKING:
-    from floatbase.simulation.rollout import Rollout
+    from floatbase.simulation import Rollout
 
 REPETITIONS = 10_000  # meshcat's default is 1, after which a picture falls back to its start
 _SMOOTH, _STEP = 2301, 2300  # three.js: linear and discrete interpolation

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, checked, positive, read_only
-from floatbase.control.friction import FrictionPolyhedron, tangents
 from floatbase.errors import InputError
-from floatbase.viewer import geometry, three
+from floatbase.friction import FrictionPolyhedron, tangents
+from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import COM, CONE, CONE_ALPHA, PATCH, RGB, RGBA, WARNING, with_alpha
-from floatbase.viewer.three import Shape
+from floatbase.viewer.lowering import Shape
 
 FACET_ALPHA = 0.75
 ARROW_SLENDERNESS = 0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
@@ -190,36 +190,36 @@ def _surface_frame_of(x: float, y: float, z: float) -> Array:
 @lru_cache(maxsize=64)
 def _unit_arrow(colour: RGB, opacity: float) -> Shape:
     """Along z."""
-    return three.mesh(*geometry.revolved(ARROW), colour, opacity=opacity)
+    return lowering.mesh(*geometry.revolved(ARROW), colour, opacity=opacity)
 
 
 @lru_cache(maxsize=64)
 def _unit_rod(colour: RGB) -> Shape:
     """Along z, 1 long, of radius 1."""
-    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14), colour)
+    return lowering.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14), colour)
 
 
 @lru_cache(maxsize=64)
 def _unit_disc(colour: RGB) -> Shape:
     """A flat cylinder around z, of radius 1, its middle at 0."""
-    return three.mesh(*geometry.revolved([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32), colour)
+    return lowering.mesh(*geometry.revolved([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32), colour)
 
 
 @lru_cache(maxsize=64)
 def _unit_ball(colour: RGB, through: bool = False) -> Shape:
-    return three.mesh(*geometry.ball(1.0), colour, through=through)
+    return lowering.mesh(*geometry.ball(1.0), colour, through=through)
 
 
 @lru_cache(maxsize=1)
 def _unit_cone() -> Shape:
     """Point down at 0, 1 high, opening to radius 1."""
-    return three.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 1.0)], 48), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"])
+    return lowering.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 1.0)], 48), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"])
 
 
 @lru_cache(maxsize=64)
 def _unit_polyhedron(mu: float, facets: int, inside: bool) -> Shape:
     rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside).rays
-    return three.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True)
+    return lowering.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True)
 
 
 @lru_cache(maxsize=256)
@@ -227,17 +227,17 @@ def _facet(mu: float, facets: int, inside: bool, facet: int) -> Shape:
     """One side of the polyhedron: facet i lies between rays i - 1 and i."""
     rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside).rays
     corners = [np.zeros(3), rays[facet - 1], rays[facet]]
-    return three.mesh(*geometry.fan(corners), WARNING, opacity=FACET_ALPHA, flat=True)
+    return lowering.mesh(*geometry.fan(corners), WARNING, opacity=FACET_ALPHA, flat=True)
 
 
 @lru_cache(maxsize=256)
 def _label(text: str, height: float, plate: bool, colour: RGB) -> Shape:
-    return three.label(text, height, plate, colour)
+    return lowering.label(text, height, plate, colour)
 
 
 @lru_cache(maxsize=256)
 def _polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float) -> Shape:
-    return three.mesh(*geometry.fan(corners), colour, opacity=opacity, lit=False)
+    return lowering.mesh(*geometry.fan(corners), colour, opacity=opacity, lit=False)
 
 
 @lru_cache(maxsize=8)
@@ -247,4 +247,4 @@ def _grid(colour: RGB, step: float, half: float) -> Shape:
     start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
     along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
     points = np.vstack([along_x, along_x[:, ::-1]])
-    return three.lines(np.hstack([points, np.zeros((len(points), 1))]), colour)
+    return lowering.lines(np.hstack([points, np.zeros((len(points), 1))]), colour)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase.robots.robot import Robot
+from floatbase.robots import Robot
 
 if TYPE_CHECKING:
     import trimesh

@@ -12,8 +12,8 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.control.analytic import AnalyticController
-from floatbase.objectives.centroidal import rotational_inertia
+from floatbase.control import AnalyticController
+from floatbase.objectives import rotational_inertia
 
 Array = npt.NDArray[np.float64]
 PERIOD = 2e-3
@@ -37,7 +37,7 @@ def near(name: str, seed: int, far: float = 0.03, fast: float = 0.3) -> fb.State
     state = judges.along(state, rng.normal(size=state.robot.nv), far)
     v = fast * rng.normal(size=state.robot.nv)
     A = judges.stance(state.robot).constraint(state)[0]
-    return state.at(v=v - np.linalg.pinv(A, rcond=1e-9) @ (A @ v))
+    return state.replace(v=v - np.linalg.pinv(A, rcond=1e-9) @ (A @ v))
 
 
 def inertia_about_com(state: fb.State) -> Array:
@@ -165,8 +165,8 @@ def test_its_answer_satisfies_the_equations_of_motion(name: str) -> None:
 
 def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_same() -> None:
     """§4: the QP is a strict generalisation. The same terms as tasks, limits far away: the same torques."""
-    from floatbase.control.controller import Limits, build_qp
-    from floatbase.control.qp import QP, solve
+    from floatbase.control import Limits, build_qp
+    from floatbase.qp import QP, solve
 
     for seed in range(3):
         state, controller = near("go2", seed, far=0.003, fast=0.01), controller_of("go2")
@@ -214,7 +214,7 @@ def turned(state: fb.State, yaw: float) -> fb.State:
     turn = pin.Quaternion(judges.rotation([0.0, 0.0, yaw]))
     q[:3] = turn.matrix() @ q[:3]
     q[3:7] = (turn * pin.Quaternion(q[6], q[3], q[4], q[5])).normalized().coeffs()
-    return state.at(q=q)
+    return state.replace(q=q)
 
 
 def test_the_torques_do_not_depend_on_the_way_the_robot_faces() -> None:

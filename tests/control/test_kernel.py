@@ -12,8 +12,10 @@ import pytest
 
 import floatbase as fb
 from floatbase.__main__ import main
-from floatbase.control import compiled
-from floatbase.robots.robot import Robot
+from floatbase.control.tick import compiled
+from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
+from floatbase.qp import FEASIBILITY_TOLERANCE
+from floatbase.robots import Robot
 
 pytest.importorskip("numba")
 
@@ -25,7 +27,7 @@ def compiled_one(robot: Robot, **options: object) -> fb.WholeBodyController:
 
 
 def test_a_replaced_controller_compiles_nothing() -> None:
-    from floatbase.control import kernel
+    from floatbase.control.tick import kernel
 
     robot = judges.load("go2")
     controller = compiled_one(robot, facets=6)
@@ -72,12 +74,11 @@ def test_a_tick_makes_no_array_and_says_when_its_room_is_too_small() -> None:
 
 
 def test_all_paths_keep_the_same_tolerances() -> None:
-    from floatbase.control import controller, kernel, qp
-    from floatbase.dynamics import subspace
+    from floatbase.control.tick import kernel
 
-    assert subspace.MOTION_TOLERANCE == kernel._MOTION
-    assert controller.MOTION_NOISE == kernel._NOISE
-    assert qp.FEASIBILITY_TOLERANCE == kernel._VIOLATED
+    assert MOTION_TOLERANCE == kernel._MOTION
+    assert MOTION_NOISE == kernel._NOISE
+    assert FEASIBILITY_TOLERANCE == kernel._VIOLATED
 
 
 def test_importing_floatbase_leaves_numba_alone() -> None:
@@ -88,7 +89,7 @@ def test_importing_floatbase_leaves_numba_alone() -> None:
 def test_the_kernel_compiles_where_no_cache_can_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     import numba
 
-    from floatbase.control import kernel
+    from floatbase.control.tick import kernel
 
     def njit(*, cache: bool = False, **options: object) -> object:
         if cache:
@@ -104,7 +105,7 @@ def test_the_kernel_compiles_where_no_cache_can_be_kept(monkeypatch: pytest.Monk
 def test_a_cache_that_a_power_cut_left_half_written_is_compiled_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     import pickle
 
-    from floatbase.control import kernel
+    from floatbase.control.tick import kernel
 
     robot, tick = judges.load("go2"), kernel.tick
     wanted = compiled_one(robot)(robot.posture, np.zeros(robot.nv)).tau
@@ -127,7 +128,7 @@ def test_a_cache_that_a_power_cut_left_half_written_is_compiled_anew(monkeypatch
 def test_compiling_anew_forgets_every_function(monkeypatch: pytest.MonkeyPatch) -> None:
     from numba.core.dispatcher import Dispatcher
 
-    from floatbase.control import kernel
+    from floatbase.control.tick import kernel
 
     forgotten: list[Dispatcher] = []
     monkeypatch.setattr(Dispatcher, "recompile", lambda self: forgotten.append(self))
@@ -137,7 +138,7 @@ def test_compiling_anew_forgets_every_function(monkeypatch: pytest.MonkeyPatch) 
 
 def test_an_answer_out_of_reach_is_none() -> None:
     """Where next to nothing chooses an entry, as with weights of 0, it may be anything: then the readable path decides."""
-    from floatbase.control import kernel
+    from floatbase.control.tick import kernel
 
     V, T, active = np.zeros((3, 2)), np.zeros((1, 2)), np.zeros(3, np.int64)
     V[0, 0] = T[0, 0] = 1.0
@@ -168,7 +169,7 @@ def test_the_tick_can_be_compiled_before_it_is_needed(capsys: pytest.CaptureFixt
 
 def test_polish_is_newtons_step_it_reaches_the_optimum_from_anywhere() -> None:
     """A small problem with two active rows: after one step point and multipliers are those of the KKT system."""
-    from floatbase.control import kernel
+    from floatbase.control.tick import kernel
 
     rng = np.random.default_rng(0)
     root, rows, (bounds, g) = rng.standard_normal((4, 4)), rng.standard_normal((2, 4)), (rng.standard_normal(n) for n in (2, 4))
@@ -184,7 +185,7 @@ def test_polish_is_newtons_step_it_reaches_the_optimum_from_anywhere() -> None:
 
 
 def test_a_place_where_nothing_can_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    from floatbase.control import kernel
+    from floatbase.control.tick import kernel
 
     robot = judges.load("go2")
     assert "cannot be kept" not in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason

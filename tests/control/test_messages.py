@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.control.friction import FrictionPolyhedron
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
+from floatbase.friction import FrictionPolyhedron
 
 GO2 = judges.load("go2")
 CONTACTS = fb.Contacts.points(GO2)

@@ -13,16 +13,15 @@ import pytest
 import scipy.linalg
 
 import floatbase as fb
-from floatbase.control import compiled
-from floatbase.control.qp import QP, Solution
+from floatbase.control.tick import compiled
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
-from floatbase.robots.robot import Robot
-from floatbase.robots.state import State
+from floatbase.qp import QP, Solution
+from floatbase.robots import Robot, State
 
 TORQUE = 1e-8  # N·m between a fast path and the readable one
 
 
-@pytest.fixture(params=["compiled", "reduced"])
+@pytest.fixture(params=["compiled"])
 def path(request: pytest.FixtureRequest) -> str:
     """Each fast path in turn."""
     if request.param == "compiled":
@@ -422,7 +421,7 @@ def test_the_evidence_is_that_of_the_tick_when_a_target_has_moved_on(path: str) 
     assert command.solution.residuals.stationarity < 1e-8
 
 
-@pytest.mark.parametrize("path", ["compiled", "reduced", "readable"], indirect=True)
+@pytest.mark.parametrize("path", ["compiled", "readable"], indirect=True)
 def test_a_controller_can_be_copied_and_sent_to_another_process(path: str) -> None:
     robot = judges.load("go2")
     controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), path=path)
@@ -477,8 +476,6 @@ def test_a_whole_number_of_facets_may_be_written_with_a_point(path: str) -> None
 def test_a_replaced_controller_that_comes_to_a_fast_path_has_run_it_before_the_loop_does(
     path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if path == "reduced":
-        monkeypatch.setattr(compiled, "find_spec", lambda name: None)
     robot = judges.load("go2")
     readable = fb.WholeBodyController(robot, judges.stance(robot), [OwnTask()])
     ticks = []

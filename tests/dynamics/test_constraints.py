@@ -12,9 +12,9 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics import subspace
-from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
-from floatbase.robots.robot import Robot
+from floatbase import dynamics, linear_algebra
+from floatbase.dynamics import LinearConstraint, RollingWheel, fixed_frame, moving_frame
+from floatbase.robots import Robot
 
 Array = npt.NDArray[np.float64]
 
@@ -129,7 +129,7 @@ def test_a_linear_constraint_is_kept_by_the_motion_and_its_force_is_its_rows_tim
     constraint = LinearConstraint("any", 4, lambda s, t: (A, b))
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot, frames=["FL_foot"]) + fb.Contacts([constraint]))
     tau = rng.normal(size=12)
-    qdd, forces = subspace.accelerations_from_torques(eom)(tau), subspace.forces_from_torques(eom)(tau)
+    qdd, forces = dynamics.accelerations_from_torques(eom)(tau), dynamics.forces_from_torques(eom)(tau)
     assert np.allclose(A @ qdd, b, atol=1e-8)
     J_foot = judges.mujoco_of("go2").at(state).jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
     assert np.allclose(state.M @ qdd + state.h - eom.S @ tau, J_foot.T @ forces[:3] + A.T @ forces[3:], atol=1e-7)
@@ -150,7 +150,7 @@ def test_gauss_a_constraint_changes_the_free_acceleration_as_little_as_the_inert
     cp.Problem(cp.Minimize(cp.sum_squares(L.T @ (x - free))), [A @ x == b]).solve(
         solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12
     )
-    assert np.allclose(subspace.accelerations_from_torques(eom)(tau), x.value, rtol=1e-5, atol=1e-3)
+    assert np.allclose(dynamics.accelerations_from_torques(eom)(tau), x.value, rtol=1e-5, atol=1e-3)
 
 
 def test_rows_that_turn_with_time_push_along_where_they_point_now() -> None:
@@ -200,7 +200,7 @@ def test_bolts_of_a_robot_that_is_held_still_carry_its_weight_upwards_and_the_mo
     """λ is what the ground does to the robot: + m g along z, and r × (+ m g z) about the frame, r from the frame to the CoM."""
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
-    zeta, eta = subspace.forces_from_torques(eom), subspace.accelerations_from_torques(eom)
+    zeta, eta = dynamics.forces_from_torques(eom), dynamics.accelerations_from_torques(eom)
     tau = np.linalg.solve(eta.A[6:], -eta.b[6:])  # the torques that hold the legs
     assert np.allclose(eta(tau), 0.0, atol=1e-9)
     up = np.array([0.0, 0.0, state.robot.mass * G])
@@ -232,12 +232,12 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_b
         R = judges.quaternion_rotation(state.q[3:7])
         v = state.v.copy()
         v[:6] = 0.0
-        state, tau = state.at(v=v), 5.0 * rng.normal(size=12)
+        state, tau = state.replace(v=v), 5.0 * rng.normal(size=12)
         eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
         model.gravity.linear = R.T @ np.array([0.0, 0.0, -G])  # the bolted base leans
         data = model.createData()
         wanted = pin.aba(model, data, state.q[7:], state.v[6:], tau)
-        qdd = subspace.accelerations_from_torques(eom)(tau)
+        qdd = dynamics.accelerations_from_torques(eom)(tau)
         assert judges.relative(qdd[6:], wanted) < 1e-9
         assert np.max(np.abs(qdd[:6])) < 1e-9
         pin.rnea(model, data, state.q[7:], state.v[6:], wanted)
@@ -250,7 +250,7 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_b
         f_own = -own.mass * np.array(model.gravity.linear)
         origin += pin.Force(f_own, np.cross(own.lever, f_own))
         # the links that pin welds into the world keep their weight out of data.f; robot.inertias[1] holds them all
-        wrench = subspace.forces_from_torques(eom)(tau)
+        wrench = dynamics.forces_from_torques(eom)(tau)
         assert np.allclose(R.T @ wrench[:3], origin.linear, atol=1e-7)
         assert np.allclose(R.T @ wrench[3:], origin.angular, atol=1e-7)
 
@@ -260,8 +260,8 @@ def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1() ->
     state = judges.load("go2").standing()
     bolted = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
     standing = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    assert np.linalg.matrix_rank(subspace.accelerations_from_torques(bolted).A[6:], tol=1e-6) == 12
-    assert np.linalg.matrix_rank(subspace.accelerations_from_torques(standing).A[6:], tol=1e-6) == 6
+    assert np.linalg.matrix_rank(dynamics.accelerations_from_torques(bolted).A[6:], tol=1e-6) == 12
+    assert np.linalg.matrix_rank(dynamics.accelerations_from_torques(standing).A[6:], tol=1e-6) == 6
 
 
 def test_the_frame_of_the_bolts_does_not_accelerate_whatever_moves() -> None:
@@ -370,7 +370,7 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(disc: R
     assert np.allclose(linear, -(rate**2) * radius * out, atol=1e-9)
     assert np.allclose(angular, rate * np.cross(Z, omega), atol=1e-9)
     assert np.allclose(force, M_DISC * (G * Z - rate**2 * radius * out), atol=1e-9)
-    faster = state.at(v=1.2 * state.v)  # at another rate the circle is not kept: the lean changes
+    faster = state.replace(v=1.2 * state.v)  # at another rate the circle is not kept: the lean changes
     assert np.linalg.norm(world_acceleration(faster, motion(faster, wheel)[0])[1] - 1.44 * angular) > 1.0
 
 
@@ -413,7 +413,7 @@ def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) 
     assert np.allclose(ahead.q[:3] - start.q[:3], [way, 0.0, 0.0], atol=1e-9)
     assert np.allclose(end.frame_pose("disc").rotation, np.eye(3), atol=1e-9)
     assert np.allclose(end.q[:3] - start.q[:3], way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0]), atol=1e-9)
-    sideways = start.at(v=[0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    sideways = start.replace(v=[0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     assert np.linalg.norm(wheel.slip(sideways)) > 0.9
 
 
@@ -433,7 +433,7 @@ def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_gr
 
     def bracket(contact: object) -> float:
         """Largest A [X, Y] over pairs of constant allowed directions: what a small parallel-parking loop gains, per area."""
-        N = subspace.null_space(contact.constraint(state)[0])
+        N = linear_algebra.null_space(contact.constraint(state)[0])
         gains = []
         for x in N.T:
             for y in N.T:

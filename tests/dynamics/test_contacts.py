@@ -8,6 +8,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.dynamics import FlatFootContact, PointContact
+from floatbase.robots import Foot
 
 N = 10
 
@@ -30,7 +31,7 @@ def owners(contacts: fb.Contacts) -> list[str]:
 
 
 def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str) -> None:
-    from floatbase.simulation.physics import Ground
+    from floatbase.simulation import Ground
 
     robot = judges.load(name)
     for seed, state in enumerate(judges.states(name, 3)):
@@ -83,7 +84,7 @@ def test_a_ball_rolls_without_slipping_over_its_lowest_point() -> None:
     state = robot.random_state(0)
     J, still = contact.jacobian(state), np.zeros(robot.nv)
     still[:] = state.v - np.linalg.pinv(J) @ (J @ state.v)
-    rolling = state.at(v=still)
+    rolling = state.replace(v=still)
     velocity = rolling.frame_velocity("FL_foot")
     assert np.linalg.norm(velocity[:3]) > 1e-3
     assert np.allclose(velocity[:3], np.cross(velocity[3:], 0.05 * n), atol=1e-9)
@@ -265,7 +266,7 @@ def test_feet_are_taken_as_they_are_flat_or_round() -> None:
         assert contacts.names == tuple(foot.frame for foot in robot.feet)
         assert [contact.k for contact in contacts] == [12 if foot.is_flat else 3 for foot in robot.feet]
         assert np.all(contacts.mus == 0.4)
-    mixed = fb.load("go2", feet=[fb.Foot("FL_foot", 0.02), fb.Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])])
+    mixed = fb.load("go2", feet=[Foot("FL_foot", 0.02), Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])])
     assert [contact.k for contact in fb.Contacts.feet(mixed)] == [3, 9]
     talos = fb.load("talos")
     mixed = fb.Contacts.feet(talos, mu={"left_sole_link": 0.3})

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
+from floatbase.robots import Foot
 
 N = 10
 
@@ -82,7 +83,7 @@ def test_accelerations_under_contact_agree_with_pinocchios_constrained_dynamics(
     """q̈ of [M -Jᵀ; J 0] with point feet, against pin.constraintDynamics with the feet's centres pinned."""
     robot = judges.load(name)
     rng = np.random.default_rng(0)
-    feet = [fb.Foot(foot.frame, 0.0, foot.centre) for foot in robot.feet]
+    feet = [Foot(foot.frame, 0.0, foot.centre) for foot in robot.feet]
     pinned = fb.load(name, feet=feet)
     contacts = fb.Contacts.points(pinned).only(*[foot.frame for foot in feet[:2]])  # J of full rank on every robot
     models = pin.StdVec_RigidConstraintModel()
@@ -128,10 +129,10 @@ def test_rotor_inertia_counts() -> None:
     assert np.allclose(state.M - light, np.diag(robot.model.armature), atol=1e-12)
 
 
-@pytest.mark.parametrize("name", fb.robots())
+@pytest.mark.parametrize("name", fb.catalogue())
 def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name: str) -> None:
     """(8): pushing with unit forces one by one, the contact points accelerate by the columns of J M⁻¹ Jᵀ."""
-    from floatbase.dynamics.subspace import contact_inertia_inverse
+    from floatbase.dynamics import contact_inertia_inverse
 
     state = judges.states(name, 1)[0]
     contacts = judges.stance(state.robot) if state.robot.is_floating else fb.Contacts.points(state.robot, frames=["tool0"])

@@ -9,7 +9,7 @@ import pytest
 import scipy.integrate
 
 import floatbase as fb
-from floatbase.dynamics.fictitious import (
+from floatbase.dynamics import (
     bias_forces,
     coriolis_matrix,
     inertia_rate,
@@ -58,7 +58,7 @@ def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grow
     state = judges.load(name).random_state(3, spread=1.0)
     scale = np.max(np.abs(state.h))
     for i, unit in enumerate(np.eye(state.robot.nv)):
-        slow, fast = bias_forces(state.at(v=unit)), bias_forces(state.at(v=-3.0 * unit))
+        slow, fast = bias_forces(state.replace(v=unit)), bias_forces(state.replace(v=-3.0 * unit))
         assert np.max(np.abs(fast.coriolis)) < 1e-11 * scale, i
         assert np.allclose(fast.centrifugal, 9.0 * slow.centrifugal, atol=1e-11 * scale)
 
@@ -70,7 +70,7 @@ def test_coriolis_forces_are_the_products_of_two_different_velocities(name: str)
     judge.model.opt.gravity[:] = 0.0
 
     def felt(v: np.ndarray) -> np.ndarray:
-        return judge.at(state.at(v=v)).h
+        return judge.at(state.replace(v=v)).h
 
     v, nv = state.v, state.robot.nv
     alone = [felt(v[i] * np.eye(nv)[i]) for i in range(nv)]
@@ -104,14 +104,14 @@ def test_fictitious_forces_do_no_net_work(name: str) -> None:
 def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy() -> None:
     """go2 whirls its legs for 0.2 s under fictitious forces alone: energy moves between joints and base, none is lost."""
     state = judges.load("go2").random_state(5, spread=1.0)
-    state = state.at(v=8.0 * state.v)
+    state = state.replace(v=8.0 * state.v)
     start, dt, joints = 0.5 * state.v @ state.M @ state.v, 1e-4, []
     for _ in range(2000):
         # the midpoint rule in q and v
         acceleration = -np.linalg.solve(state.M, bias_forces(state).fictitious)
-        middle = state.at(q=state.integrate(0.5 * dt * state.v), v=state.v + 0.5 * dt * acceleration)
+        middle = state.replace(q=state.integrate(0.5 * dt * state.v), v=state.v + 0.5 * dt * acceleration)
         acceleration = -np.linalg.solve(middle.M, bias_forces(middle).fictitious)
-        state = state.at(q=state.integrate(dt * middle.v), v=state.v + dt * acceleration)
+        state = state.replace(q=state.integrate(dt * middle.v), v=state.v + dt * acceleration)
         joints.append(0.5 * state.v[6:] @ state.M[6:, 6:] @ state.v[6:])
     assert abs(0.5 * state.v @ state.M @ state.v / start - 1.0) < 1e-7
     assert np.ptp(joints) > 0.3 * joints[0]
@@ -176,7 +176,7 @@ def test_the_path_is_straight_again_in_the_world() -> None:
 def test_a_link_that_turns_evenly_pulls_its_points_inward_by_omega_squared_times_distance() -> None:
     """ur5's shoulder turns at 2 rad/s: the wrist's acceleration by the robot's own kinematics."""
     robot = judges.load("ur5")
-    state = robot.standing().at(v=2.0 * np.eye(robot.nv)[0])
+    state = robot.standing().replace(v=2.0 * np.eye(robot.nv)[0])
     axis, place = state.frame_pose("shoulder_pan_joint").rotation[:, 2], state.point("shoulder_pan_joint")
     r = state.point("wrist_3_link") - place
     inward = inward_acceleration(2.0 * axis, r)

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics import FlatFootContact, PointContact
-from floatbase.dynamics.constraints import fixed_frame
+from floatbase.dynamics import FlatFootContact, PointContact, fixed_frame
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
 
 GO2, UR5, SOLO = judges.load("go2"), judges.load("ur5"), judges.load("solo12")

@@ -18,8 +18,9 @@ import pytest
 import scipy.linalg
 
 import floatbase as fb
-from floatbase.dynamics import EquationsOfMotion, FlatFootContact, PointContact, subspace
-from floatbase.dynamics.constraints import fixed_frame
+from floatbase import dynamics, linear_algebra
+from floatbase.dynamics import EquationsOfMotion, FlatFootContact, PointContact, fixed_frame
+from floatbase.robots import Foot
 
 Array = npt.NDArray[np.float64]
 
@@ -97,7 +98,7 @@ def constrained(eom: EquationsOfMotion, tau: Array) -> tuple[Array, Array]:
 def kept(state: fb.State, contacts: fb.Contacts) -> fb.State:
     """The state with the velocity nearest to its own that the contacts allow: A v = 0."""
     A = contacts.constraint(state)[0]
-    return state.at(v=state.v - np.linalg.pinv(A, rcond=1e-9) @ (A @ state.v))
+    return state.replace(v=state.v - np.linalg.pinv(A, rcond=1e-9) @ (A @ state.v))
 
 
 # counting -----------------------------------------------------------------------------------------------------------------
@@ -106,7 +107,7 @@ def kept(state: fb.State, contacts: fb.Contacts) -> fb.State:
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_ranks_of_the_contact_jacobian_are_those_of_mujocos_by_elimination(name: str) -> None:
     for case, eom in cases(name):
-        found = subspace.dimensions(eom)
+        found = dynamics.dimensions(eom)
         _, J = judged(eom)
         assert found.rank_J == eliminated(J), case
         assert found.rank_J_base == eliminated(J[:, : eom.nv - eom.d]), case
@@ -116,12 +117,12 @@ def test_ranks_of_the_contact_jacobian_are_those_of_mujocos_by_elimination(name:
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name: str) -> None:
     for case, eom in cases(name):
-        found, (_, J) = subspace.dimensions(eom), judged(eom)
+        found, (_, J) = dynamics.dimensions(eom), judged(eom)
         wanted = eom.d + eom.k - eliminated(J)
         assert (found.null_B, found.null_C) == (wanted, wanted), case
-        assert subspace.feasible_space(eom).dimension == wanted, case
-        assert subspace.torque_force_space(eom).n_in == wanted, case
-        B, C = subspace.motion_matrix(eom)[0], subspace.torque_force_matrix(eom)[0]
+        assert dynamics.feasible_space(eom).dimension == wanted, case
+        assert dynamics.torque_force_space(eom).n_in == wanted, case
+        B, C = dynamics.motion_matrix(eom)[0], dynamics.torque_force_matrix(eom)[0]
         assert B.shape[1] - eliminated(B) == wanted, case
         assert C.shape[1] - eliminated(C) == wanted, case
         if found.rank_J == eom.k:
@@ -133,7 +134,7 @@ def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(nam
     """rank V_q̈ = d - rank J + rank J_b, and it is the number of accelerations that torques reach with the contacts held."""
     for case, eom in cases(name):
         M, J = judged(eom)
-        found = subspace.dimensions(eom)
+        found = dynamics.dimensions(eom)
         assert found.rank_V_qdd == eom.d - eliminated(J) + eliminated(J[:, : eom.nv - eom.d]), case
         N = np.linalg.svd(J)[2][eliminated(J) :].T if len(J) else np.eye(eom.nv)
         reached = N @ np.linalg.solve(N.T @ M @ N, N.T @ eom.S)
@@ -148,9 +149,9 @@ def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_g
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         spanned = int(np.sum(spread > 1e-9))
         wanted = eom.k - {0: 3, 1: 5}.get(spanned, 6)
-        F = subspace.internal_forces(eom)
+        F = dynamics.internal_forces(eom)
         assert F.shape == (eom.k, wanted), case
-        assert subspace.dimensions(eom).internal == wanted, case
+        assert dynamics.dimensions(eom).internal == wanted, case
         for f in F.T:
             each = f.reshape(-1, 3)
             assert np.allclose(each.sum(axis=0), 0.0, atol=1e-9), case
@@ -162,7 +163,7 @@ def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -
     """τ changes by -J_jᵀ λ for an internal λ: the acceleration by Pinocchio's recursion stays what it was."""
     rng = np.random.default_rng(0)
     for case, eom in cases(name)[:: 3 if name != "talos" else 1]:
-        F = subspace.internal_forces(eom)
+        F = dynamics.internal_forces(eom)
         if F.shape[1] == 0:
             continue
         tau, forces = rng.normal(size=eom.d), rng.normal(size=eom.k)
@@ -178,9 +179,9 @@ def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -
 def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name: str) -> None:
     for case, eom in cases(name):
         _, J = judged(eom)
-        N = subspace.undetermined_forces(eom)
+        N = dynamics.undetermined_forces(eom)
         assert N.shape[1] == eom.k - eliminated(J), case
-        assert subspace.forces_are_unique(eom) == (eliminated(J) == eom.k), case
+        assert dynamics.forces_are_unique(eom) == (eliminated(J) == eom.k), case
         if eom.k:
             assert np.max(np.abs(J.T @ N), initial=0.0) < 1e-8, case
 
@@ -188,16 +189,16 @@ def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name: str) -
 def test_solo8_on_four_feet_has_rank_10_where_it_stands_symmetrically_and_11_elsewhere() -> None:
     robot = judges.load("solo8")
     contacts = fb.Contacts.points(robot)
-    standing = subspace.dimensions(fb.equations_of_motion(robot.standing(), contacts))
+    standing = dynamics.dimensions(fb.equations_of_motion(robot.standing(), contacts))
     assert (standing.rank_J, standing.null_B, standing.rank_V_qdd, standing.undetermined) == (10, 10, 4, 2)
     for seed in range(10):
-        generic = subspace.dimensions(fb.equations_of_motion(robot.random_state(seed), contacts))
+        generic = dynamics.dimensions(fb.equations_of_motion(robot.random_state(seed), contacts))
         assert (generic.rank_J, generic.null_B, generic.rank_V_qdd, generic.undetermined) == (11, 9, 3, 1)
 
 
 def test_solo8_loses_one_rank_more_with_all_legs_straight_down() -> None:
     robot = judges.load("solo8")
-    assert subspace.dimensions(fb.equations_of_motion(robot.neutral(), fb.Contacts.points(robot))).rank_J == 9
+    assert dynamics.dimensions(fb.equations_of_motion(robot.neutral(), fb.Contacts.points(robot))).rank_J == 9
 
 
 @pytest.mark.parametrize("name", ["go2", "solo12"])
@@ -209,7 +210,7 @@ def test_straight_knees_alone_do_not_cost_a_robot_with_three_joints_a_leg_its_ra
     leg = [i for i in range(6, eom.nv) if np.any(np.abs(J[:3, i]) > 1e-9)]
     assert len(leg) == 3
     assert eliminated(J[:3][:, leg]) == 2
-    assert subspace.rank(eom.J) == eliminated(J) == 12
+    assert linear_algebra.rank(eom.J) == eliminated(J) == 12
 
 
 @pytest.mark.parametrize("name", ["go2", "solo12"])
@@ -217,7 +218,7 @@ def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_
     robot = judges.load(name)
     contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
     for state, lost in ((robot.standing(), 0), (robot.neutral(), 4)):
-        found = subspace.dimensions(fb.equations_of_motion(state, contacts))
+        found = dynamics.dimensions(fb.equations_of_motion(state, contacts))
         assert found.rank_J == 18 - lost
         assert found.null_B == found.null_C == 12 + 18 - found.rank_J
         assert found.rank_V_qdd == 12 - found.rank_J + 6 == lost  # how many ways the legs can still move: bent, none
@@ -229,7 +230,7 @@ def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_ra
     standing = judges.load("solo8").standing()
     away = np.random.default_rng(0).normal(size=standing.robot.nv)
     state = judges.along(standing, away, 10.0**-exponent)
-    found = subspace.dimensions(fb.equations_of_motion(state, fb.Contacts.points(state.robot)))
+    found = dynamics.dimensions(fb.equations_of_motion(state, fb.Contacts.points(state.robot)))
     wanted = found.d + found.k - found.rank_J
     assert (found.null_B, found.null_C) == (wanted, wanted)
     assert found.rank_V_qdd == found.d - found.rank_J + found.rank_J_base
@@ -240,19 +241,19 @@ def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
     robot = judges.load("solo8")
     rng = np.random.default_rng(0)
     state = judges.along(robot.standing(), rng.normal(size=robot.nv), 10.0**-exponent)
-    return fb.equations_of_motion(state.at(v=speed * rng.normal(size=robot.nv)), fb.Contacts.points(robot))
+    return fb.equations_of_motion(state.replace(v=speed * rng.normal(size=robot.nv)), fb.Contacts.points(robot))
 
 
 @pytest.mark.parametrize("exponent", range(1, 13))
 def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_ten_thousandth(exponent: int) -> None:
     """A q̈ = b to 1e-10 of |q̈| along the resolved directions, and along the others to their singular value times |q̈|."""
     eom = near_singular(exponent)
-    qdd = subspace.accelerations_from_torques(eom)(np.random.default_rng(1).normal(size=8))
+    qdd = dynamics.accelerations_from_torques(eom)(np.random.default_rng(1).normal(size=8))
     U, s, _ = np.linalg.svd(eom.A)
     gap, kept = np.abs(U.T @ (eom.A @ qdd - eom.b)), s > 1e-4 * s[0]
     assert np.max(gap[kept]) < 1e-10 * np.linalg.norm(qdd)
     assert np.all(gap[~kept] <= (s[~kept] + 1e-10) * np.linalg.norm(qdd))
-    assert kept.sum() == subspace.contact_space(eom).r == (11 if exponent < 3 else 10)
+    assert kept.sum() == dynamics.contact_space(eom).r == (11 if exponent < 3 else 10)
 
 
 @pytest.mark.parametrize("exponent", range(3, 13))
@@ -266,10 +267,10 @@ def test_velocity_noise_makes_no_force_near_a_loss_of_rank(exponent: int, speed:
     standing, contacts = robot.standing(), fb.Contacts.points(robot)
     tau = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing))(standing.q, standing.v).tau
     eom = near_singular(exponent, speed)
-    wanted = subspace.forces_from_torques(fb.equations_of_motion(standing, contacts))(tau)
-    assert np.max(np.abs(subspace.forces_from_torques(eom)(tau) - wanted)) < 0.01 * robot.weight
-    assert np.max(np.abs(subspace.accelerations_from_torques(eom)(tau))) < 0.2 + 10.0 * speed
-    space = subspace.feasible_space(eom)
+    wanted = dynamics.forces_from_torques(fb.equations_of_motion(standing, contacts))(tau)
+    assert np.max(np.abs(dynamics.forces_from_torques(eom)(tau) - wanted)) < 0.01 * robot.weight
+    assert np.max(np.abs(dynamics.accelerations_from_torques(eom)(tau))) < 0.2 + 10.0 * speed
+    space = dynamics.feasible_space(eom)
     assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight  # the smallest point of all; q̈ in rad/s² is in it
 
 
@@ -277,10 +278,10 @@ def test_velocity_noise_makes_no_force_near_a_loss_of_rank(exponent: int, speed:
 def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_losing_rank(exponent: int) -> None:
     """Also for forces along directions that the contacts resolve badly: they push a little, and q̈ says so."""
     eom = near_singular(exponent, 0.1)
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     qdd, tau, forces = space(10.0 * np.random.default_rng(2).normal(size=space.dimension))
     assert np.max(np.abs(judges.aba(eom, tau, forces) - qdd)) < 1e-9 * np.max(np.abs(qdd))
-    assert space.dimension == eom.d + eom.k - subspace.dimensions(eom).rank_J
+    assert space.dimension == eom.d + eom.k - dynamics.dimensions(eom).rank_J
 
 
 def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_the_rows_forbids() -> None:
@@ -291,7 +292,7 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_
     run = fb.rollout(sim, controller, 1.0, pushes=[fb.Push([0.0, 0.1, 0.0], 0.9)], control_period=2e-3)
     eom = fb.equations_of_motion(sim.state, contacts)
     _, s, Vt = np.linalg.svd(eom.A)
-    assert 1e-6 < s[10] / s[0] < subspace.MOTION_TOLERANCE
+    assert 1e-6 < s[10] / s[0] < dynamics.MOTION_TOLERANCE
     rolling = 0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()  # N·m, torques along the badly resolved direction
     change, rolls = [], []
     for tau in (run.tau[-1], run.tau[-1] + rolling):
@@ -302,8 +303,8 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_
         rolls.append(sim.data.qacc[3])
     roll, forces = rolls[1] - rolls[0], (change[1] - change[0]).sum(axis=0)
     assert abs(roll) > 1.0
-    assert subspace.accelerations_from_torques(eom).A[3] @ rolling == pytest.approx(roll, rel=0.05)
-    found = (subspace.forces_from_torques(eom).A @ rolling).reshape(4, 3)
+    assert dynamics.accelerations_from_torques(eom).A[3] @ rolling == pytest.approx(roll, rel=0.05)
+    found = (dynamics.forces_from_torques(eom).A @ rolling).reshape(4, 3)
     assert np.max(np.abs(found.sum(axis=0) - forces)) < 0.05 * np.max(np.abs(forces))
     assert np.max(np.abs(found - (change[1] - change[0]))) < 0.3  # N; lateral shares are what softness decides
     to_the_letter = np.linalg.pinv(eom.A @ np.linalg.solve(eom.M, eom.J.T), rcond=1e-12) @ eom.A
@@ -313,12 +314,12 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_
 def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_to_it() -> None:
     eom = near_singular(6, 0.1)
     U, _, Vt = np.linalg.svd(eom.A)
-    A, b = subspace.resolved_motion(eom)
+    A, b = dynamics.resolved_motion(eom)
     assert np.max(np.abs(U[:, 10:].T @ b)) < 1e-12 < np.max(np.abs(U[:, 10:].T @ eom.b))
     assert np.max(np.abs(A @ Vt[10])) < 1e-12 < np.max(np.abs(eom.A @ Vt[10]))
     assert np.allclose(U[:, :10].T @ b, U[:, :10].T @ eom.b, atol=1e-12)
     regular = fb.equations_of_motion(judges.load("go2").random_state(0), fb.Contacts.points(judges.load("go2")))
-    for found, given in zip(subspace.resolved_motion(regular), (regular.A, regular.b), strict=True):
+    for found, given in zip(dynamics.resolved_motion(regular), (regular.A, regular.b), strict=True):
         assert np.allclose(found, given, atol=1e-12)
 
 
@@ -332,7 +333,7 @@ def test_contacts_whose_forces_push_where_nothing_is_kept_are_refused() -> None:
 
     state = judges.load("go2").standing()
     with pytest.raises(fb.FloatbaseError, match="forces push along motions that the contacts do not keep"):
-        subspace.feasible_space(fb.equations_of_motion(state, fb.Contacts([Thruster("FL_foot", radius=0.022)])))
+        dynamics.feasible_space(fb.equations_of_motion(state, fb.Contacts([Thruster("FL_foot", radius=0.022)])))
 
 
 @pytest.mark.parametrize(("name", "unseen"), [("go2", 0), ("solo12", 0), ("solo8", 2)])
@@ -340,11 +341,11 @@ def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(name:
     """ζ answers -J_jᵀ λ with λ for an internal λ, without its part in null(Jᵀ): k - rank J_b - (k - rank J) are left."""
     state = judges.load(name).standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    F, N = subspace.internal_forces(eom), subspace.undetermined_forces(eom)
+    F, N = dynamics.internal_forces(eom), dynamics.undetermined_forces(eom)
     assert np.allclose(F @ (F.T @ N), N, atol=1e-9)  # null(Jᵀ) lies in null(J_bᵀ)
-    answer = subspace.forces_from_torques(eom).A @ (-eom.J[:, 6:].T @ F)
+    answer = dynamics.forces_from_torques(eom).A @ (-eom.J[:, 6:].T @ F)
     assert np.allclose(answer, F - N @ (N.T @ F), atol=1e-9)
-    found = subspace.dimensions(eom)
+    found = dynamics.dimensions(eom)
     assert (found.internal, found.undetermined) == (6, unseen)
     assert np.linalg.matrix_rank(answer, tol=1e-8) == found.internal - found.undetermined == found.rank_J - found.rank_J_base
 
@@ -353,12 +354,12 @@ def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(name:
 def test_in_free_flight_all_torques_are_free_and_no_force_is_left(name: str) -> None:
     state = judges.load(name).random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
-    found = subspace.dimensions(eom)
+    found = dynamics.dimensions(eom)
     assert found.null_B == found.null_C == found.rank_V_qdd == eom.d
     assert found.internal == found.undetermined == 0
     tau = np.random.default_rng(0).normal(size=eom.d)
-    assert judges.relative(subspace.accelerations_from_torques(eom)(tau), judges.aba(eom, tau, np.zeros(0))) < 1e-9
-    assert subspace.forces_from_torques(eom)(tau).shape == (0,)
+    assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), judges.aba(eom, tau, np.zeros(0))) < 1e-9
+    assert dynamics.forces_from_torques(eom)(tau).shape == (0,)
 
 
 # ζ and η -----------------------------------------------------------------------------------------------------------------
@@ -386,7 +387,7 @@ def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tup
 
 def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_aligned() -> None:
     """The judge's own convention, checked first: its forces, put on the links as external ones, give its accelerations."""
-    state = judges.load("go2").random_state(0).at(v=np.zeros(18))
+    state = judges.load("go2").random_state(0).replace(v=np.zeros(18))
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     tau = np.random.default_rng(0).normal(size=12)
     qdd, forces = pinocchios(eom, tau, pin.ContactType.CONTACT_3D)
@@ -397,18 +398,18 @@ def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_ali
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(name: str) -> None:
     """Feet of radius 0 where the balls' centres are, random states and torques, every stance with J of full rank."""
-    robot = fb.load(name, feet=[fb.Foot(foot.frame, 0.0, foot.centre) for foot in judges.load(name).feet])
+    robot = fb.load(name, feet=[Foot(foot.frame, 0.0, foot.centre) for foot in judges.load(name).feet])
     rng, compared = np.random.default_rng(0), 0
     for state in judges.states(name, 3):
         state = fb.State(robot, state.q, state.v)
         for chosen in stances(name):
             eom = fb.equations_of_motion(state, fb.Contacts.points(robot, frames=chosen.names))
-            if not subspace.forces_are_unique(eom):
+            if not dynamics.forces_are_unique(eom):
                 continue
             tau = 10.0 * rng.normal(size=eom.d)
             qdd, forces = pinocchios(eom, tau, pin.ContactType.CONTACT_3D)
-            assert judges.relative(subspace.forces_from_torques(eom)(tau), forces) < 1e-8, chosen
-            assert judges.relative(subspace.accelerations_from_torques(eom)(tau), qdd) < 1e-8, chosen
+            assert judges.relative(dynamics.forces_from_torques(eom)(tau), forces) < 1e-8, chosen
+            assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-8, chosen
             compared += 1
     assert compared >= 3 * 14
 
@@ -422,17 +423,17 @@ def test_the_controllers_torques_make_the_forces_that_pinocchio_finds_under_its_
     rng = np.random.default_rng(0)
     for _ in range(5):
         step = 0.03 * rng.normal(size=robot.nv)
-        state = standing.at(q=standing.integrate(step))
+        state = standing.replace(q=standing.integrate(step))
         command = controller(state.q, state.v)
         eom = fb.equations_of_motion(state, controller.contacts)
         qdd, forces = pinocchios(eom, command.tau, pin.ContactType.CONTACT_3D)
-        assert judges.relative(subspace.accelerations_from_torques(eom)(command.tau), qdd) < 1e-6
-        if subspace.forces_are_unique(eom):
-            assert judges.relative(subspace.forces_from_torques(eom)(command.tau), forces) < 1e-8
+        assert judges.relative(dynamics.accelerations_from_torques(eom)(command.tau), qdd) < 1e-6
+        if dynamics.forces_are_unique(eom):
+            assert judges.relative(dynamics.forces_from_torques(eom)(command.tau), forces) < 1e-8
             assert judges.relative(command.forces, forces) < 1e-6
             assert judges.relative(command.qdd, qdd) < 1e-6
         else:  # only what λ does is unique
-            found = subspace.forces_from_torques(eom)(command.tau)
+            found = dynamics.forces_from_torques(eom)(command.tau)
             assert judges.relative(eom.J.T @ found, eom.J.T @ forces) < 1e-6
 
 
@@ -446,10 +447,10 @@ def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: st
         assert np.linalg.norm(eom.state.v) > 0.5
         tau = 10.0 * rng.normal(size=eom.d)
         qdd, wrenches = pinocchios(eom, tau, pin.ContactType.CONTACT_6D)
-        forces = subspace.forces_from_torques(eom)(tau)
+        forces = dynamics.forces_from_torques(eom)(tau)
         found = np.concatenate([c.generators(eom.state) @ forces[contacts.force_slice(c.name)] for c in contacts])
         assert judges.relative(found, wrenches) < 1e-8
-        assert judges.relative(subspace.accelerations_from_torques(eom)(tau), qdd) < 1e-8
+        assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-8
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
@@ -460,10 +461,10 @@ def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str
         eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
         tau = 5.0 * rng.normal(size=eom.d)
         qdd, forces = constrained(eom, tau)
-        assert judges.relative(subspace.accelerations_from_torques(eom)(tau), qdd) < 1e-6, case
-        found = subspace.forces_from_torques(eom)(tau)
+        assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-6, case
+        found = dynamics.forces_from_torques(eom)(tau)
         assert judges.relative(found, forces) < 1e-6, case
-        N = subspace.undetermined_forces(eom)
+        N = dynamics.undetermined_forces(eom)
         assert np.max(np.abs(N.T @ found), initial=0.0) < 1e-6 * (1.0 + np.abs(found).max(initial=0.0)), case
 
 
@@ -472,7 +473,7 @@ def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground() -> None:
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     pressing = eom.J[:, 6:].T @ np.tile([0.0, 0.0, -10.0], 4)  # joint torques of a downward force of the feet
-    change = subspace.forces_from_torques(eom).A @ pressing
+    change = dynamics.forces_from_torques(eom).A @ pressing
     assert np.all(change[2::3] > 1.0)
 
 
@@ -499,7 +500,7 @@ def softness(name: str, moving: bool) -> float:
     worst = 0.0
     for i in rows:
         eom = fb.equations_of_motion(run.state(i), contacts)
-        gap = subspace.forces_from_torques(eom)(run.tau[i]) - run.measured[i]
+        gap = dynamics.forces_from_torques(eom)(run.tau[i]) - run.measured[i]
         for contact in contacts:
             worst = max(worst, float(np.abs(gap[contacts.force_slice(contact.name)].reshape(-1, 3).sum(axis=0)).max()))
     return worst / robot.weight
@@ -525,12 +526,12 @@ def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> No
         if case.split()[1] != "random":
             continue
         qdd, tau, forces = rng.normal(size=eom.nv), rng.normal(size=eom.d), rng.normal(size=eom.k)
-        B, right = subspace.motion_matrix(eom)
+        B, right = dynamics.motion_matrix(eom)
         left = B @ np.concatenate([qdd, tau, forces]) - right
         judge = judges.mujoco_of(name).at(eom.state)
-        dynamics = judge.M @ qdd + judge.h - eom.S @ tau - eom.J.T @ forces
-        assert np.allclose(left, np.concatenate([dynamics, eom.A @ qdd - eom.b]), atol=1e-7), case
-        C, a = subspace.torque_force_matrix(eom)
+        newton = judge.M @ qdd + judge.h - eom.S @ tau - eom.J.T @ forces
+        assert np.allclose(left, np.concatenate([newton, eom.A @ qdd - eom.b]), atol=1e-7), case
+        C, a = dynamics.torque_force_matrix(eom)
         wanted = eom.A @ judges.aba(eom, tau, forces) - eom.b
         assert np.allclose(C @ np.concatenate([tau, forces]) - a, wanted, atol=1e-7 * max(1.0, np.abs(wanted).max(initial=0.0)))
 
@@ -541,15 +542,15 @@ def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_
         if case.split()[1] not in ("standing", "random"):
             continue
         eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
-        B, right = subspace.motion_matrix(eom)
-        space = subspace.feasible_space(eom)
+        B, right = dynamics.motion_matrix(eom)
+        space = dynamics.feasible_space(eom)
         v = np.linalg.lstsq(B, right, rcond=1e-10)[0]
         N = scipy.linalg.null_space(B, rcond=1e-10)
         assert judges.relative(space.map.b, v) < 1e-6, case
         assert np.allclose(space.map.A @ space.map.A.T, N @ N.T, atol=1e-7), case
-        C, a = subspace.torque_force_matrix(eom)
-        pairs = subspace.torque_force_space(eom)
-        if subspace.forces_are_unique(eom):  # C squares what J has small
+        C, a = dynamics.torque_force_matrix(eom)
+        pairs = dynamics.torque_force_space(eom)
+        if dynamics.forces_are_unique(eom):  # C squares what J has small
             N = scipy.linalg.null_space(C, rcond=1e-10)
             assert np.allclose(pairs.A @ pairs.A.T, N @ N.T, atol=1e-6), case
             assert judges.relative(pairs.b, np.linalg.lstsq(C, a, rcond=1e-10)[0]) < 1e-5, case
@@ -560,7 +561,7 @@ def test_corners_on_a_line_cannot_hold_six_rows_and_are_refused() -> None:
     robot = judges.load("talos")
     line = [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.0, 0.0]]
     with pytest.raises(fb.FloatbaseError):
-        subspace.feasible_space(
+        dynamics.feasible_space(
             fb.equations_of_motion(robot.standing(), fb.Contacts([FlatFootContact("left_sole_link", line)]))
         )
 
@@ -576,11 +577,11 @@ def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(nam
         if case.split()[1] != "random" and not eom.k:
             continue
         eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
-        space = subspace.feasible_space(eom)
+        space = dynamics.feasible_space(eom)
         qdd, tau, forces = space(10.0 * rng.normal(size=space.dimension))
-        dynamics, motion = eom.residual(qdd, tau, forces)
+        newton, motion = eom.residual(qdd, tau, forces)
         scale = max(np.abs(eom.h).max(), np.abs(eom.J.T @ forces).max(initial=0.0), 1.0)
-        assert np.max(np.abs(dynamics)) < 1e-9 * scale, case
+        assert np.max(np.abs(newton)) < 1e-9 * scale, case
         assert np.max(np.abs(motion), initial=0.0) < 1e-9 * max(1.0, np.abs(qdd).max()), case
         assert judges.relative(judges.aba(eom, tau, forces), qdd) < 1e-7, case
 
@@ -591,10 +592,10 @@ def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
     rng = np.random.default_rng(1)
     for case, eom in cases(name):
         eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
-        space = subspace.feasible_space(eom)
+        space = dynamics.feasible_space(eom)
         tau = 5.0 * rng.normal(size=eom.d)
         qdd, forces = constrained(eom, tau)
-        N = subspace.undetermined_forces(eom)
+        N = dynamics.undetermined_forces(eom)
         for unseen in (np.zeros(N.shape[1]), 30.0 * rng.normal(size=N.shape[1])):
             point = (qdd, tau, forces + N @ unseen if eom.k else forces)
             back = space(space.coordinates(*point))
@@ -607,7 +608,7 @@ def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
 def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str) -> None:
     rng = np.random.default_rng(2)
     for case, eom in cases(name):
-        space = subspace.feasible_space(eom)
+        space = dynamics.feasible_space(eom)
         beta = rng.normal(size=space.dimension)
         assert np.allclose(space.coordinates(*space(beta)), beta, atol=1e-8), case
         assert np.allclose(space.map.A.T @ space.map.A, np.eye(space.dimension), atol=1e-10), case
@@ -621,7 +622,7 @@ def test_torque_and_force_blocks_of_C_and_of_B_describe_the_same_pairs(name: str
         if case.split()[1] != "random":
             continue
         eom = fb.equations_of_motion(kept(eom.state, eom.contacts), eom.contacts)
-        pairs, space = subspace.torque_force_space(eom), subspace.feasible_space(eom)
+        pairs, space = dynamics.torque_force_space(eom), dynamics.feasible_space(eom)
         beta = rng.normal(size=space.dimension)
         pair = np.concatenate([space.tau(beta), space.forces(beta)])
         back = pairs(pairs.A.T @ (pair - pairs.b))
@@ -637,18 +638,18 @@ def test_where_contacts_are_asked_for_what_they_cannot_do_the_dynamics_still_hol
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     nearest = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=1e-10)[0]
     assert np.max(np.abs(nearest - eom.b)) > 1e-3
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     qdd, tau, forces = space(np.random.default_rng(0).normal(size=space.dimension))
-    dynamics, _ = eom.residual(qdd, tau, forces)
-    assert np.max(np.abs(dynamics)) < 1e-9 * np.abs(forces).max()
+    newton, _ = eom.residual(qdd, tau, forces)
+    assert np.max(np.abs(newton)) < 1e-9 * np.abs(forces).max()
     assert np.allclose(eom.A @ qdd, nearest, atol=1e-8)
     tau = np.ones(8)
-    assert np.allclose(eom.A @ subspace.accelerations_from_torques(eom)(tau), nearest, atol=1e-7)
+    assert np.allclose(eom.A @ dynamics.accelerations_from_torques(eom)(tau), nearest, atol=1e-7)
 
 
 def test_torques_of_a_fixed_base_are_all_of_its_feasible_space() -> None:
     eom = fb.equations_of_motion(judges.load("ur5").random_state(0), fb.Contacts.none())
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     assert space.dimension == 6
     assert np.linalg.matrix_rank(space.tau.A) == 6
 
@@ -662,7 +663,7 @@ def test_torques_of_a_fixed_base_are_all_of_its_feasible_space() -> None:
 )
 def test_coordinates_that_do_not_fit_are_refused(arguments: tuple[Array], text: str) -> None:
     state = judges.load("go2").standing()
-    space = subspace.feasible_space(fb.equations_of_motion(state, fb.Contacts.points(state.robot)))
+    space = dynamics.feasible_space(fb.equations_of_motion(state, fb.Contacts.points(state.robot)))
     with pytest.raises(fb.FloatbaseError, match=text):
         space(*arguments)
     with pytest.raises(fb.FloatbaseError, match=r"the point has shape \(41,\); it must have shape \(42,\)"):

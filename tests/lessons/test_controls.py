@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.controls import slider_panel
+from floatbase.lessons import slider_panel
 
 RANGES = [
     (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05), (0, 60, 80, 1.0),

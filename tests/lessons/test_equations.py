@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from floatbase.lessons import equations
-from floatbase.lessons.notebooks import FOLDER
+from floatbase.lessons.publish import FOLDER, equations
 
 ENTRIES = equations.entries()
 
@@ -24,7 +23,7 @@ def test_no_docstring_names_an_equation_that_does_not_exist() -> None:
 
 
 def test_the_page_is_the_one_that_the_code_makes() -> None:
-    """`python -m floatbase.lessons.equations` writes it."""
+    """`python -m floatbase.lessons.publish.equations` writes it."""
     assert (FOLDER / "equations.md").read_text(encoding="utf-8") == equations.table()
 
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.lessons import lesson01
-from floatbase.lessons.exercises import exercises
+from floatbase.lessons import all_exercises, lesson01
 from floatbase.lessons.lesson03 import standing_go2, tilted_squeeze
 from floatbase.lessons.lesson04 import WANTED, tilted
 
@@ -26,7 +25,7 @@ def arm() -> fb.State:
 
 def moving() -> fb.State:
     slow = GO2.random_state(5)
-    return slow.at(v=8 * slow.v)
+    return slow.replace(v=8 * slow.v)
 
 
 def solo8() -> np.ndarray:
@@ -159,7 +158,7 @@ def in_world(state: fb.State, forces: np.ndarray) -> np.ndarray:
 
 
 def test_every_exercise_is_here_with_every_kind_that_it_can_be_wrong_in() -> None:
-    assert set(WRONG) == set(exercises())
+    assert set(WRONG) == set(all_exercises())
     for name, kinds in WRONG.items():
         assert "shape" in kinds and ("sign" in kinds) == (name not in COUNTS), name
 
@@ -167,7 +166,7 @@ def test_every_exercise_is_here_with_every_kind_that_it_can_be_wrong_in() -> Non
 @pytest.mark.parametrize(("name", "kind"), [(name, kind) for name, kinds in WRONG.items() for kind in kinds])
 def test_a_wrong_answer_gets_the_hint_that_fits(name: str, kind: str) -> None:
     answer, hint = WRONG[name][kind]
-    said = exercises()[name].judge(answer())
+    said = all_exercises()[name].judge(answer())
     assert not said.right
     assert hint in said.text
 
@@ -180,19 +179,19 @@ ODD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", exercises())
+@pytest.mark.parametrize("name", all_exercises())
 @pytest.mark.parametrize("odd", ODD)
 def test_no_answer_at_all_makes_a_check_fail(name: str, odd: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        said = exercises()[name].judge(ODD[odd])
+        said = all_exercises()[name].judge(ODD[odd])
     assert not said.right and said.text
 
 
 @pytest.mark.parametrize("name", ["00.1", "01.3"])
 def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str) -> None:
     share = {"00.1": 1.0, "01.3": 0.7}[name]
-    judge = exercises()[name].judge
+    judge = all_exercises()[name].judge
     assert judge(share * GO2.mass * 9.8).right
     assert "g as 10" in judge(share * GO2.mass * 10.0).text
 
@@ -206,6 +205,6 @@ def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str) -> No
     ],
 )
 def test_a_wrong_count_gets_the_hint_that_fits(name: str, count: Any, hint: str) -> None:
-    said = exercises()[name].judge(count)
+    said = all_exercises()[name].judge(count)
     assert not said.right
     assert hint in said.text

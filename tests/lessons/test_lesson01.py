@@ -9,9 +9,8 @@ import pytest
 from panels import assert_a_slider_redraws
 
 import floatbase as fb
-from floatbase.lessons import lesson01
-from floatbase.lessons.exercises import check
-from floatbase.robots.robot import Robot
+from floatbase.lessons import check, lesson01
+from floatbase.robots import Robot
 
 F_R = np.array([-60.0, 0.0, 0.0])
 

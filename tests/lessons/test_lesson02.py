@@ -11,9 +11,8 @@ import pytest
 from panels import assert_a_slider_redraws
 
 import floatbase as fb
-from floatbase.lessons import lesson01, lesson02
-from floatbase.lessons.exercises import check
-from floatbase.robots.robot import Robot
+from floatbase.lessons import check, lesson01, lesson02
+from floatbase.robots import Robot
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +29,7 @@ def go2() -> Robot:
 def moving(go2: Robot) -> fb.State:
     """The state of the lesson's exercises."""
     slow = go2.random_state(5)
-    return slow.at(v=8 * slow.v)
+    return slow.replace(v=8 * slow.v)
 
 
 def motion(eom: Any, tau: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics.subspace import dimensions, internal_forces
-from floatbase.lessons.exercises import exercises
+from floatbase.dynamics import dimensions, internal_forces
+from floatbase.lessons import all_exercises
 from floatbase.lessons.lesson03 import (
     ConstantTorques,
     bars,
@@ -28,7 +28,7 @@ GO2 = fb.load("go2")
 
 
 def verdict(name: str, answer: Any) -> Any:
-    return exercises()[name].judge(answer)
+    return all_exercises()[name].judge(answer)
 
 
 def torques() -> Any:

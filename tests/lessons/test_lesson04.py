@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.exercises import exercises
+from floatbase.lessons import all_exercises
 from floatbase.lessons.lesson03 import ConstantTorques, space_of, standing_go2, standing_still
 from floatbase.lessons.lesson04 import (
     WANTED,
@@ -21,15 +21,14 @@ from floatbase.lessons.lesson04 import (
     slices,
     tilted,
 )
-from floatbase.objectives.centroidal import tangential_bias
-from floatbase.objectives.pullback import seen_from_best, seen_from_smallest
+from floatbase.objectives import seen_from_best, seen_from_smallest, tangential_bias
 
 GO2 = fb.load("go2")
 EFFORT = fb.Quadratic.from_residual(np.eye(12), np.zeros(12))
 
 
 def verdict(name: str, answer: Any) -> Any:
-    return exercises()[name].judge(answer)
+    return all_exercises()[name].judge(answer)
 
 
 def com_cost(eom: Any, wanted: Any = WANTED) -> fb.Quadratic:

@@ -18,8 +18,7 @@ from PIL import Image
 
 import floatbase as fb
 from floatbase.errors import ViewerError
-from floatbase.lessons import pages, prose
-from floatbase.lessons.notebooks import FOLDER, read
+from floatbase.lessons.publish import FOLDER, pages, prose, read
 from floatbase.viewer import page as viewer_page
 
 TEXT = r"""# 07 · A page
@@ -46,7 +45,7 @@ STILL = "fb.Viewer(robot, height=200).show(state, contacts)"
 MOVING = """controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
 fb.Viewer(robot, height=200).play(fb.rollout(fb.Simulation(robot), controller, 0.1), paused=True)
 """
-SLIDER = """from floatbase.lessons.controls import slider_panel
+SLIDER = """from floatbase.lessons import slider_panel
 
 view = fb.Viewer(robot, height=200)
 slider_panel(view, lambda up: view.show(state, title="moved") and f"up <b>{up:.0f}</b>", up=(-2, 1, 4, "m"))

@@ -10,9 +10,8 @@ import pytest
 from nbformat.v4 import new_code_cell
 
 import floatbase as fb
-from floatbase.lessons import progress
-from floatbase.lessons.exercises import check, exercises, reveal, show_progress
-from floatbase.lessons.notebooks import FOLDER, execute, read
+from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
+from floatbase.lessons.publish import FOLDER, execute, read
 
 LESSONS = sorted(FOLDER.glob("*.ipynb"))
 
@@ -32,18 +31,18 @@ def changed(answer: Any) -> Any:
     return answer + 1
 
 
-@pytest.mark.parametrize("name", exercises())
+@pytest.mark.parametrize("name", all_exercises())
 def test_a_placeholder_gets_its_hint_and_counts_no_try(name: str) -> None:
-    placeholder = exercises()[name].placeholder()
+    placeholder = all_exercises()[name].placeholder()
     said = check(name, placeholder)
     assert not said.right
-    assert said.text == exercises()[name].judge(placeholder).text
+    assert said.text == all_exercises()[name].judge(placeholder).text
     assert progress.load() == {}
 
 
-@pytest.mark.parametrize("name", exercises())
+@pytest.mark.parametrize("name", all_exercises())
 def test_an_answer_beside_the_placeholder_is_a_try(name: str) -> None:
-    answer = changed(exercises()[name].placeholder())
+    answer = changed(all_exercises()[name].placeholder())
     assert not check(name, answer).right
     assert progress.load() == {name: {"tries": 1, "right": 0}}
 

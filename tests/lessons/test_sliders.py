@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.sliders import live, push_panel
-from floatbase.simulation.live import Live
+from floatbase.lessons import live, push_panel
+from floatbase.simulation import Live
 
 
 class Panel:

@@ -8,8 +8,8 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
-from floatbase.lessons import exercises, progress
-from floatbase.lessons.workspace import MINE, prepare
+from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
+from floatbase.lessons.publish import MINE, prepare
 
 
 def write(path: Path, source: str, output: str = "") -> None:
@@ -73,14 +73,14 @@ def test_solutions_are_shown_after_two_tries(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
-    solution = exercises.exercises()["00.1"].solution
+    solution = all_exercises()["00.1"].solution
     for left in ("twice", "once"):
-        exercises.reveal("00.1")
+        reveal("00.1")
         printed = capsys.readouterr().out
         assert f"Try {left} more first" in printed
         assert solution not in printed
-        exercises.check("00.1", 1.0)
-    exercises.reveal("00.1")
+        check("00.1", 1.0)
+    reveal("00.1")
     assert solution in capsys.readouterr().out
 
 
@@ -88,22 +88,22 @@ def test_progress_is_kept_and_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
-    exercises.show_progress()
+    show_progress()
     assert "00.1 ·" in capsys.readouterr().out
-    exercises.check("00.1", None)
+    check("00.1", None)
     assert progress.load() == {}
-    exercises.check("00.1", 3.0)
-    exercises.show_progress()
+    check("00.1", 3.0)
+    show_progress()
     assert "00.1 ✗" in capsys.readouterr().out
-    exercises.check("00.1", 9.81 * 16.085)
-    exercises.show_progress()
+    check("00.1", 9.81 * 16.085)
+    show_progress()
     assert "00.1 ✓" in capsys.readouterr().out
 
 
 def test_a_place_that_cannot_be_written_to_costs_only_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "file"))
-    assert not exercises.check("00.1", 3.0).right
+    assert not check("00.1", 3.0).right
     assert progress.load() == {}
 
 
@@ -121,6 +121,6 @@ def test_a_place_that_cannot_be_written_to_costs_only_the_memory(tmp_path: Path,
     ],
 )
 def test_wrong_answers_to_00_1_get_the_hint_that_fits(answer: object, hint: str) -> None:
-    verdict = exercises.check("00.1", answer)
+    verdict = check("00.1", answer)
     assert not verdict.right
     assert hint in verdict.text

@@ -11,10 +11,9 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
+from floatbase import dynamics, linear_algebra, objectives
 from floatbase.affine import Quadratic
-from floatbase.dynamics import EquationsOfMotion, subspace
-from floatbase.dynamics.constraints import fixed_frame
-from floatbase.objectives import centroidal
+from floatbase.dynamics import EquationsOfMotion, fixed_frame
 
 Array = npt.NDArray[np.float64]
 TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12, "max_iter": 200}
@@ -61,10 +60,10 @@ def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> Non
     """(20)(21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i; no points give a matrix without columns."""
     rng = np.random.default_rng(0)
     points, about, forces = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=(5, 3))
-    wrench = centroidal.grasp_matrix(points, about) @ forces.ravel()
+    wrench = objectives.grasp_matrix(points, about) @ forces.ravel()
     assert np.allclose(wrench[:3], forces.sum(axis=0))
     assert np.allclose(wrench[3:], np.cross(points - about, forces).sum(axis=0))
-    assert centroidal.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
+    assert objectives.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
 
 
 # (20)(21) ----------------------------------------------------------------------------------------------------------------
@@ -78,7 +77,7 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
         forces = state.robot.weight * rng.normal(size=contacts.k)
         tau = 5.0 * seed * rng.normal(size=state.robot.d)
         rate = momentum_rate(state, contacts, forces, tau)
-        wrench = centroidal.com_wrench(state, contacts)
+        wrench = objectives.com_wrench(state, contacts)
         gravity = np.array([0.0, 0.0, -state.robot.mass * 9.81])
         scale = np.abs(forces).sum()
         assert np.allclose(wrench["force"](forces), rate[:3] - gravity, atol=1e-6 * scale)
@@ -94,8 +93,8 @@ def test_the_wrench_is_the_rate_of_pinocchios_centroidal_momentum_less_gravity(n
         model, data = state.robot.model, state.robot.model.createData()
         rate = pin.computeCentroidalMomentumTimeVariation(model, data, state.q, state.v, judges.aba(eom, tau, forces))
         gravity = np.array([0.0, 0.0, -state.robot.mass * 9.81])
-        assert judges.relative(centroidal.force_sum(contacts) @ forces + gravity, rate.linear) < 1e-8
-        assert judges.relative(centroidal.moment_sum(state, contacts) @ forces, rate.angular) < 1e-8
+        assert judges.relative(objectives.force_sum(contacts) @ forces + gravity, rate.linear) < 1e-8
+        assert judges.relative(objectives.moment_sum(state, contacts) @ forces, rate.angular) < 1e-8
 
 
 def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_10_would_roll_it_left() -> None:
@@ -105,7 +104,7 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_1
     left = contacts.positions(state)[:, 1] > 0
     up = np.zeros((4, 3))
     up[left, 2] = 10.0
-    moment = centroidal.moment_sum(state, contacts) @ up.ravel()
+    moment = objectives.moment_sum(state, contacts) @ up.ravel()
     assert moment[0] > 1.0
     rate = momentum_rate(state, contacts, up.ravel(), np.zeros(12))[3:]
     footnote = sum(np.cross(state.com - x, f) for x, f in zip(contacts.positions(state), up, strict=True))
@@ -116,7 +115,7 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_1
 def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name: str) -> None:
     """(20) prints three blocks for four feet."""
     contacts = judges.stance(judges.load(name))
-    G_f = centroidal.force_sum(contacts)
+    G_f = objectives.force_sum(contacts)
     assert G_f.shape == (3, 3 * contacts.n_points)
     for block in np.split(G_f, contacts.n_points, axis=1):
         assert np.array_equal(block, np.eye(3))
@@ -128,10 +127,10 @@ def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name:
     state = judges.load(name).random_state(0)
     contacts = judges.stance(state.robot)
     eom = fb.equations_of_motion(state, contacts)
-    G = centroidal.com_wrench(state, contacts).A
+    G = objectives.com_wrench(state, contacts).A
     assert np.linalg.matrix_rank(G) == 6
-    assert np.allclose(G @ subspace.internal_forces(eom), 0.0, atol=1e-9)
-    assert subspace.internal_forces(eom).shape[1] == contacts.k - 6
+    assert np.allclose(G @ dynamics.internal_forces(eom), 0.0, atol=1e-9)
+    assert dynamics.internal_forces(eom).shape[1] == contacts.k - 6
 
 
 # (22) --------------------------------------------------------------------------------------------------------------------
@@ -143,7 +142,7 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_wanted(name: 
     for state in judges.states(name, 3):
         contacts = judges.stance(state.robot)
         a, spin = rng.normal(size=3), rng.normal(size=3)
-        cost = centroidal.wrench_objective(state, contacts, *centroidal.wanted_wrench(state, a, spin))
+        cost = objectives.wrench_objective(state, contacts, *objectives.wanted_wrench(state, a, spin))
         forces = cost.minimiser()
         assert cost(forces) < 1e-12 * state.robot.weight**2
         rate = momentum_rate(state, contacts, forces, np.zeros(state.robot.d))
@@ -153,7 +152,7 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_wanted(name: 
 
 def test_standing_still_wants_the_weight_upwards_and_no_moment(name: str) -> None:
     state = judges.load(name).standing()
-    force, moment = centroidal.wanted_wrench(state, np.zeros(3))
+    force, moment = objectives.wanted_wrench(state, np.zeros(3))
     assert np.allclose(force, [0.0, 0.0, 9.81 * mass_of_links(state)])
     assert np.array_equal(moment, np.zeros(3))
 
@@ -170,7 +169,7 @@ def test_the_wrench_objective_has_the_value_of_its_formula_and_cvxpys_minimum() 
         contacts = fb.Contacts.points(state.robot)
         contacts = contacts.only(*contacts.names[:feet])
         force, moment = 50.0 * rng.normal(size=3), 5.0 * rng.normal(size=3)
-        cost = centroidal.wrench_objective(state, contacts, force, moment)
+        cost = objectives.wrench_objective(state, contacts, force, moment)
         lam = rng.normal(size=3 * feet)
         points = contacts.positions(state)
         f = lam.reshape(-1, 3)
@@ -203,16 +202,16 @@ def test_the_force_bias_is_the_squared_friction_plus_alpha_times_the_squared_dis
         pairs = [split(f, n) for f, n in zip(lam.reshape(4, 3), LEAN, strict=True)]
         tangential = 0.5 * sum(t**2 for t, _ in pairs)
         normal = 0.5 * sum((s - ai) ** 2 for (_, s), ai in zip(pairs, a, strict=True))
-        assert centroidal.tangential_bias(contacts)(lam) == pytest.approx(tangential, rel=1e-10)
-        assert centroidal.normal_bias(contacts, a)(lam) == pytest.approx(normal, rel=1e-10)
-        assert centroidal.force_bias(contacts, alpha, a)(lam) == pytest.approx(tangential + alpha * normal, rel=1e-10)
+        assert objectives.tangential_bias(contacts)(lam) == pytest.approx(tangential, rel=1e-10)
+        assert objectives.normal_bias(contacts, a)(lam) == pytest.approx(normal, rel=1e-10)
+        assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(tangential + alpha * normal, rel=1e-10)
 
 
 def test_only_squared_is_the_friction_term_a_quadratic() -> None:
     """Twice the friction costs four times as much; the norm as printed would cost twice, and have no gradient at 0."""
     contacts = fb.Contacts.points(judges.load("go2"))
     sideways = np.tile([3.0, 4.0, 0.0], 4)
-    bias = centroidal.tangential_bias(contacts)
+    bias = objectives.tangential_bias(contacts)
     assert bias(sideways) == pytest.approx(4 * 0.5 * 25.0)
     assert bias(2.0 * sideways) == pytest.approx(4.0 * bias(sideways))
     assert np.allclose(bias.gradient(np.zeros(12)), 0.0)
@@ -222,7 +221,7 @@ def test_the_gradient_of_the_bias_points_along_friction_and_along_the_excess_of_
     rng = np.random.default_rng(1)
     contacts = fb.Contacts.points(judges.load("go2"), normals=LEAN)
     lam, alpha, a = 30.0 * rng.normal(size=12), 0.4, 25.0
-    bias = centroidal.force_bias(contacts, alpha, a)
+    bias = objectives.force_bias(contacts, alpha, a)
     slope = [(bias(lam + 1e-3 * e) - bias(lam - 1e-3 * e)) / 2e-3 for e in np.eye(12)]
     assert judges.relative(bias.gradient(lam), slope) < 1e-8
     forces = lam.reshape(4, 3)
@@ -233,7 +232,7 @@ def test_the_gradient_of_the_bias_points_along_friction_and_along_the_excess_of_
 def test_the_bias_is_smallest_at_a_along_every_normal() -> None:
     contacts = fb.Contacts.points(judges.load("go2"), normals=LEAN)
     a = np.array([10.0, 20.0, 30.0, 40.0])
-    bias = centroidal.force_bias(contacts, 0.3, a)
+    bias = objectives.force_bias(contacts, 0.3, a)
     assert np.allclose(bias.minimiser().reshape(4, 3), a[:, None] * LEAN)
     assert bias(bias.minimiser()) == pytest.approx(0.0, abs=1e-9)
 
@@ -247,9 +246,9 @@ def test_the_bias_does_not_know_how_the_world_is_turned() -> None:
         here = fb.Contacts.points(robot, normals=LEAN)
         there = fb.Contacts.points(robot, normals=LEAN @ R.T)
         for part in (
-            centroidal.tangential_bias,
-            lambda c: centroidal.normal_bias(c, 12.0),
-            lambda c: centroidal.force_bias(c, 0.7, [1.0, 2.0, 3.0, 4.0]),
+            objectives.tangential_bias,
+            lambda c: objectives.normal_bias(c, 12.0),
+            lambda c: objectives.force_bias(c, 0.7, [1.0, 2.0, 3.0, 4.0]),
         ):
             assert part(there)((lam @ R.T).ravel()) == pytest.approx(part(here)(lam.ravel()), rel=1e-9)
 
@@ -257,20 +256,20 @@ def test_the_bias_does_not_know_how_the_world_is_turned() -> None:
 def test_the_bias_is_a_preference_that_a_pulling_force_only_pays_for() -> None:
     contacts = fb.Contacts.points(judges.load("go2"))
     pulling = np.tile([0.0, 0.0, -5.0], 4)
-    assert np.isfinite(centroidal.force_bias(contacts, 0.1, 37.0)(pulling))
+    assert np.isfinite(objectives.force_bias(contacts, 0.1, 37.0)(pulling))
 
 
 def test_with_the_bias_the_forces_of_a_wanted_wrench_are_unique_and_cvxpys() -> None:
     """(22) + w (23): what §3.1.1 is for. Without the bias six directions cost nothing."""
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, normals=LEAN)
-    wrench = centroidal.wrench_objective(state, contacts, *centroidal.wanted_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2]))
+    wrench = objectives.wrench_objective(state, contacts, *objectives.wanted_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2]))
     assert np.linalg.matrix_rank(wrench.H) == 6
-    cost = wrench + 0.1 * centroidal.force_bias(contacts, 0.5, 30.0)
+    cost = wrench + 0.1 * objectives.force_bias(contacts, 0.5, 30.0)
     assert np.linalg.eigvalsh(cost.H)[0] > 1e-3
     x = cp.Variable((4, 3))
     points = contacts.positions(state)
-    force, moment = centroidal.wanted_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
+    force, moment = objectives.wanted_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
     terms = [0.5 * cp.sum_squares(cp.sum(x, axis=0) - force)]
     terms.append(0.5 * cp.sum_squares(sum(pin.skew(p - state.com) @ x[i] for i, p in enumerate(points)) - moment))
     for i, n in enumerate(LEAN):
@@ -284,14 +283,14 @@ def test_with_the_bias_the_forces_of_a_wanted_wrench_are_unique_and_cvxpys() -> 
 
 def stand(name: str, seed: int | None = None) -> EquationsOfMotion:
     robot = judges.load(name)
-    state = robot.standing() if seed is None else robot.random_state(seed).at(v=np.zeros(robot.nv))
+    state = robot.standing() if seed is None else robot.random_state(seed).replace(v=np.zeros(robot.nv))
     return fb.equations_of_motion(state, fb.Contacts.points(robot))
 
 
 @pytest.mark.parametrize(("name", "sign"), [("solo8", -1), ("go2", 0), ("solo12", 0), ("anymal_kinova", 1)])
 def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(name: str, sign: int) -> None:
     eom = stand(name, 0)
-    found = centroidal.torque_for_forces(eom)
+    found = objectives.torque_for_forces(eom)
     assert np.sign(eom.d - eom.k) == sign
     assert found.reachable.n_in == (9 if name == "solo8" else 12)  # solo8: 8 torques and one null(Jᵀ)
     assert found.free_torques.shape[1] == max(eom.d - eom.k, 0)
@@ -303,9 +302,9 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
     """min ½‖τ‖² over (q̈, τ) with (7) and λ given; a force that solo8 can give is drawn from what random torques give."""
     rng = np.random.default_rng(0)
     eom = stand(name, seed)
-    found = centroidal.torque_for_forces(eom)
+    found = objectives.torque_for_forces(eom)
     tau0 = rng.normal(size=eom.d)
-    wanted = subspace.forces_from_torques(eom)(tau0)
+    wanted = dynamics.forces_from_torques(eom)(tau0)
     assert found.gap(wanted) < 1e-6 * np.linalg.norm(wanted)
     tau = found.torque(wanted)
     qdd = judges.aba(eom, tau, wanted)
@@ -313,7 +312,7 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
     assert np.linalg.norm(tau) <= np.linalg.norm(tau0) * (1 + 1e-9)
     # (25) about τ0, whose torques change by dtau with the forces held
     Q = np.linalg.svd(eom.A, full_matrices=False)
-    rows = Q[2][: subspace.rank(eom.A)]
+    rows = Q[2][: linear_algebra.rank(eom.A)]
     x = cp.Variable(eom.d)
     effect = rows @ np.linalg.solve(eom.M, eom.S)
     cp.Problem(cp.Minimize(cp.sum_squares(tau0 + x)), [effect @ x == 0]).solve(**TIGHT)
@@ -326,10 +325,10 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
 
 def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> None:
     eom = stand("anymal_kinova", 0)
-    found = centroidal.torque_for_forces(eom)
+    found = objectives.torque_for_forces(eom)
     rng = np.random.default_rng(0)
     tau = rng.normal(size=eom.d)
-    zeta, eta = subspace.forces_from_torques(eom), subspace.accelerations_from_torques(eom)
+    zeta, eta = dynamics.forces_from_torques(eom), dynamics.accelerations_from_torques(eom)
     more = found.free_torques @ rng.normal(size=found.free_torques.shape[1])
     assert np.allclose(zeta(tau + more), zeta(tau), atol=1e-8)
     assert np.linalg.norm(eta(tau + more) - eta(tau)) > 1e-2
@@ -342,8 +341,8 @@ def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_ra
     standing, contacts = judges.load("solo8").standing(), fb.Contacts.points(judges.load("solo8"))
     wanted = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
     rng = np.random.default_rng(0)
-    near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).at(v=0.1 * rng.normal(size=14))
-    there, here = (centroidal.torque_for_forces(fb.equations_of_motion(s, contacts)).torque(wanted) for s in (standing, near))
+    near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).replace(v=0.1 * rng.normal(size=14))
+    there, here = (objectives.torque_for_forces(fb.equations_of_motion(s, contacts)).torque(wanted) for s in (standing, near))
     assert np.max(np.abs(here - there)) < 0.3  # N·m
 
 
@@ -352,9 +351,9 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
     for seed in (None, 0, 1):
         eom = stand("solo8", seed)
         found, zeta, N = (
-            centroidal.torque_for_forces(eom),
-            subspace.forces_from_torques(eom),
-            subspace.undetermined_forces(eom),
+            objectives.torque_for_forces(eom),
+            dynamics.forces_from_torques(eom),
+            dynamics.undetermined_forces(eom),
         )
         wanted = 10.0 * rng.normal(size=12)
         tau, unseen = cp.Variable(8), cp.Variable(N.shape[1])
@@ -372,11 +371,11 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
 @pytest.mark.parametrize("name", ["go2", "solo12", "anymal_kinova"])
 def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
     eom = stand(name, 1)
-    found = centroidal.torque_for_forces(eom)
+    found = objectives.torque_for_forces(eom)
     wanted = 30.0 * np.random.default_rng(0).normal(size=eom.k)
     assert found.gap(wanted) < 1e-8
     assert np.allclose(found.nearest(wanted), wanted, atol=1e-8)
-    assert np.allclose(subspace.forces_from_torques(eom)(found.torque(wanted)), wanted, atol=1e-6)
+    assert np.allclose(dynamics.forces_from_torques(eom)(found.torque(wanted)), wanted, atol=1e-6)
 
 
 def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration() -> None:
@@ -387,7 +386,7 @@ def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration
     free = np.linalg.solve(eom.M, eom.J.T @ wanted - eom.h)
     gap = eom.A @ free + eom.A @ np.linalg.solve(eom.M, eom.S) @ x - eom.b
     cp.Problem(cp.Minimize(cp.sum_squares(gap))).solve(**TIGHT)
-    tau = centroidal.torque_for_forces(eom).torque(wanted)
+    tau = objectives.torque_for_forces(eom).torque(wanted)
     left = eom.A @ judges.aba(eom, tau, wanted) - eom.b
     assert np.linalg.norm(left) > 1.0
     assert np.linalg.norm(left) == pytest.approx(np.linalg.norm(gap.value), rel=1e-6)
@@ -400,10 +399,10 @@ def test_forces_without_a_point_are_refused_by_name() -> None:
     state = judges.load("go2").standing()
     mixed = fb.Contacts.points(state.robot) + fb.Contacts([fixed_frame("base")])
     for call in (
-        lambda: centroidal.com_wrench(state, mixed),
-        lambda: centroidal.wrench_objective(state, mixed, np.zeros(3), np.zeros(3)),
-        lambda: centroidal.tangential_bias(mixed),
-        lambda: centroidal.force_bias(mixed, 1.0, 0.0),
+        lambda: objectives.com_wrench(state, mixed),
+        lambda: objectives.wrench_objective(state, mixed, np.zeros(3), np.zeros(3)),
+        lambda: objectives.tangential_bias(mixed),
+        lambda: objectives.force_bias(mixed, 1.0, 0.0),
     ):
         with pytest.raises(fb.FloatbaseError, match="bolts of base has forces that do not act at points; leave it out"):
             call()
@@ -412,19 +411,19 @@ def test_forces_without_a_point_are_refused_by_name() -> None:
 @pytest.mark.parametrize("a", [[1.0, 2.0, 3.0], np.nan, [1.0, np.inf, 0.0, 0.0], "much"])
 def test_a_nominal_normal_force_that_does_not_fit_is_an_error_of_the_package(a: object) -> None:
     with pytest.raises(fb.FloatbaseError):
-        centroidal.normal_bias(fb.Contacts.points(judges.load("go2")), a)
+        objectives.normal_bias(fb.Contacts.points(judges.load("go2")), a)
 
 
 def test_other_values_that_do_not_fit_are_named() -> None:
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot)
     with pytest.raises(fb.FloatbaseError, match="alpha is -1; it must be ≥ 0"):
-        centroidal.force_bias(contacts, -1.0, 10.0)
+        objectives.force_bias(contacts, -1.0, 10.0)
     with pytest.raises(fb.FloatbaseError, match=r"force has shape \(2,\); it must have shape \(3,\) \(N\)"):
-        centroidal.wrench_objective(state, contacts, [1.0, 2.0], np.zeros(3))
+        objectives.wrench_objective(state, contacts, [1.0, 2.0], np.zeros(3))
     with pytest.raises(fb.FloatbaseError, match=r"com_acceleration has shape \(2,\)"):
-        centroidal.wanted_wrench(state, [0.0, 0.0])
-    found = centroidal.torque_for_forces(fb.equations_of_motion(state, contacts))
+        objectives.wanted_wrench(state, [0.0, 0.0])
+    found = objectives.torque_for_forces(fb.equations_of_motion(state, contacts))
     for call in (found.gap, found.nearest):
         with pytest.raises(fb.FloatbaseError, match=r"forces has shape \(9,\); it must have shape \(12,\)"):
             call(np.zeros(9))
@@ -432,4 +431,4 @@ def test_other_values_that_do_not_fit_are_named() -> None:
 
 def test_objectives_are_costs_of_the_package() -> None:
     contacts = fb.Contacts.points(judges.load("go2"))
-    assert isinstance(centroidal.force_bias(contacts, 1.0, 1.0), Quadratic)
+    assert isinstance(objectives.force_bias(contacts, 1.0, 1.0), Quadratic)

@@ -9,10 +9,9 @@ import numpy.typing as npt
 import pytest
 
 import floatbase as fb
+from floatbase import dynamics, objectives
 from floatbase.affine import Affine, Quadratic
-from floatbase.dynamics import EquationsOfMotion, subspace
-from floatbase.dynamics.constraints import fixed_frame
-from floatbase.objectives import pullback
+from floatbase.dynamics import EquationsOfMotion, fixed_frame
 
 Array = npt.NDArray[np.float64]
 BLOCKS = ("qdd", "tau", "forces")
@@ -23,7 +22,7 @@ def eom_of(name: str, feet: int, seed: int | None = None) -> EquationsOfMotion:
     """A robot at rest on its first feet, standing or at random."""
     robot = judges.load(name)
     contacts = judges.stance(robot)
-    state = robot.standing() if seed is None else robot.random_state(seed).at(v=np.zeros(robot.nv))
+    state = robot.standing() if seed is None else robot.random_state(seed).replace(v=np.zeros(robot.nv))
     return fb.equations_of_motion(state, contacts.only(*contacts.names[:feet]))
 
 
@@ -56,7 +55,7 @@ def by_cvxpy(eom: EquationsOfMotion, residuals: dict[str, tuple[Array, Array]], 
     constraints.append(rows[2][:r] @ qdd == (rows[0].T @ eom.b)[:r] / rows[1][:r])
     for block, value in (fixed or {}).items():
         # a value in the block's range fixes it; its independent coordinates are enough
-        V = subspace.feasible_space(eom).map[block].A
+        V = dynamics.feasible_space(eom).map[block].A
         U, s, _ = np.linalg.svd(V)
         U = U[:, : int(np.sum(s > 1e-9))]
         constraints.append(U.T @ parts[block] == U.T @ value)
@@ -77,7 +76,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
     for seed in (None, 0):
         eom = eom_of(name, 4, seed)
         cost = Quadratic.from_residual(*costs(eom)["qdd"])
-        seen = pullback.cost_on_torques(cost, eom)
+        seen = objectives.cost_on_torques(cost, eom)
         for _ in range(5):
             tau = rng.normal(size=eom.d)
             kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
@@ -89,7 +88,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
 def test_a_cost_pulled_back_to_the_torques_has_the_minimum_that_cvxpy_finds_over_everything(name: str) -> None:
     eom = eom_of(name, 4)
     residuals = {"qdd": costs(eom)["qdd"]}
-    seen = pullback.cost_on_torques(as_quadratics(residuals)["qdd"], eom)
+    seen = objectives.cost_on_torques(as_quadratics(residuals)["qdd"], eom)
     assert seen(seen.minimiser()) == pytest.approx(by_cvxpy(eom, residuals), rel=1e-6)
 
 
@@ -99,8 +98,8 @@ def test_costs_on_all_three_pulled_back_to_beta_have_the_minimum_that_cvxpy_find
     """(18): q̈, τ and λ weighed at once."""
     eom = eom_of(name, feet)
     residuals = costs(eom)
-    space = subspace.feasible_space(eom)
-    seen = pullback.cost_on_space(space, **as_quadratics(residuals))
+    space = dynamics.feasible_space(eom)
+    seen = objectives.cost_on_space(space, **as_quadratics(residuals))
     beta = seen.minimiser()
     assert seen(beta) == pytest.approx(by_cvxpy(eom, residuals), rel=1e-6)
     assert sum(Quadratic.from_residual(*residuals[b])(x) for b, x in zip(BLOCKS, space(beta), strict=True)) == pytest.approx(
@@ -110,22 +109,22 @@ def test_costs_on_all_three_pulled_back_to_beta_have_the_minimum_that_cvxpy_find
 
 def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
     eom = eom_of("go2", 3)
-    space, parts = subspace.feasible_space(eom), as_quadratics(costs(eom))
+    space, parts = dynamics.feasible_space(eom), as_quadratics(costs(eom))
     beta = np.random.default_rng(0).normal(size=space.dimension)
-    values = {b: pullback.cost_on_space(space, **{b: parts[b]})(beta) for b in BLOCKS}
+    values = {b: objectives.cost_on_space(space, **{b: parts[b]})(beta) for b in BLOCKS}
     for block, x in zip(BLOCKS, space(beta), strict=True):
         assert values[block] == pytest.approx(parts[block](x), rel=1e-10)
-    assert pullback.cost_on_space(space, **parts)(beta) == pytest.approx(sum(values.values()), rel=1e-10)
-    assert pullback.cost_on_space(space)(beta) == 0.0
+    assert objectives.cost_on_space(space, **parts)(beta) == pytest.approx(sum(values.values()), rel=1e-10)
+    assert objectives.cost_on_space(space)(beta) == 0.0
 
 
 def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
     """(18) for Q(q̈, τ, λ) that is no sum: joint power τᵀ q̇ has none, but (τ - K q̈)² does."""
     eom = eom_of("go2", 2)
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     rng = np.random.default_rng(0)
     A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
-    seen = pullback.pullback(Quadratic.from_residual(A, r), space.map)
+    seen = objectives.pullback(Quadratic.from_residual(A, r), space.map)
     beta = rng.normal(size=space.dimension)
     assert seen(beta) == pytest.approx(0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10)
 
@@ -142,8 +141,8 @@ def test_a_pullback_of_a_pullback_is_the_pullback_by_the_composed_map() -> None:
 
 def test_the_gradient_of_a_pullback_is_the_chain_rule() -> None:
     eom = eom_of("go2", 4, 0)
-    cost, eta = Quadratic.from_residual(*costs(eom)["qdd"]), subspace.accelerations_from_torques(eom)
-    seen, tau = pullback.cost_on_torques(cost, eom), np.random.default_rng(0).normal(size=12)
+    cost, eta = Quadratic.from_residual(*costs(eom)["qdd"]), dynamics.accelerations_from_torques(eom)
+    seen, tau = objectives.cost_on_torques(cost, eom), np.random.default_rng(0).normal(size=12)
     slope = [(seen(tau + 1e-4 * e) - seen(tau - 1e-4 * e)) / 2e-4 for e in np.eye(12)]
     assert judges.relative(seen.gradient(tau), slope) < 1e-6
     assert judges.relative(seen.gradient(tau), eta.A.T @ cost.gradient(eta(tau))) < 1e-10
@@ -159,16 +158,16 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name: 
     """Every block, against cvxpy with that block held and everything else free; the literal reading is never below it."""
     eom = eom_of(name, feet)
     residuals = costs(eom)
-    space = subspace.feasible_space(eom)
-    cost = pullback.cost_on_space(space, **as_quadratics(residuals))
-    best, smallest = (f(cost, space, block) for f in (pullback.seen_from_best, pullback.seen_from_smallest))
+    space = dynamics.feasible_space(eom)
+    cost = objectives.cost_on_space(space, **as_quadratics(residuals))
+    best, smallest = (f(cost, space, block) for f in (objectives.seen_from_best, objectives.seen_from_smallest))
     rng = np.random.default_rng(0)
     for seed in range(2):
         x = space.map[block](3.0 * rng.normal(size=space.dimension))
         assert best(x) <= smallest(x) * (1 + 1e-9)
         if seed == 0:
             assert best(x) == pytest.approx(by_cvxpy(eom, residuals, {block: x}), rel=1e-6)
-        beta = pullback.best_coordinates(cost, space, block)(x)
+        beta = objectives.best_coordinates(cost, space, block)(x)
         assert np.allclose(space.map[block](beta), x, atol=1e-7 * max(1.0, np.abs(x).max()))
 
 
@@ -177,10 +176,10 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
     """V_q̈ on one foot has full column rank, on four it has not: there the literal reading costs visibly more."""
     for feet, agree in ((1, True), (4, False)):
         eom = eom_of(name, feet, 0)
-        space, found = subspace.feasible_space(eom), subspace.dimensions(eom)
+        space, found = dynamics.feasible_space(eom), dynamics.dimensions(eom)
         assert (found.rank_V_qdd == found.null_B) == agree
-        cost = pullback.cost_on_space(space, **as_quadratics(costs(eom)))
-        best, smallest = (f(cost, space, "qdd") for f in (pullback.seen_from_best, pullback.seen_from_smallest))
+        cost = objectives.cost_on_space(space, **as_quadratics(costs(eom)))
+        best, smallest = (f(cost, space, "qdd") for f in (objectives.seen_from_best, objectives.seen_from_smallest))
         rng = np.random.default_rng(0)
         for _ in range(4):
             x = space.qdd(rng.normal(size=space.dimension))
@@ -190,15 +189,15 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
 def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19() -> None:
     """go2, cost = friction squared and a little torque: the smallest β leaves friction in that the best β squeezes out."""
     eom = eom_of("go2", 4)
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     sideways = np.kron(np.eye(4), np.diag([1.0, 1.0, 0.0]))
-    cost = pullback.cost_on_space(
+    cost = objectives.cost_on_space(
         space,
         tau=Quadratic.from_residual(np.eye(12), np.zeros(12), 1e-3),
         forces=Quadratic.from_residual(sideways, np.zeros(12)),
     )
     still = np.zeros(18)
-    smallest, best = (f(cost, space, "qdd")(still) for f in (pullback.seen_from_smallest, pullback.seen_from_best))
+    smallest, best = (f(cost, space, "qdd")(still) for f in (objectives.seen_from_smallest, objectives.seen_from_best))
     wanted = by_cvxpy(
         eom, {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))}, {"qdd": still}
     )
@@ -211,42 +210,42 @@ def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
     eom = fb.equations_of_motion(robot.standing(), contacts)
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     assert np.max(np.abs(space.qdd.A)) < 1e-10
-    assert np.max(np.abs(pullback.smallest_coordinates(space, "qdd").A)) < 1e6
-    cost = pullback.cost_on_space(space, tau=Quadratic.from_residual(np.eye(12), np.zeros(12)))
+    assert np.max(np.abs(objectives.smallest_coordinates(space, "qdd").A)) < 1e6
+    cost = objectives.cost_on_space(space, tau=Quadratic.from_residual(np.eye(12), np.zeros(12)))
     least = cost(cost.minimiser())  # q̈ leaves everything free
-    assert pullback.seen_from_best(cost, space, "qdd")(np.zeros(18)) == pytest.approx(least, abs=1e-6)
+    assert objectives.seen_from_best(cost, space, "qdd")(np.zeros(18)) == pytest.approx(least, abs=1e-6)
 
 
 def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
     """A reward for internal force has no least cost: said, not returned."""
     eom = eom_of("go2", 4)
-    space = subspace.feasible_space(eom)
-    squeeze = subspace.internal_forces(eom)[:, 0]
-    reward = pullback.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
-    for call in (pullback.seen_from_best, pullback.best_coordinates):
+    space = dynamics.feasible_space(eom)
+    squeeze = dynamics.internal_forces(eom)[:, 0]
+    reward = objectives.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
+    for call in (objectives.seen_from_best, objectives.best_coordinates):
         with pytest.raises(fb.FloatbaseError, match="falls for ever along a direction without curvature. Add a cost"):
             call(reward, space, "qdd")
-    assert np.isfinite(pullback.seen_from_smallest(reward, space, "qdd")(np.zeros(18)))
+    assert np.isfinite(objectives.seen_from_smallest(reward, space, "qdd")(np.zeros(18)))
 
 
 def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
     """Negative curvature has no minimum either: the stationary point there is the worst, not the best."""
     eom = eom_of("go2", 4)
-    space = subspace.feasible_space(eom)
-    hill = pullback.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
+    space = dynamics.feasible_space(eom)
+    hill = objectives.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
     with pytest.raises(fb.FloatbaseError, match="no minimum: its smallest curvature is -"):
-        pullback.seen_from_best(hill, space, "qdd")
+        objectives.seen_from_best(hill, space, "qdd")
 
 
 def test_directions_that_cost_nothing_are_left_alone() -> None:
     eom = eom_of("go2", 4)
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     free = Quadratic.zero(space.dimension)
     x = space.qdd(np.ones(space.dimension))
-    smallest = pullback.smallest_coordinates(space, "qdd")(x)
-    assert np.allclose(pullback.best_coordinates(free, space, "qdd")(x), smallest)
+    smallest = objectives.smallest_coordinates(space, "qdd")(x)
+    assert np.allclose(objectives.best_coordinates(free, space, "qdd")(x), smallest)
 
 
 def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
@@ -255,16 +254,16 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
     solo8 on four feet: null(Jᵀ) changes forces alone, so the torque cost leaves it to the small weight.
     """
     eom = eom_of("solo8", 4)
-    space = subspace.feasible_space(eom)
+    space = dynamics.feasible_space(eom)
     wanted = np.arange(12.0)
     for weight in (1e-2, 1e-6, 1e-10):
-        cost = pullback.cost_on_space(
+        cost = objectives.cost_on_space(
             space,
             tau=Quadratic.from_residual(np.eye(8), np.zeros(8)),
             forces=Quadratic.from_residual(np.eye(12), wanted, weight),
         )
-        beta = pullback.best_coordinates(cost, space, "qdd")(np.zeros(14))
-        N = subspace.undetermined_forces(eom)
+        beta = objectives.best_coordinates(cost, space, "qdd")(np.zeros(14))
+        N = dynamics.undetermined_forces(eom)
         assert np.allclose(N.T @ (space.forces(beta) - wanted), 0.0, atol=1e-3), weight
 
 
@@ -275,7 +274,7 @@ def test_minimising_on_a_subspace_is_what_cvxpy_finds_there() -> None:
         line = Affine(rng.normal(size=(7, 3)), rng.normal(size=7))
         x, beta = cp.Variable(7), cp.Variable(3)
         cp.Problem(cp.Minimize(cp.sum_squares(A @ x - r)), [x == line.A @ beta + line.b]).solve(**TIGHT)
-        assert np.allclose(pullback.minimise_on(Quadratic.from_residual(A, r), line), x.value, atol=1e-6)
+        assert np.allclose(objectives.minimise_on(Quadratic.from_residual(A, r), line), x.value, atol=1e-6)
 
 
 def test_minimised_over_a_span_is_the_schur_complement() -> None:
@@ -291,12 +290,12 @@ def test_minimised_over_a_span_is_the_schur_complement() -> None:
 
 
 def test_a_block_that_does_not_exist_is_named() -> None:
-    space = subspace.feasible_space(eom_of("go2", 4))
+    space = dynamics.feasible_space(eom_of("go2", 4))
     with pytest.raises(fb.FloatbaseError, match=r"no block 'lambda'; its blocks are \['qdd', 'tau', 'forces'\]"):
-        pullback.seen_from_best(Quadratic.zero(12), space, "lambda")
+        objectives.seen_from_best(Quadratic.zero(12), space, "lambda")
 
 
 def test_a_cost_of_another_size_is_refused() -> None:
     eom = eom_of("go2", 4)
     with pytest.raises(fb.FloatbaseError, match="the map gives 18 numbers, the cost takes 12"):
-        pullback.cost_on_torques(Quadratic.zero(12), eom)
+        objectives.cost_on_torques(Quadratic.zero(12), eom)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics.equations import EquationsOfMotion
+from floatbase.dynamics import EquationsOfMotion
 
 N = 5
 

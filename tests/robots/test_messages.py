@@ -11,6 +11,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError, unknown_name
+from floatbase.robots import Foot
 
 GO2 = judges.load("go2")
 Q = GO2.standing().q
@@ -26,7 +27,7 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("make", "kind", "text"),
     [
-        (lambda: fb.load("go3"), UnknownNameError, r"unknown robot 'go3'; near names: go2, .*fb\.robots\(\) says what"),
+        (lambda: fb.load("go3"), UnknownNameError, r"unknown robot 'go3'; near names: go2, .*fb\.catalogue\(\) says what"),
         (lambda: fb.load("talus"), UnknownNameError, "unknown robot 'talus'; near names: .*talos"),
         (lambda: fb.load("zzz"), UnknownNameError, "unknown robot 'zzz'; known: "),
         (lambda: fb.load(3), UnknownNameError, "unknown robot 3"),
@@ -46,8 +47,8 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: fb.load("go2", torque_limits=-1.0), InputError, "torque_limits must be one number > 0 or 12"),
         (lambda: fb.load("go2", torque_limits=np.nan), InputError, "torque_limits must be one number > 0 or 12"),
         (lambda: fb.load("go2", posture=[0.0]), InputError, r"posture has shape \(1,\); it must have shape \(19,\)"),
-        (lambda: fb.Foot("toe", -1.0), InputError, "radius of foot toe is -1; it must be ≥ 0 m"),
-        (lambda: fb.Foot("toe", corners=np.eye(2, 3)), InputError, "corners of toe span no area; a flat foot needs at least 3"),
+        (lambda: Foot("toe", -1.0), InputError, "radius of foot toe is -1; it must be ≥ 0 m"),
+        (lambda: Foot("toe", corners=np.eye(2, 3)), InputError, "corners of toe span no area; a flat foot needs at least 3"),
         (lambda: GO2.standing(height=5.0), InputError, "cannot put all its feet on the ground with its base 5 m above it"),
         (lambda: GO2.standing(height=5.0), InputError, "Ask for another height, or load it with another posture"),
         (lambda: GO2.frame_id("FL_fot"), UnknownNameError, r"near names: FL_foot, .*robot\.frames lists them all"),

@@ -12,7 +12,7 @@ import floatbase as fb
 
 
 @pytest.fixture(params=judges.ROBOTS)
-def robot(request: pytest.FixtureRequest) -> fb.robots:
+def robot(request: pytest.FixtureRequest) -> fb.Robot:
     return judges.load(request.param)
 
 
@@ -22,8 +22,8 @@ def floating(request: pytest.FixtureRequest):
 
 
 def test_the_catalogue_holds_the_robots_of_the_course_and_says_what_each_is_for() -> None:
-    assert {"go2", "solo12", "solo8", "anymal_kinova", "talos", "ur5"} <= set(fb.robots())
-    assert all(len(text) > 10 for text in fb.robots().values())
+    assert {"go2", "solo12", "solo8", "anymal_kinova", "talos", "ur5"} <= set(fb.catalogue())
+    assert all(len(text) > 10 for text in fb.catalogue().values())
 
 
 def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot) -> None:

@@ -86,7 +86,7 @@ def test_difference_undoes_integrate(seed: int, which: str) -> None:
     robot = judges.load(which)
     rng = np.random.default_rng(seed)
     state, dv = robot.random_state(seed), rng.uniform(-0.5, 0.5, robot.nv)
-    reached = state.at(q=state.integrate(dv))
+    reached = state.replace(q=state.integrate(dv))
     assert np.allclose(reached.difference(state.q), dv, atol=1e-9)
     assert not np.allclose(state.difference(reached.q), dv, atol=1e-3)
 
@@ -133,7 +133,7 @@ def test_joint_transforms_are_where_mujoco_has_the_joints(name: str) -> None:
 
 def test_a_state_does_not_change() -> None:
     state = judges.load("go2").standing()
-    with pytest.raises(fb.FloatbaseError, match=r"a State does not change; state\.at\(q=…\) makes a new one"):
+    with pytest.raises(fb.FloatbaseError, match=r"a State does not change; state\.replace\(q=…\) makes a new one"):
         state.q = state.q
     with pytest.raises(ValueError, match="read-only"):
         state.q[0] = 1.0

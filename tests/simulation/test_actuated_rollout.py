@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.control.actuators import HydraulicActuators, Hydraulics
+from floatbase.actuators import HydraulicActuators, Hydraulics
 
 PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.5, duration=0.2),)  # N: a fifth of go2's weight for 0.2 s
 
@@ -103,7 +103,7 @@ def test_joints_without_limits_reach_the_actuators_as_angles() -> None:
     robot = fb.load("kinova")
     assert robot.nq > robot.nv
     sim, lag = fb.Simulation(robot), Lag(0.0)
-    start = robot.standing().at(v=np.full(robot.d, 2.0))
+    start = robot.standing().replace(v=np.full(robot.d, 2.0))
     sim.reset(start)
     controller = fb.WholeBodyController(robot, fb.Contacts.none(), (fb.PostureTask(start.q),))
     fb.rollout(sim, controller, 0.05, actuators=lag)

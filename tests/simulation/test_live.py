@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.simulation.live import SEEN, Live
-from floatbase.viewer.recording import push_at
+from floatbase.simulation import SEEN, Live
+from floatbase.viewer import push_at
 
 ROBOT = judges.load("go2")
 CONTROLLER = fb.WholeBodyController(ROBOT, fb.Contacts.points(ROBOT), fb.standing_tasks(ROBOT.standing()))

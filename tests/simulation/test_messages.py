@@ -11,7 +11,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.errors import FloatbaseError, InputError, SimulationError, UnknownNameError
-from floatbase.simulation.physics import Ground
+from floatbase.simulation import Ground
 
 GO2 = judges.load("go2")
 SIM = fb.Simulation(GO2)

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.robots.state import State
-from floatbase.simulation.physics import Ground
+from floatbase.robots import State
+from floatbase.simulation import Ground
 
 G = np.array([0.0, 0.0, -9.81])
 
@@ -78,7 +78,7 @@ def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name: str)
         for _ in range(round(0.08 / timestep)):
             sim.step(np.zeros(sim.robot.d))
         lost.append(energy(sim.state) - energy(start))
-    assert abs(lost[1]) < 0.005 * energy(start.at(q=start.robot.standing().q))
+    assert abs(lost[1]) < 0.005 * energy(start.replace(q=start.robot.standing().q))
     # m g² t dt / 2 of free fall alone is of first order; Richardson's extrapolation leaves the second
     assert abs(2.0 * lost[1] - lost[0]) < 0.05 * abs(lost[0]) + 1e-6
 
@@ -126,7 +126,7 @@ def test_a_push_acts_in_its_own_steps_and_no_others() -> None:
 def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name: str) -> None:
     """Angular momentum about the CoM grows by (p - com) × F dt, wherever on the robot the frame lies."""
     robot = judges.load(name)
-    start = flying(name, seed=3, speed=0.2).at(v=np.zeros(robot.nv))
+    start = flying(name, seed=3, speed=0.2).replace(v=np.zeros(robot.nv))
     force = np.array([20.0, -10.0, 15.0])
     for frame in ("base", robot.feet[0].frame, robot.frames[-1], robot.base):
         sim = fb.Simulation(robot, timestep=1e-4)
@@ -246,7 +246,7 @@ def slope_normal(angle: float) -> np.ndarray:
     return np.array([np.sin(angle), 0.0, np.cos(angle)])
 
 
-def on_slope(robot: fb.robots, angle: float) -> State:
+def on_slope(robot: fb.Robot, angle: float) -> State:
     """The standing robot turned with the ground about the world's y axis."""
     q = robot.standing().q.copy()
     R = judges.rotation([0.0, angle, 0.0])

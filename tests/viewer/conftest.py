@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from browsers import launched
 
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
-from floatbase.viewer.scene import Viewer
-from floatbase.viewer.window import Window
+from floatbase.viewer import Viewer, Window
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import numpy as np
 from browsers import SCREENSHOTS
 from PIL import Image
 
-from floatbase.viewer.scene import Viewer
+from floatbase.viewer import Viewer
 
 # world position of a node, in our coordinates
 WHERE = """(path) => {

@@ -7,12 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from floatbase.dynamics.contacts import Contacts
-from floatbase.robots import Robot, State, load, robots
-from floatbase.viewer import wire
-from floatbase.viewer.colours import ALARM, CALM, COM, MEASURED, WARNING, X_AXIS
-from floatbase.viewer.scene import Viewer
-from floatbase.viewer.window import Window
+from floatbase.dynamics import Contacts
+from floatbase.robots import Robot, State, catalogue, load
+from floatbase.viewer import ALARM, CALM, COM, MEASURED, WARNING, X_AXIS, Viewer, Window, wire
 
 from .looks import WHERE, hue_pixels, picture, settle
 
@@ -185,7 +182,7 @@ def test_backgrounds(page, go2: Robot, standing: State, background: str) -> None
     viewer.close()
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", catalogue())
 def test_every_robot_is_in_the_page(page, name: str) -> None:
     robot = load(name)
     viewer = Viewer(robot, background="white")

@@ -13,10 +13,7 @@ import pytest
 from IPython.core.interactiveshell import InteractiveShell
 
 from floatbase.robots import Robot, State
-from floatbase.viewer import displays, wire
-from floatbase.viewer.displays import Displays
-from floatbase.viewer.scene import Viewer
-from floatbase.viewer.window import Window
+from floatbase.viewer import Displays, Viewer, Window, displays, wire
 
 from .looks import hue_pixels, picture
 from .test_window import commands_in, connect, in_a_loop

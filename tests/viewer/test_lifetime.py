@@ -21,12 +21,10 @@ import umsgpack
 from browsers import CHROMIUM, FLAGS
 from jupyter_client.manager import start_new_kernel
 
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
+from floatbase.viewer import Viewer, Window, wire
 from floatbase.viewer import window as window_module
-from floatbase.viewer import wire
-from floatbase.viewer.scene import Viewer
-from floatbase.viewer.window import Window
 
 MB = 1 << 20
 

@@ -14,14 +14,14 @@ import pytest
 
 from floatbase import Contacts, Simulation, WholeBodyController, standing_tasks
 from floatbase.__main__ import PERIODS, Pace, Playground, control_period, main
-from floatbase.robots import Robot, load, robots
+from floatbase.robots import Robot, catalogue, load
 
 from .looks import picture
 
 
 def test_the_robots_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robots"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(robots())
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(catalogue())
 
 
 def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:

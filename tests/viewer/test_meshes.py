@@ -11,12 +11,12 @@ import pinocchio as pin
 import pytest
 
 from floatbase._assets import assets_root
-from floatbase.dynamics.contacts import Contacts
-from floatbase.robots import load, load_urdf, robots
-from floatbase.viewer.meshes import robot_meshes
+from floatbase.dynamics import Contacts
+from floatbase.robots import catalogue, load, load_urdf
+from floatbase.viewer import robot_meshes
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", catalogue())
 def test_light_meshes_are_under_400_kb_and_good_triangles(name: str) -> None:
     assert (assets_root() / "meshes" / f"{name}.npz").stat().st_size < 400_000
     for mesh in robot_meshes(load(name)):
@@ -24,11 +24,11 @@ def test_light_meshes_are_under_400_kb_and_good_triangles(name: str) -> None:
         assert np.all(np.isfinite(mesh.vertices))
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", catalogue())
 def test_light_meshes_fill_the_same_box_as_the_originals(name: str) -> None:
     pytest.importorskip("trimesh", reason="the originals are read with trimesh")
     pytest.importorskip("collada", reason="the originals are read with pycollada")
-    from floatbase.viewer.visuals import urdf_visuals
+    from floatbase.viewer import urdf_visuals
 
     robot = load(name)
     pieces = urdf_visuals(robot)
@@ -40,11 +40,11 @@ def test_light_meshes_fill_the_same_box_as_the_originals(name: str) -> None:
         np.testing.assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=0.006)
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", catalogue())
 def test_every_visual_of_the_original_is_read(name: str) -> None:
     pytest.importorskip("trimesh", reason="the originals are read with trimesh")
     pytest.importorskip("collada", reason="the originals are read with pycollada")
-    from floatbase.viewer.visuals import urdf_visuals
+    from floatbase.viewer import urdf_visuals
 
     robot = load(name)
     folders = [str(folder) for folder in robot.package_dirs]
@@ -54,7 +54,7 @@ def test_every_visual_of_the_original_is_read(name: str) -> None:
     }
 
 
-@pytest.mark.parametrize("name", [name for name in robots() if load(name).feet])
+@pytest.mark.parametrize("name", [name for name in catalogue() if load(name).feet])
 def test_light_meshes_reach_down_to_the_contacts(name: str) -> None:
     robot = load(name)
     state = robot.standing()

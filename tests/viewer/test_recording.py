@@ -13,15 +13,11 @@ import pytest
 import umsgpack
 from browsers import SCREENSHOTS
 
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
-from floatbase.robots import Robot, State, load, robots
-from floatbase.simulation.physics import Push
-from floatbase.simulation.rollout import Rollout
-from floatbase.viewer import place, recording, wire
-from floatbase.viewer.colours import ALARM, CONE, CONE_ALPHA, MEASURED
-from floatbase.viewer.scene import Viewer
-from floatbase.viewer.shapes import Picture
+from floatbase.robots import Robot, State, catalogue, load
+from floatbase.simulation import Push, Rollout
+from floatbase.viewer import ALARM, CONE, CONE_ALPHA, MEASURED, Picture, Viewer, place, recording, wire
 
 from .looks import picture, settle
 
@@ -149,7 +145,7 @@ def on_its_feet(robot: Robot) -> Contacts:
     return make(robot, mu=0.6) if robot.feet else Contacts.none()
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", catalogue())
 def test_every_robot_saves_to_less_than_a_megabyte_with_forces_and_cones(name: str, tmp_path: Path) -> None:
     robot = load(name)
     viewer, contacts = Viewer(robot), on_its_feet(robot)
@@ -161,7 +157,7 @@ def test_every_robot_saves_to_less_than_a_megabyte_with_forces_and_cones(name: s
     viewer.close()
 
 
-@pytest.mark.parametrize("name", [name for name in robots() if load(name).feet])
+@pytest.mark.parametrize("name", [name for name in catalogue() if load(name).feet])
 def test_ten_seconds_with_forces_are_less_than_two_megabytes(name: str, tmp_path: Path) -> None:
     viewer = Viewer(load(name))
     viewer.play(record(viewer.robot, duration=10.0), support=True)

@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
-from floatbase.robots import Robot, State, load, robots
-from floatbase.simulation.physics import Ground, Simulation
-from floatbase.viewer.camera import PRESETS, View
-from floatbase.viewer.colours import ALARM, BACKGROUNDS, CALM, IDLE, MEASURED, PLANNED, WARNING
-from floatbase.viewer.scene import Viewer
-from floatbase.viewer.three import code
+from floatbase.robots import Robot, State, catalogue, load
+from floatbase.simulation import Ground, Simulation
+from floatbase.viewer import ALARM, BACKGROUNDS, CALM, IDLE, MEASURED, PLANNED, PRESETS, WARNING, View, Viewer, code
 
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
@@ -182,7 +179,7 @@ def test_the_ground_is_level_where_contacts_do_not_say_otherwise(go2: Robot, sta
     viewer.close()
 
 
-@pytest.mark.parametrize("name", [name for name in robots() if load(name).feet])
+@pytest.mark.parametrize("name", [name for name in catalogue() if load(name).feet])
 def test_the_feet_fill_the_picture_of_the_feet(name: str) -> None:
     robot = load(name)
     viewer = Viewer(robot)
@@ -369,7 +366,7 @@ def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer: Viewe
     np.testing.assert_allclose(drawn["projection"][:3, 3], [*state.com[:2], 0.0], atol=1e-6)
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", catalogue())
 def test_every_robot_is_shown_from_every_side(name: str) -> None:
     robot = load(name)
     viewer = Viewer(robot)

@@ -7,19 +7,30 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
-from floatbase.viewer import geometry, marks, props, shapes
-from floatbase.viewer.camera import View
-from floatbase.viewer.canvas import Canvas
-from floatbase.viewer.colours import BACKGROUNDS, CONE, LEGEND, MEASURED, PLANNED
-from floatbase.viewer.cones import cone_status, polyhedron_status
-from floatbase.viewer.figures import FIGURES
-from floatbase.viewer.painter import below, nice
-from floatbase.viewer.scene import Viewer
-from floatbase.viewer.text import text_picture
-from floatbase.viewer.window import Window
+from floatbase.viewer import (
+    BACKGROUNDS,
+    CONE,
+    FIGURES,
+    LEGEND,
+    MEASURED,
+    PLANNED,
+    Canvas,
+    View,
+    Viewer,
+    Window,
+    below,
+    cone_status,
+    geometry,
+    marks,
+    nice,
+    polyhedron_status,
+    props,
+    shapes,
+    text_picture,
+)
 
 from .looks import picture, settle
 
@@ -58,7 +69,7 @@ def test_a_cones_status_changes_at_the_friction_limit() -> None:
 
 
 def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it() -> None:
-    from floatbase.control.friction import FrictionPolyhedron
+    from floatbase.friction import FrictionPolyhedron
 
     up, force = np.array([0.0, 0.0, 1.0]), np.array([5.0, 0.0, 10.0])
     assert cone_status(force, up, 0.6) == "inside"

@@ -27,8 +27,7 @@ import tornado.websocket
 import umsgpack
 
 from floatbase.errors import FloatbaseError, ViewerError
-from floatbase.viewer import wire
-from floatbase.viewer.window import Window
+from floatbase.viewer import Window, wire
 
 
 def window_threads() -> list[threading.Thread]:

@@ -1,0 +1,165 @@
+"""Geometry of cones and polytopes that `wrenches` needs: facets from rays, vertices from farthest points.
+
+Nothing here knows of robots. qhull only says which rays or points belong to a facet; the numbers are computed from
+those again, so that its own tolerances do not stay in the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import ConvexHull, QhullError
+
+from floatbase._arrays import Array
+from floatbase.errors import SolverError
+from floatbase.qp import linear_program
+
+FLAT = 1e-9  # part of the size below which a set counts as flat, a point as on a facet
+_ROUNDS = 200  # of looking for farther points; each adds one at least, and the stances of the course need about ten
+_SAME_DIRECTION = 1e-6  # rad, normals nearer than this are one
+
+
+def cone_rows(rays: Array) -> tuple[Array, Array]:
+    """The cone {Σ w_j ray_j, w ≥ 0} as rows: (G, E) with G x ≤ 0 and E x = 0, each row of unit length.
+
+    rays: shape (n, N), one ray a column. E, shape (n - r, n), spans what no ray reaches, r being their rank. Where
+    some rays together point in opposite directions the cone holds whole lines; G is zero along them, and empty
+    altogether where the cone is a subspace. Source: facets of a cone are facets of its cross-section, whose convex
+    hull qhull finds (Barber, Dobkin, Huhdanpaa, The Quickhull algorithm for convex hulls, 1996).
+    """
+    rays = rays / np.linalg.norm(rays, axis=0)  # length does not matter in a cone
+    span, E = _span(rays)
+    inside = span.T @ rays
+    c, on_lines = _supporting_direction(inside)
+    across = _span(inside[:, on_lines])[1] if np.any(on_lines) else np.eye(len(inside))
+    G = _pointed_rows(across @ inside[:, ~on_lines], across @ c)
+    return G @ across @ span.T, E
+
+
+def vertices(farthest: Callable[[Array], Array], n: int, size: float) -> Array:
+    """The vertices of a bounded convex polytope in R^n, n ≤ 3, shape (k, n), from its farthest points.
+
+    farthest: direction (n,) -> a point of the set with the largest direction · x. size: a length by which smallness
+    is judged. The hull of the points known is pushed outwards at each of its facets until none of them gives way, so
+    the answer is exact, not a sampling. In the plane the vertices come counter-clockwise. A flat set gives what it
+    is: one point, the two ends of a segment, a polygon in space. Source: for the support region, Bretl and Lall,
+    Testing static equilibrium for legged robots, IEEE Transactions on Robotics, 2008.
+    """
+    tolerance = FLAT * size
+    basis, points = _affine_hull(farthest, n, tolerance)
+    origin = points[0]
+    if basis.shape[1] == 0:
+        return origin[None]
+    flat = (points - origin) @ basis
+    if basis.shape[1] == 1:
+        return points[[int(np.argmin(flat)), int(np.argmax(flat))]]
+    for _ in range(_ROUNDS):
+        hull = _hull(flat)
+        normals, offsets = _facets(hull)
+        found = np.array([(farthest(basis @ normal) - origin) @ basis for normal in normals])
+        beyond = np.einsum("ij,ij->i", normals, found) + offsets > tolerance
+        if not np.any(beyond):
+            return origin + flat[_corners(hull, flat, normals, offsets, tolerance)] @ basis.T
+        flat = np.vstack([flat[hull.vertices], found[beyond]])
+    raise SolverError(f"the vertices of a polytope were not all found in {_ROUNDS} rounds; {len(flat)} are known.")
+
+
+def _span(rays: Array) -> tuple[Array, Array]:
+    """Orthonormal bases of what the rays span, shape (n, r), and of the rest, as rows, shape (n - r, n)."""
+    U, s, _ = np.linalg.svd(rays)
+    rank = int(np.sum(s > FLAT * s[0]))
+    return U[:, :rank], U[:, rank:].T
+
+
+def _supporting_direction(rays: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """A c with c · ray ≥ 0 for every ray, = 0 only for rays on lines of the cone, and which these are.
+
+    The t_j of the program can all be 1 at once but for those: the c that serve different rays can be added up.
+    """
+    n, N = rays.shape
+    result = linear_program(
+        np.concatenate([np.zeros(n), -np.ones(N)]),
+        inequalities=(np.hstack([-rays.T, np.eye(N)]), np.zeros(N)),
+        bounds=[(None, None)] * n + [(0.0, 1.0)] * N,
+    )
+    return result.x[:n], result.x[n:] < 0.5
+
+
+def _pointed_rows(rays: Array, c: Array) -> Array:
+    """Rows of a pointed cone of full dimension, shape (facets, n); c · ray > 0 for all rays."""
+    n = len(rays)
+    if n == 0:
+        return np.zeros((0, 0))
+    if n == 1:
+        return -np.sign(c)[None]
+    _, plane = _span(c[:, None])
+    section = ((plane @ rays) / (c @ rays)).T
+    if n == 2:
+        on_facets = {frozenset([int(np.argmin(section))]), frozenset([int(np.argmax(section))])}
+    else:
+        on_facets = _rays_on_facets(section)
+    rows = [_row_through(rays, sorted(chosen)) for chosen in sorted(on_facets, key=sorted)]
+    return np.array([row for row in rows if row is not None])
+
+
+def _rays_on_facets(section: Array) -> set[frozenset[int]]:
+    """For each facet of the convex hull of the points, all the points that lie on it."""
+    equations = _hull(section).equations
+    distance = section @ equations[:, :-1].T + equations[:, -1]
+    near = np.abs(distance) < 1e-8 * float(np.max(np.abs(section)))
+    return {frozenset(np.flatnonzero(column).tolist()) for column in near.T}
+
+
+def _row_through(rays: Array, chosen: list[int]) -> Array | None:
+    """The unit row that is 0 on the rays chosen and ≤ 0 on the others; None where they do not fix it (a sliver)."""
+    U, s, _ = np.linalg.svd(rays[:, chosen])
+    n = len(rays)
+    if np.sum(s > 1e-7 * s[0]) != n - 1:
+        return None
+    row = U[:, -1]
+    return -np.sign(row @ rays.sum(axis=1)) * row
+
+
+def _affine_hull(farthest: Callable[[Array], Array], n: int, tolerance: float) -> tuple[Array, Array]:
+    """An orthonormal basis of the directions in which the set extends, shape (n, r), and points that show it."""
+    basis, flat, points = np.zeros((n, 0)), np.zeros((n, 0)), []
+    while basis.shape[1] + flat.shape[1] < n:
+        direction = np.linalg.svd(np.hstack([basis, flat]))[0][:, -1] if basis.size + flat.size else np.eye(n)[0]
+        ends = [farthest(direction), farthest(-direction)]
+        points += ends
+        step = ends[0] - ends[1]
+        if direction @ step <= tolerance:
+            flat = np.hstack([flat, direction[:, None]])
+        else:
+            step -= basis @ (basis.T @ step)
+            basis = np.hstack([basis, (step / np.linalg.norm(step))[:, None]])
+    # the plane's own axes where nothing is flat, so that counter-clockwise stays so
+    return np.eye(n) if basis.shape[1] == n else basis, np.array(points)
+
+
+def _hull(points: Array) -> ConvexHull:
+    try:
+        return ConvexHull(points)
+    except QhullError as error:
+        raise SolverError(f"qhull found no hull of {len(points)} points in R^{points.shape[1]}: {error}") from None
+
+
+def _facets(hull: ConvexHull) -> tuple[Array, Array]:
+    """Unit normals, shape (m, n), and offsets, shape (m,), of the hull's facets, triangles of one facet taken
+    together."""
+    _, first = np.unique(np.round(hull.equations, 9), axis=0, return_index=True)
+    return hull.equations[first, :-1], hull.equations[first, -1]
+
+
+def _corners(hull: ConvexHull, points: Array, normals: Array, offsets: Array, tolerance: float) -> list[int]:
+    """Which points are vertices: those where facets of enough different directions meet."""
+    corners: list[int] = []
+    for i in hull.vertices:
+        on = normals[np.abs(normals @ points[i] + offsets) <= tolerance]
+        met = int(np.sum(np.linalg.svd(on, compute_uv=False) > _SAME_DIRECTION)) if len(on) else 0
+        doubled = any(np.linalg.norm(points[i] - points[j]) <= tolerance for j in corners)
+        if met == points.shape[1] and not doubled:
+            corners.append(int(i))
+    return corners

@@ -1,0 +1,271 @@
+"""The wrenches that a stance can produce: friction cones (28) summed through (20) and (21), and their slices.
+
+A wrench is w = (f_c, τ_c), shape (6,): the total contact force, N, and its moment about the centre of mass, N·m, both
+world: τ_c = Σ (x_i - x_c) × f_i. Which torques the motors would need, and whether they have them, is no part of these
+sets: they say what the ground allows, with friction polyhedra in place of the cones. Sources: the document, §3.1 and
+§4.2; Caron, Pham and Nakamura, Leveraging cone double description for multi-contact stability of humanoids, RSS 2015.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, checked, positive, read_only
+from floatbase.dynamics import Contacts
+from floatbase.errors import InfeasibleError, InputError
+from floatbase.friction.cones import FrictionPolyhedron
+from floatbase.friction.polytopes import cone_rows, vertices
+from floatbase.objectives import grasp_matrix
+from floatbase.qp import INFEASIBLE, UNBOUNDED, linear_program
+from floatbase.robots import State
+
+TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchSet:
+    """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i) with every f_i in its friction polyhedron: the contact wrench
+    cone (CWC), also called gravito-inertial wrench cone, of the stance.
+
+    `wrench_set` makes it from a state and its contacts.
+    points: x_i, shape (P, 3), m, world. cones: a `FrictionPolyhedron` for each point. about: x_c, shape (3,), m,
+    world. weight: of the robot, N; (0, 0, weight) is the force that `torques` and `support_region` assume.
+    max_normal_force: N, one number for each point, +inf where there is no limit. Without limits the set is a cone;
+    with a limit on every point it is bounded. Torque limits of the joints are no part of it.
+    """
+
+    points: Array
+    cones: tuple[FrictionPolyhedron, ...]
+    about: Array
+    weight: float
+    max_normal_force: Array
+
+    def __post_init__(self) -> None:
+        points = checked("points", self.points, (None, 3), "m")
+        cones = tuple(self.cones)
+        if not len(points):
+            raise InputError("a wrench set needs at least one contact point; a robot in the air can produce no wrench.")
+        if len(cones) != len(points) or not all(isinstance(cone, FrictionPolyhedron) for cone in cones):
+            raise InputError(f"cones must hold one FrictionPolyhedron for each of the {len(points)} points.")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "cones", cones)
+        object.__setattr__(self, "about", checked("about", self.about, (3,), "m"))
+        object.__setattr__(self, "weight", positive("weight", self.weight, "N"))
+        object.__setattr__(self, "max_normal_force", _limits(self.max_normal_force, len(points)))
+
+    @cached_property
+    def arm(self) -> float:
+        """The largest distance of a point from x_c, m (1 where all are 0): torque / arm is comparable to force."""
+        return float(np.max(np.linalg.norm(self.points - self.about, axis=1))) or 1.0
+
+    @cached_property
+    def rays(self) -> Array:
+        """The edges of all cones as wrenches, shape (6, N), point after point, each with normal component 1 N.
+
+        Without limits the set is their sums with weights ≥ 0. Some may be sums of others.
+        """
+        at = np.split(grasp_matrix(self.points, self.about), len(self.points), axis=1)
+        return read_only(np.hstack([grasp @ cone.rays.T for grasp, cone in zip(at, self.cones, strict=True)]))
+
+    @cached_property
+    def rows(self) -> Array:
+        """Facets of the set, shape (m, 6): rows @ w ≤ 0, beside equalities @ w = 0. Scaled so that rows @ w is in N.
+
+        A row (a, b) has ‖a‖² + ‖arm b‖² = 1. Only for a set without limits on the normal force; `InputError`
+        otherwise. Empty where contacts that face each other produce every wrench.
+        """
+        return self._halfspaces[0]
+
+    @cached_property
+    def equalities(self) -> Array:
+        """What no contact force can produce, shape (m, 6): equalities @ w = 0, scaled as `rows`.
+
+        Empty as soon as three points are not in line. Two point feet cannot twist about the line through them (1
+        row), one foot makes no torque about itself (3 rows).
+        """
+        return self._halfspaces[1]
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """A name for each row."""
+        return tuple(f"wrench facet {i}" for i in range(len(self.rows)))
+
+    def margin(self, wrench: npt.ArrayLike) -> float:
+        """How far inside its facets every contact force can be, N, when together they make the wrench, shape (6,).
+
+        The largest t for which there are f_i with margin ≥ t each, and t below the normal force's limit; negative
+        where the facets must be passed. -inf where no forces at all make the wrench (see `equalities`), +inf where
+        contacts that face each other can be squeezed as hard as one likes.
+        """
+        w = checked("wrench", wrench, (6,))
+        scale = float(np.linalg.norm(self._to_newton @ w)) or self.weight
+        G = np.hstack([self._to_newton @ grasp_matrix(self.points, self.about), np.zeros((6, 1))])
+        rows, h = self._force_rows
+        cost = np.append(np.zeros(3 * len(self.points)), -1.0)
+        result = linear_program(cost, (G, self._to_newton @ w / scale), (rows, h / scale), (None, None))
+        if result.status == INFEASIBLE:
+            return -np.inf
+        return np.inf if result.status == UNBOUNDED else -scale * float(result.fun)
+
+    def contains(self, wrench: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
+        """Whether contact forces in their polyhedra, and within their limits, make the wrench, shape (6,).
+
+        tolerance: N, by which each of them may pass its facets.
+        """
+        return self.margin(wrench) >= -positive("tolerance", tolerance, "N", allow_zero=True)
+
+    def support(self, direction: npt.ArrayLike) -> float:
+        """The largest direction · w over the set, direction of shape (6,); +inf where it grows without limit."""
+        gains = checked("direction", direction, (6,)) @ self.rays
+        ends = np.cumsum([cone.facets for cone in self.cones])
+        best = np.array([np.max(part) for part in np.split(gains, ends[:-1])])
+        pushing = best > 1e-12 * float(np.max(np.abs(gains)))
+        return float(np.sum(best[pushing] * self.max_normal_force[pushing]))
+
+    def reach(self, direction: npt.ArrayLike, start: npt.ArrayLike | None = None) -> float:
+        """The largest s with start + s · direction in the set: how hard the stance can push in just this direction.
+
+        direction, start: wrenches of shape (6,); start is 0 by default. (0, 0, weight, 0, 0, 0) as start asks what is
+        left while the weight is carried. +inf where there is no end, negative where the set lies behind. Raises
+        `InfeasibleError` when the line misses it.
+        """
+        d = checked("direction", direction, (6,))
+        if not np.any(d):
+            raise InputError("direction is the zero wrench; it must have a direction.")
+        w = checked("start", np.zeros(6) if start is None else start, (6,))
+        N, scale = self.rays.shape[1], float(np.linalg.norm(self._to_newton @ d))
+        result = linear_program(
+            np.append(np.zeros(N), -1.0),
+            (self._to_newton @ np.column_stack([self.rays, -d / scale]), self._to_newton @ w),
+            self._limit_rows(1),
+            [(0.0, None)] * N + [(None, None)],
+        )
+        if result.status == INFEASIBLE:
+            raise InfeasibleError("no wrench start + s · direction can be produced, however large or small s is.")
+        return np.inf if result.status == UNBOUNDED else -float(result.fun) / scale
+
+    def torques(self, force: npt.ArrayLike | None = None) -> Array:
+        """The slice at a total force: vertices, shape (k, 3), N·m, of the torques τ_c that can go with it.
+
+        force: f_c, shape (3,), N, world; by default (0, 0, weight), which carries the robot. No rows when no contact
+        forces add up to it. Raises `InputError` when the slice has no end, as where walls that face each other can be
+        squeezed.
+        """
+        f = checked("force", (0.0, 0.0, self.weight) if force is None else force, (3,), "N")
+        size = float(np.linalg.norm(f)) * self.arm
+        return self._slice(self.rays[3:], self.rays[:3], f, size or self.arm)
+
+    def support_region(self) -> Array:
+        """Where the CoM may be for the robot to stand still: vertices of a polygon, shape (k, 2), m, world x and y.
+
+        All horizontal positions c for which forces in the polyhedra carry the weight without torque about c, at
+        whatever height, counter-clockwise; `about` plays no part. On level ground it is the convex hull of the feet;
+        on slopes it may be smaller, larger or elsewhere. Two rows are a segment, one is a point, none says that the
+        stance cannot carry the weight at all. Raises `InputError` when it has no end.
+        """
+        origin = self.points.mean(axis=0)
+        rays = np.vstack([self.rays[:3], self.rays[3:] + np.cross(self.about - origin, self.rays[:3].T).T])
+        # (c - origin) × (0, 0, weight) = (weight c_y, -weight c_x, 0) must be the moment about the origin
+        places = np.array([-rays[4], rays[3]]) / self.weight
+        carried = np.array([0.0, 0.0, self.weight, 0.0])
+        size = float(np.max(np.linalg.norm(self.points - origin, axis=1))) or 1.0
+        return read_only(origin[:2] + self._slice(places, rays[[0, 1, 2, 5]], carried, size))
+
+    def _slice(self, values: Array, fixed: Array, at: Array, size: float) -> Array:
+        """Vertices of {values @ x : fixed @ x = at, x ≥ 0 within the limits}, shape (k, n)."""
+        scale = float(np.linalg.norm(at)) or self.weight
+        limits = self._limit_rows(0, scale)
+
+        def farthest(direction: Array) -> Array:
+            result = linear_program(-(direction @ values), (fixed, at / scale), limits)
+            if result.status == UNBOUNDED:
+                raise InputError(
+                    "this slice of the wrench set has no end: contacts can be squeezed against each other without "
+                    "limit. Give max_normal_force."
+                )
+            if result.status == INFEASIBLE:
+                raise InfeasibleError("no contact forces add up to what was asked for.")
+            return scale * (values @ result.x)
+
+        try:
+            return read_only(vertices(farthest, len(values), size))
+        except InfeasibleError:
+            return read_only(np.zeros((0, len(values))))
+
+    @cached_property
+    def _to_newton(self) -> Array:
+        """Divides torques by `arm`, shape (6, 6)."""
+        return np.diag(np.repeat([1.0, 1.0 / self.arm], 3))
+
+    @cached_property
+    def _force_rows(self) -> tuple[Array, Array]:
+        """Facets and limits of all points on (λ, t): every slack at least t."""
+        P = len(self.points)
+        rows, h = [], []
+        for i, (cone, limit) in enumerate(zip(self.cones, self.max_normal_force, strict=True)):
+            own = np.vstack([cone.rows, cone.normal]) if np.isfinite(limit) else cone.rows
+            block = np.zeros((len(own), 3 * P + 1))
+            block[:, 3 * i : 3 * i + 3], block[:, -1] = own, 1.0
+            rows.append(block)
+            h.append(np.append(np.zeros(cone.facets), limit)[: len(own)])
+        return np.vstack(rows), np.concatenate(h)
+
+    def _limit_rows(self, more: int, scale: float = 1.0) -> tuple[Array, Array] | None:
+        """Limits of the normal force on the weights of the rays, `more` columns of zeros after them; N / scale."""
+        limited = np.isfinite(self.max_normal_force)
+        if not np.any(limited):
+            return None
+        rows = np.repeat(np.eye(len(self.points)), [cone.facets for cone in self.cones], axis=1)[limited]
+        return np.hstack([rows, np.zeros((len(rows), more))]), self.max_normal_force[limited] / scale
+
+    @cached_property
+    def _halfspaces(self) -> tuple[Array, Array]:
+        if np.any(np.isfinite(self.max_normal_force)):
+            raise InputError(
+                "rows describe the cone of a stance without limits on the normal force; make the set without "
+                "max_normal_force, or ask contains and margin."
+            )
+        G, E = cone_rows(self._to_newton @ self.rays)
+        return read_only(G @ self._to_newton), read_only(E @ self._to_newton)
+
+
+def wrench_set(
+    state: State,
+    contacts: Contacts,
+    *,
+    facets: int = 4,
+    inside: bool = True,
+    max_normal_force: npt.ArrayLike | None = None,
+) -> WrenchSet:
+    """(20)(21)(28) The wrenches about the centre of mass that a state's contacts can produce.
+
+    facets, inside: the friction polyhedron of every point (see `FrictionPolyhedron`); by default the controller's.
+    max_normal_force: N, one number or one for each contact point; no limit by default. Raises `InputError` for contacts
+    that make no set of wrenches: none at all, or such whose forces have no cone. Source: the document, §3.1, §4.2.
+    """
+    if not isinstance(state, State):
+        raise InputError(f"wrench_set needs a State first, not {type(state).__name__}.")
+    if not isinstance(contacts, Contacts):
+        raise InputError(f"wrench_set needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
+    coneless = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
+    if coneless:
+        raise InputError(f"{', '.join(coneless)} has forces without a cone; leave it out: contacts.without(…).")
+    cones = [FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True)]
+    limit = np.inf if max_normal_force is None else max_normal_force
+    limits = np.full(len(cones), limit) if np.ndim(limit) == 0 else limit
+    return WrenchSet(contacts.positions(state), tuple(cones), state.com, state.robot.weight, np.asarray(limits))
+
+
+def _limits(limits: npt.ArrayLike, n: int) -> Array:
+    """Limits of the normal force, shape (n,); +inf is allowed, so `checked` will not do."""
+    try:
+        values = read_only(limits)
+    except (TypeError, ValueError):
+        values = read_only([])
+    if values.shape != (n,) or not np.all(values > 0):
+        raise InputError(f"max_normal_force must be one number > 0 or {n} of them, one for each contact point (N).")
+    return values

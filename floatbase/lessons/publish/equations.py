@@ -1,0 +1,181 @@
+"""The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; never written by hand.
+
+A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as in "App. A: …", stands for
+them. A test counts where it names that function. `python -m floatbase.lessons.publish.equations` writes notebooks/equations.md.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import pkgutil
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import floatbase
+from floatbase.lessons.publish.notebooks import FOLDER, read
+
+TITLES = {
+    "(1)": "fixed-base equations of motion",
+    "(2)": "configuration: base and joints",
+    "(3)": "actuation matrix S",
+    "(4)": "floating base, forces at points",
+    "(5)": "constraints A q̈ = b",
+    "(6)": "nonholonomic constraints",
+    "(7)": "constrained equations of motion",
+    "(8)": "forces and torques, before solving",
+    "(9)": "forces from torques, ζ",
+    "(10)": "the matrix C",
+    "(11)": "all torques and forces that go together",
+    "(12)": "the matrix B",
+    "(13)": "all motions that are possible",
+    "(14)": "accelerations from torques, η",
+    "(15)": "pullback of a cost",
+    "(16)": "blocks of the space of motions",
+    "(17)": "q̈, τ, λ from β",
+    "(18)": "a cost on all three, seen from β",
+    "(19)": "a cost on β, seen from one of them",
+    "(20)": "net force, G_f",
+    "(21)": "net moment, G_τ",
+    "(22)": "wanted wrench as a cost",
+    "(23)": "preference among contact forces",
+    "(24)": "torques and forces as two maps",
+    "(25)": "smallest torques for wanted forces",
+    "(26)": "control as a QP: objective",
+    "(27)": "control as a QP: constraints",
+    "(28)": "friction cone",
+    "App. A": "fictitious forces",
+    "App. B": "torque is an abstraction",
+    "App. C": "quadratic programming",
+}
+_START = re.compile(r"\s*((?:\(\d+\))+|App\. [ABC])")
+_TESTS = Path(floatbase.__file__).parents[1] / "tests"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One public thing that implements equations: its import path, the equations, and the tests that name it."""
+
+    path: str
+    equations: tuple[str, ...]
+    tests: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The last part of its path."""
+        return self.path.rsplit(".", 1)[1]
+
+
+def entries() -> list[Entry]:
+    """Everything public whose docstring starts with an equation number or an appendix, with its tests.
+
+    A class is tested where it is named or where a function that returns it is; a member where both it and its class are.
+    """
+    named = _names_in_tests()
+    found = []
+    for path, docstring, makers in _public():
+        start = _START.match(docstring)
+        if start:
+            owner, name = path.rsplit(".", 2)[1:]
+            tests = set().union(*(named.get(maker, set()) for maker in makers))
+            if owner[0].isupper():
+                tests &= named.get(name, set())
+            found.append(Entry(path, tuple(re.findall(r"\(\d+\)|App\. [ABC]", start.group(1))), tuple(sorted(tests))))
+    return found
+
+
+def lessons_of(equation: str) -> list[str]:
+    """Names of the lessons whose text mentions an equation."""
+    found = []
+    for path in sorted(FOLDER.glob("*.ipynb")):
+        text = "\n".join(cell.source for cell in read(path).cells if cell.cell_type == "markdown")
+        if equation in text or equation.replace("App.", "Appendix") in text:
+            found.append(path.name)
+    return found
+
+
+def table() -> str:
+    """The map as a page of Markdown."""
+    found = entries()
+    lines = [
+        "# The map: equation → function → test → lesson",
+        "",
+        "Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish.equations`; do not edit.",
+        "",
+        "| equation | what it says | functions | tests that use them | lessons |",
+        "|---|---|---|---|---|",
+    ]
+    for equation, title in TITLES.items():
+        here = [entry for entry in found if equation in entry.equations]
+        functions = "<br>".join(f"`{entry.path.removeprefix('floatbase.')}`" for entry in here)
+        tests = sorted({test.split("::")[0] for entry in here for test in entry.tests})
+        lessons = ", ".join(f"[{name.split('_')[0]}]({name})" for name in lessons_of(equation))
+        lines.append(f"| {equation} | {title} | {functions} | {', '.join(tests)} | {lessons} |")
+    return "\n".join(lines) + "\n"
+
+
+def _public() -> Iterator[tuple[str, str, list[str]]]:
+    """Import path, docstring and the names that make it, of every public function, class, method and property."""
+    names = [found.name for found in pkgutil.walk_packages(floatbase.__path__, "floatbase.") if _counts(found.name)]
+    modules = [import_module(name) for name in names]
+    own = [(m.__name__, name, value) for m in modules for name, value in vars(m).items() if _is_own(m, name)]
+    for module, name, value in own:
+        makers = [name] + [maker for _, maker, made in own if _returns(made) == name]
+        yield f"{module}.{name}", inspect.getdoc(value) or "", makers
+        for member, thing in vars(value).items() if inspect.isclass(value) and not _is_protocol(value) else ():
+            if not member.startswith("_"):
+                yield f"{module}.{name}.{member}", inspect.getdoc(thing) or "", makers
+
+
+def _counts(module: str) -> bool:
+    """Whether a module can hold equations: pictures, lessons and what starts with an underscore do not.
+
+    Nor do the controller's fast paths, which are held to the readable one as a whole.
+    """
+    return not re.search(r"\._|\.viewer|\.lessons|\.kernel|\.reduced", module)
+
+
+def _is_own(module: ModuleType, name: str) -> bool:
+    """Whether a public name was defined in the module, not imported into it."""
+    return not name.startswith("_") and getattr(vars(module)[name], "__module__", None) == module.__name__
+
+
+def _is_protocol(value: type) -> bool:
+    """Whether a class only says what others must offer."""
+    return bool(getattr(value, "_is_protocol", False))
+
+
+def _returns(value: object) -> str:
+    """Name of what a function returns, as its annotation says."""
+    return str(getattr(value, "__annotations__", {}).get("return", ""))
+
+
+def _names_in_tests() -> dict[str, set[str]]:
+    """For every name that a test uses, directly or through a helper of its file, the tests that use it."""
+    found: dict[str, set[str]] = {}
+    for path in sorted(_TESTS.rglob("test_*.py")):
+        functions = {
+            node.name: _names(node)
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            if isinstance(node, ast.FunctionDef)
+        }
+        for test, names in functions.items():
+            if test.startswith("test_"):
+                helpers = set().union(*(functions[name] for name in names if name in functions), names)
+                for name in helpers:
+                    found.setdefault(name, set()).add(f"{path.relative_to(_TESTS).as_posix()}::{test}")
+    return found
+
+
+def _names(node: ast.AST) -> set[str]:
+    """All names and attributes below a node."""
+    names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+    return names | {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}
+
+
+if __name__ == "__main__":
+    (FOLDER / "equations.md").write_text(table(), encoding="utf-8")

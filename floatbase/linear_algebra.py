@@ -1,0 +1,34 @@
+"""Rank, null space and row lengths: the few decisions of linear algebra that every room must take alike."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, read_only
+
+RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
+
+
+def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
+    """Number of singular values of A above `RANK_TOLERANCE` times the largest.
+
+    absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding altogether.
+    """
+    s = np.linalg.svd(np.asarray(A, dtype=np.float64), compute_uv=False)
+    largest = 1.0 if absolute else float(s.max(initial=0.0))
+    return int(np.sum(s > RANK_TOLERANCE * largest))
+
+
+def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
+    """Orthonormal columns that span {x : A x = 0}, shape (n, n - rank); absolute as for `rank`."""
+    A = np.asarray(A, dtype=np.float64)
+    if A.size == 0:
+        return np.eye(A.shape[1])
+    return read_only(np.linalg.svd(A)[2][rank(A, absolute) :].T)
+
+
+def row_lengths(rows: Array) -> Array:
+    """Euclidean length of each row, shape (m,), 1 for a row of zeros: the unit to compare violations of rows in."""
+    size = np.linalg.norm(rows, axis=1)
+    return np.where(size > 0.0, size, 1.0)

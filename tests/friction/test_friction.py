@@ -1,0 +1,245 @@
+"""The force taken apart, the exact cone, its projection, and what the polyhedron adds to rows and rays."""
+
+from __future__ import annotations
+
+import cvxpy as cp
+import judges
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from floatbase.errors import InputError
+from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
+
+Array = npt.NDArray[np.float64]
+UP = np.array([0.0, 0.0, 1.0])
+
+seeds = st.integers(0, 100_000)
+facets = st.integers(3, 32)
+mus = st.floats(0.05, 3.0)
+
+
+def any_normal(rng: np.random.Generator) -> Array:
+    raw = rng.normal(size=3)
+    return raw / np.linalg.norm(raw)
+
+
+def any_force(rng: np.random.Generator) -> Array:
+    """A force of any direction, from 1 mN to 10 kN."""
+    return rng.normal(size=3) * 10.0 ** rng.uniform(-3, 4)
+
+
+@given(seeds)
+def test_the_two_parts_of_figure_3_add_up_and_are_at_right_angles(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n, f = any_normal(rng), any_force(rng)
+    parts, size = decompose(f, 3.0 * n), np.linalg.norm(f)
+    P = np.outer(n, n)
+    assert np.allclose(parts.f_perp, P @ f, rtol=0, atol=1e-12 * size)
+    assert np.allclose(parts.f_par, (np.eye(3) - P) @ f, rtol=0, atol=1e-12 * size)
+    assert np.allclose(parts.f_perp + parts.f_par, f, rtol=0, atol=1e-15 * size)
+    assert abs(parts.f_perp @ parts.f_par) <= 1e-12 * size**2
+    assert parts.alpha_perp**2 + parts.alpha_par**2 == pytest.approx(size**2)
+    assert parts.alpha_par >= 0
+
+
+def test_a_force_that_pulls_has_a_negative_normal_component() -> None:
+    parts = decompose([3.0, 4.0, -2.0], UP)
+    assert (parts.alpha_perp, parts.alpha_par) == (-2.0, 5.0)
+
+
+def test_the_cone_opens_by_arctan_mu() -> None:
+    cone = FrictionCone(UP, 1.0)
+    assert cone.angle == pytest.approx(np.pi / 4)
+    for angle, held in ((cone.angle - 1e-6, True), (cone.angle + 1e-6, False)):
+        assert cone.contains(10.0 * np.array([np.sin(angle), 0.0, np.cos(angle)])) is held
+
+
+@given(seeds, mus)
+def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_slips(seed: int, mu: float) -> None:
+    rng = np.random.default_rng(seed)
+    cone = FrictionCone(any_normal(rng), mu)
+    f = cone.normal * rng.uniform(1, 100) + 0.9 * mu * rng.uniform(-0.7, 0.7, 2) @ tangents(cone.normal)
+    margin, parts = cone.margin(f), decompose(f, cone.normal)
+    outwards = parts.f_par / parts.alpha_par
+    assert margin > 0
+    assert cone.margin(f + margin * outwards) == pytest.approx(0.0, abs=1e-9)
+    # its distance from the surface: a step at a right angle to the surface line that lies next
+    nearest = f + margin / (1 + mu**2) * (outwards - mu * cone.normal)
+    assert cone.margin(nearest) == pytest.approx(0.0, abs=1e-9)
+    assert np.linalg.norm(nearest - f) == pytest.approx(margin / np.sqrt(1 + mu**2))
+
+
+def test_the_tolerance_is_in_newton() -> None:
+    cone, polyhedron = FrictionCone(UP, 0.5), FrictionPolyhedron(UP, 0.5, 4, inside=False)
+    slipping = [50.02, 0.0, 100.0]
+    for shape in (cone, polyhedron):
+        assert not shape.contains(slipping)
+        assert not shape.contains(slipping, tolerance=0.019)
+        assert shape.contains(slipping, tolerance=0.021)
+
+
+@given(seeds, facets, mus)
+def test_inner_polyhedra_lie_in_the_cone_and_outer_ones_contain_it(seed: int, n: int, mu: float) -> None:
+    rng = np.random.default_rng(seed)
+    normal = any_normal(rng)
+    inner, outer = FrictionPolyhedron(normal, mu, n), FrictionPolyhedron(normal, mu, n, inside=False)
+    cone = FrictionCone(normal, mu)
+    for force in rng.normal(size=(20, 3)):
+        assert cone.contains(inner.project(force))
+        assert outer.contains(cone.project(force))
+        assert inner.margin(force) <= 0 or cone.margin(force) > 0
+        assert cone.margin(force) <= 0 or outer.margin(force) > 0
+
+
+def test_the_cone_lies_strictly_between_its_polyhedra() -> None:
+    inner, cone, outer = FrictionPolyhedron(UP, 0.7, 6), FrictionCone(UP, 0.7), FrictionPolyhedron(UP, 0.7, 6, False)
+    assert all(cone.margin(0.5 * (a + b)) > 0.01 for a, b in zip(inner.rays, np.roll(inner.rays, 1, 0), strict=True))
+    assert all(cone.margin(ray) < -0.01 for ray in outer.rays)
+
+
+@given(seeds, facets, mus, st.booleans())
+def test_the_area_ratio_follows_the_number_of_facets(seed: int, n: int, mu: float, inside: bool) -> None:
+    polyhedron = FrictionPolyhedron(any_normal(np.random.default_rng(seed)), mu, n, inside)
+    corners = polyhedron.rays - polyhedron.normal
+    turns = np.cross(corners, np.roll(corners, -1, axis=0)) @ polyhedron.normal
+    assert 0.5 * np.sum(turns) / (np.pi * mu**2) == pytest.approx(polyhedron.area_ratio)
+
+
+@pytest.mark.parametrize("n", [3, 4, 8])
+@pytest.mark.parametrize("inside", [True, False])
+def test_the_area_ratio_is_what_throwing_points_at_the_cross_section_counts(n: int, inside: bool) -> None:
+    polyhedron = FrictionPolyhedron(UP, 0.6, n, inside)
+    side = 0.6 / np.cos(np.pi / n)
+    points = np.column_stack([np.random.default_rng(n).uniform(-side, side, (200_000, 2)), np.ones(200_000)])
+    hit = np.mean(np.all(points @ polyhedron.rows.T <= 0, axis=1)) * (2 * side) ** 2
+    assert hit / (np.pi * 0.6**2) == pytest.approx(polyhedron.area_ratio, rel=0.015)
+
+
+def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97() -> None:
+    assert [round(FrictionPolyhedron(UP, 0.7, n).area_ratio, 2) for n in (4, 8, 16)] == [0.64, 0.90, 0.97]
+    assert [round(FrictionPolyhedron(UP, 0.7, n, False).area_ratio, 2) for n in (4, 8, 16)] == [1.27, 1.05, 1.01]
+
+
+@settings(max_examples=25)
+@given(seeds, facets, mus, st.booleans())
+def test_rows_and_rays_describe_the_same_set(seed: int, n: int, mu: float, inside: bool) -> None:
+    """The largest push in any direction, cut off at normal component 1, is the same over the rows and over the rays."""
+    rng = np.random.default_rng(seed)
+    polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)
+    for direction in rng.normal(size=(4, 3)):
+        rows = np.vstack([polyhedron.rows, polyhedron.normal])
+        best = linprog(-direction, rows, np.append(np.zeros(n), 1.0), bounds=(None, None))
+        assert -best.fun == pytest.approx(max(0.0, np.max(polyhedron.rays @ direction)), abs=1e-9)
+
+
+def test_a_ray_lies_on_the_two_facets_beside_it_and_a_force_in_the_middle_on_none() -> None:
+    polyhedron = FrictionPolyhedron([0.2, -0.3, 0.9], 0.7, 5)
+    for i, ray in enumerate(polyhedron.rays):
+        assert set(polyhedron.active_facets(100.0 * ray)) == {f"facet {i}", f"facet {(i + 1) % 5}"}
+    assert polyhedron.active_facets(polyhedron.normal) == ()
+    assert polyhedron.active_facets(np.zeros(3)) == polyhedron.names
+    assert polyhedron.active_facets(-polyhedron.normal) == polyhedron.names
+
+
+def nearest_in_cone() -> tuple[cp.Problem, cp.Parameter, cp.Parameter, cp.Parameter, cp.Variable]:
+    """The exact second-order cone, written once for any normal and μ."""
+    x, f = cp.Variable(3), cp.Parameter(3)
+    tangential, pressing = cp.Parameter((3, 3)), cp.Parameter(3)
+    problem = cp.Problem(cp.Minimize(cp.sum_squares(x - f)), [cp.SOC(pressing @ x, tangential @ x)])
+    return problem, f, tangential, pressing, x
+
+
+def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone() -> None:
+    problem, f, tangential, pressing, x = nearest_in_cone()
+    rng, cases = np.random.default_rng(3), set()
+    for _ in range(60):
+        cone = FrictionCone(any_normal(rng), rng.uniform(0.1, 1.5))
+        f.value = rng.normal(size=3)
+        tangential.value = np.eye(3) - np.outer(cone.normal, cone.normal)
+        pressing.value = cone.mu * cone.normal
+        problem.solve(solver=cp.CLARABEL)
+        found = cone.project(f.value)
+        assert np.allclose(found, x.value, atol=2e-5)
+        # the judge stops within its tolerance: ours must not be farther away
+        assert np.linalg.norm(found - f.value) <= np.linalg.norm(x.value - f.value) + 1e-7
+        cases.add("inside" if np.array_equal(found, f.value) else "surface" if np.any(found) else "apex")
+    assert cases == {"inside", "surface", "apex"}
+
+
+@given(seeds, facets, mus, st.booleans())
+def test_a_projection_stays_put_and_what_it_takes_away_pulls_against_the_whole_cone(
+    seed: int, n: int, mu: float, inside: bool
+) -> None:
+    """Moreau: p in K, (f - p) · p = 0, (f - p) · k ≤ 0 for all k in K; together they make p the nearest point."""
+    rng = np.random.default_rng(seed)
+    polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)
+    f = any_force(rng)
+    size = float(np.linalg.norm(f))
+    for shape in (FrictionCone(polyhedron.normal, mu), polyhedron):
+        p = shape.project(f)
+        assert shape.contains(p, tolerance=1e-12 * size)
+        assert np.allclose(shape.project(p), p, rtol=0, atol=1e-13 * size)
+        assert abs((f - p) @ p) <= 1e-12 * size**2
+    assert np.max(polyhedron.rays @ (f - p)) <= 1e-12 * size * (1 + mu)
+    rest = decompose(f - shape.project(f), polyhedron.normal)
+    gone = decompose(f - FrictionCone(polyhedron.normal, mu).project(f), polyhedron.normal)
+    assert mu * gone.alpha_par + gone.alpha_perp <= 1e-12 * size
+    assert rest.alpha_perp <= 1e-12 * size  # what is taken away never pushes
+
+
+def test_projections_on_the_polyhedra_close_in_on_the_cones() -> None:
+    cone, f = FrictionCone([0.1, 0.2, 1.0], 0.7), np.array([30.0, -40.0, 20.0])
+    for n in (4, 16, 64, 256):
+        inner, outer = (FrictionPolyhedron(cone.normal, 0.7, n, inside).project(f) for inside in (True, False))
+        distances = [np.linalg.norm(p - f) for p in (outer, cone.project(f), inner)]
+        assert distances == sorted(distances)  # the larger the set, the nearer its nearest force
+        assert distances[2] - distances[0] < 50.0 * (1 - np.cos(np.pi / n))
+
+
+@given(seeds, mus)
+def test_turning_normal_and_force_together_turns_the_answers(seed: int, mu: float) -> None:
+    rng = np.random.default_rng(seed)
+    n, f, R = any_normal(rng), rng.normal(size=3), judges.rotation(rng.normal(size=3))
+    cone, turned = FrictionCone(n, mu), FrictionCone(R @ n, mu)
+    assert turned.margin(R @ f) == pytest.approx(cone.margin(f), abs=1e-12)
+    assert np.allclose(turned.project(R @ f), R @ cone.project(f), atol=1e-12)
+    assert np.allclose(decompose(R @ f, R @ n).f_par, R @ decompose(f, n).f_par, atol=1e-12)
+
+
+def test_results_cannot_be_written_to() -> None:
+    cone, polyhedron = FrictionCone(UP, 0.7), FrictionPolyhedron(UP, 0.7)
+    outside = [5.0, 0.0, 1.0]
+    arrays = [
+        cone.normal,
+        polyhedron.rows,
+        polyhedron.rays,
+        decompose(outside, UP).f_par,
+        decompose(outside, UP).f_perp,
+    ]
+    arrays += [shape.project(force) for shape in (cone, polyhedron) for force in (outside, UP, -UP)]
+    assert not any(array.flags.writeable for array in arrays)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: FrictionCone(UP, 0.0), "mu is 0; it must be > 0"),
+        (lambda: FrictionCone(np.zeros(3), 0.7), "normal is the zero vector"),
+        (lambda: FrictionCone(UP, 0.7).margin([0.0, 1.0]), r"force has shape \(2,\)"),
+        (lambda: FrictionCone(UP, 0.7).project([0.0, np.nan, 1.0]), "force holds nan"),
+        (lambda: FrictionCone(UP, 0.7).contains(UP, tolerance=-1.0), "tolerance is -1; it must be ≥ 0 N"),
+        (lambda: FrictionPolyhedron(UP, 0.7, 2), "facets is 2; .* whole number ≥ 3"),
+        (lambda: FrictionPolyhedron(UP, 0.7, 4.5), "facets is 4.5; .* whole number ≥ 3"),  # type: ignore[arg-type]
+        (lambda: FrictionPolyhedron(UP, 0.7, np.inf), "facets is inf; .* whole number ≥ 3"),  # type: ignore[arg-type]
+        (lambda: FrictionPolyhedron(UP, 0.7, "four"), "facets is 'four'; .* whole number ≥ 3"),  # type: ignore[arg-type]
+        (lambda: decompose([1.0, 2.0, 3.0], [0.0, 0.0, np.inf]), "normal holds inf"),
+    ],
+)
+def test_bad_input_is_said_to_be_bad(call: object, message: str) -> None:
+    assert callable(call)
+    with pytest.raises(InputError, match=message):
+        call()

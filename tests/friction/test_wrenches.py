@@ -1,0 +1,493 @@
+"""The wrenches of a stance, judged by cvxpy, by linear programs over rows and rays, and by brute force."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cvxpy as cp
+import judges
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+import floatbase as fb
+from floatbase.dynamics import LinearConstraint
+from floatbase.errors import InfeasibleError, InputError
+from floatbase.friction import FrictionPolyhedron, WrenchSet, wrench_set
+from floatbase.objectives import com_wrench
+
+Array = npt.NDArray[np.float64]
+seeds = st.integers(0, 100_000)
+UP = np.array([0.0, 0.0, 1.0])
+STANCES = [("go2", 4), ("go2", 3), ("go2", 2), ("go2", 1), ("talos", 2), ("talos", 1)]
+
+
+@cache
+def stance(name: str, feet: int, tilt: float = 0.0) -> tuple[fb.State, fb.Contacts]:
+    """A robot standing on its first feet, each on a slope of its own when tilt > 0."""
+    robot = judges.load(name)
+    kind = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
+    frames = [foot.frame for foot in robot.feet][:feet]
+    return robot.standing(), kind(robot, 0.6, frames, judges.random_normals(feet, 7, tilt) if tilt else None)
+
+
+def of(
+    points: npt.ArrayLike,
+    normals: npt.ArrayLike,
+    mu: float = 0.7,
+    n: int = 4,
+    inside: bool = True,
+    limit: npt.ArrayLike = np.inf,
+) -> WrenchSet:
+    """Contact points without a robot, weight 100 N, about the origin."""
+    cones = tuple(FrictionPolyhedron(normal, mu, n, inside) for normal in np.asarray(normals, dtype=float))
+    return WrenchSet(np.asarray(points), cones, np.zeros(3), 100.0, np.broadcast_to(limit, len(cones)))
+
+
+def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) -> WrenchSet:
+    """Feet about a metre apart, some higher than others, each on a slope of its own."""
+    rng = np.random.default_rng(seed)
+    return of(rng.uniform(-0.5, 0.5, (n, 3)), judges.random_normals(n, seed, 0.8), 0.6, facets, inside)
+
+
+def random_wrenches(wrenches: WrenchSet, count: int, seed: int) -> Array:
+    """About half of them inside: forces from the cones, and pushes added to them."""
+    rng = np.random.default_rng(seed)
+    inside = wrenches.rays @ rng.exponential(30.0, (wrenches.rays.shape[1], count))
+    push = rng.normal(size=(6, count)) * rng.uniform(0, 5.0, count)
+    return (inside + push * np.array([60.0] * 3 + [15.0] * 3)[:, None]).T
+
+
+class Judge:
+    """(20)(21)(28) in cvxpy: how far inside its cone every force can be; rows for four facets, written out."""
+
+    def __init__(self, points: Array, normals: Array, mu: float, exact: bool):
+        forces, self.about, self.wrench = cp.Variable((len(points), 3)), cp.Parameter(3), cp.Parameter(6)
+        self.t = cp.Variable()
+        moment = [cp.sum([self._cross(x - self.about, forces[i])[j] for i, x in enumerate(points)]) for j in range(3)]
+        rows = [cp.sum(forces, axis=0) == self.wrench[:3], cp.hstack(moment) == self.wrench[3:]]
+        for i, n in enumerate(normals):
+            x = np.array([1.0, 0.0, 0.0]) - n * n[0]
+            x /= np.linalg.norm(x)
+            y = np.cross(n, x)
+            press, slide = forces[i] @ n, cp.hstack([forces[i] @ x, forces[i] @ y])
+            limit = mu * press if exact else mu / np.sqrt(2) * press
+            rows.append((cp.norm(slide) if exact else cp.max(cp.abs(slide))) <= limit - self.t)
+        self.problem = cp.Problem(cp.Maximize(self.t), rows)
+
+    @staticmethod
+    def _cross(a: cp.Expression, b: cp.Expression) -> list[cp.Expression]:
+        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+    def margin(self, about: Array, wrench: Array) -> float:
+        self.about.value, self.wrench.value = about, wrench
+        self.problem.solve(solver=cp.CLARABEL)
+        return -np.inf if self.problem.status in ("infeasible", "infeasible_inaccurate") else float(self.t.value)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+@pytest.mark.parametrize(("name", "feet"), STANCES)
+def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: float) -> None:
+    state, contacts = stance(name, feet, tilt)
+    wrenches = wrench_set(state, contacts)
+    judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=False)
+    found = []
+    for w in random_wrenches(wrenches, 16, seed=feet):
+        # what the stance cannot produce at all is told apart by the equalities; the judge is asked about the rest
+        E = wrenches.equalities
+        w = w - np.linalg.pinv(E) @ E @ w if len(E) else w
+        wanted = judge.margin(state.com, w)
+        assert wrenches.margin(w) == pytest.approx(wanted, abs=2e-5 * np.linalg.norm(w))
+        if abs(wanted) > 1e-3:
+            assert wrenches.contains(w) == (wanted > 0)
+            found.append(wanted > 0)
+    assert 2 <= sum(found) <= len(found) - 2
+
+
+@pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("talos", 2)])
+def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra(name: str, feet: int) -> None:
+    state, contacts = stance(name, feet, 0.5)
+    judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=True)
+    inner = wrench_set(state, contacts, facets=6)
+    outer = wrench_set(state, contacts, facets=6, inside=False)
+    for w in random_wrenches(inner, 16, seed=3):
+        exact = judge.margin(state.com, w)
+        assert inner.margin(w) < 1e-4 or exact > -1e-4
+        assert exact < 1e-4 or outer.margin(w) > -1e-4
+
+
+def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays() -> None:
+    state, contacts = stance("go2", 3, 0.5)
+    wrenches = wrench_set(state, contacts, facets=5)
+    G = com_wrench(state, contacts).A
+    for i, cone in enumerate(wrenches.cones):
+        forces = np.zeros((9, 5))
+        forces[3 * i : 3 * i + 3] = cone.rays.T
+        assert np.allclose(wrenches.rays[:, 5 * i : 5 * i + 5], G @ forces)
+
+
+@pytest.mark.parametrize("facets", [4, 7])
+@pytest.mark.parametrize(("name", "feet"), STANCES)
+def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: int) -> None:
+    state, contacts = stance(name, feet, 0.4)
+    wrenches = wrench_set(state, contacts, facets=facets)
+    rows, E, rays = wrenches.rows, wrenches.equalities, wrenches.rays
+    assert np.max(rows @ rays) <= 1e-9
+    assert np.max(np.abs(E @ rays), initial=0.0) <= 1e-9
+    scale = np.repeat([1.0, wrenches.arm], 3)
+    assert np.allclose(np.linalg.norm(rows * scale, axis=1), 1.0)
+    assert wrenches.row_names[0] == "wrench facet 0"
+    assert len(wrenches.row_names) == len(rows)
+    # the other way round: the farthest that the rows allow in any direction is made by the rays
+    rng = np.random.default_rng(feet)
+    inwards = rays.sum(axis=1)
+    for _ in range(8):
+        cost = -rng.normal(size=6) / scale
+        best = linprog(
+            cost,
+            np.vstack([rows, inwards / scale**2]),
+            np.append(np.zeros(len(rows)), 100.0),
+            E,
+            np.zeros(len(E)),
+            (None, None),
+        )
+        assert best.status == 0
+        assert wrenches.contains(best.x, tolerance=1e-5)
+
+
+@settings(max_examples=20)
+@given(seeds, st.integers(1, 5))
+def test_membership_by_rows_and_by_forces_agree_for_feet_anywhere(seed: int, feet: int) -> None:
+    wrenches = feet_on_slopes(seed, feet)
+    for w in random_wrenches(wrenches, 6, seed):
+        beyond = float(np.max(wrenches.rows @ w))
+        off = float(np.max(np.abs(wrenches.equalities @ w), initial=0.0))
+        if abs(beyond) > 1e-3 and not 1e-9 < off < 1e-3:
+            assert wrenches.contains(w) == (beyond < 0 and off < 1e-9)
+
+
+@pytest.mark.parametrize(("feet", "missing"), [(1, 3), (2, 1), (3, 0), (4, 0)])
+def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line(feet: int, missing: int) -> None:
+    state, contacts = stance("go2", feet)
+    wrenches = wrench_set(state, contacts)
+    assert len(wrenches.equalities) == missing
+    if feet == 2:
+        a, b = wrenches.points
+        # (a - b) · (τ + (x_c - a) × f): the moment about the line through a and b
+        about_line = np.concatenate([np.cross(a - b, wrenches.about - a), a - b])
+        row = wrenches.equalities[0]
+        assert np.linalg.matrix_rank(np.vstack([row / np.linalg.norm(row), about_line]), tol=1e-9) == 1
+        assert wrenches.margin(np.concatenate([np.zeros(3), a - b])) == -np.inf
+
+
+def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench() -> None:
+    state, contacts = stance("go2", 4)
+    wrenches = wrench_set(state, contacts)
+    carrying = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
+    assert wrenches.margin(3.0 * carrying) == pytest.approx(3.0 * wrenches.margin(carrying))
+    # the weight divides between front and rear pair as the lever says; the lighter pair has the smaller margin
+    x = wrenches.points[:, 0] - state.com[0]
+    lightest = 0.5 * state.robot.weight * min(x[0], -x[2]) / (x[0] - x[2])
+    assert wrenches.margin(carrying) == pytest.approx(lightest * 0.6 / np.sqrt(2))
+    assert wrenches.margin(np.zeros(6)) == pytest.approx(0.0, abs=1e-9)
+    assert wrenches.margin(-carrying) < 0
+
+
+# limits on the normal force
+
+
+def test_limits_make_the_set_bounded_and_the_support_function_its_largest_wrench() -> None:
+    state, contacts = stance("go2", 4, 0.4)
+    free, limited = wrench_set(state, contacts), wrench_set(state, contacts, max_normal_force=[50.0, 60.0, 70.0, 80.0])
+    for direction in np.random.default_rng(0).normal(size=(20, 6)):
+        best = linprog(-(direction @ limited.rays), np.kron(np.eye(4), np.ones(4)), limited.max_normal_force, bounds=(0, None))
+        assert limited.support(direction) == pytest.approx(-best.fun, abs=1e-9)
+        assert free.support(direction) == (0.0 if np.max(direction @ free.rays) <= 0 else np.inf)
+        assert limited.contains(limited.rays @ best.x, tolerance=1e-5)
+        assert not limited.contains(limited.rays @ best.x + 0.1 * direction) or limited.support(direction) == 0
+    assert free.support(-UP @ np.eye(3, 6)) == 0.0
+
+
+def test_some_limits_leave_some_directions_without_end() -> None:
+    wrenches = of([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [UP, UP], limit=[10.0, np.inf])
+    assert wrenches.support([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]) == pytest.approx(0.0)  # a foot at x > 0 pitches forward: τ_y < 0
+    assert wrenches.support([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]) == np.inf
+    assert wrenches.support([0.0, 0.0, 1.0, 0.0, 1.0, 0.0]) == pytest.approx(10.0)
+
+
+def test_reach_is_where_membership_ends() -> None:
+    state, contacts = stance("talos", 2, 0.3)
+    wrenches = wrench_set(state, contacts, max_normal_force=400.0)
+    start = wrenches.rays @ np.full(wrenches.rays.shape[1], 30.0)
+    for direction in np.random.default_rng(1).normal(size=(10, 6)):
+        far = wrenches.reach(direction, start)
+        assert 0 < far < np.inf
+        assert wrenches.contains(start + (far - 1e-3) * direction)
+        assert not wrenches.contains(start + (far + 1e-2) * direction)
+        assert wrenches.reach(5.0 * direction, start) == pytest.approx(far / 5.0, rel=1e-6)
+
+
+def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight() -> None:
+    """Without torque about a CoM at the height of the ground, only friction ends it."""
+    wrenches = of([[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]], [UP] * 4, 0.5, 4, inside=False)
+    carrying = [0.0, 0.0, 100.0, 0.0, 0.0, 0.0]
+    assert wrenches.reach([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(50.0)
+    assert wrenches.reach([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], carrying) == np.inf
+    assert wrenches.reach([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(100.0)
+    assert wrenches.reach([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0]) == np.inf
+    with pytest.raises(InfeasibleError, match="no wrench start"):
+        wrenches.reach([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+
+
+# the slice at the centre of mass
+
+
+@pytest.mark.parametrize("limit", [None, 90.0])
+@pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("talos", 2), ("talos", 1)])
+def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(name: str, feet: int, limit: float | None) -> None:
+    state, contacts = stance(name, feet, 0.4)
+    limit = None if limit is None else limit / 150.0 * state.robot.weight
+    wrenches = wrench_set(state, contacts, max_normal_force=limit)
+    corners = wrenches.torques()
+    carried = np.array([0.0, 0.0, state.robot.weight])
+    assert len(corners) >= 4
+    assert all(wrenches.contains(np.concatenate([carried, corner]), tolerance=1e-4) for corner in corners)
+    hull = ConvexHull(corners)
+    assert len(hull.vertices) == len(corners)
+    rng, centre = np.random.default_rng(0), corners.mean(axis=0)
+    for corner in corners[rng.integers(len(corners), size=8)]:
+        for stretch, held in ((0.99, True), (1.01, False)):
+            torque = centre + stretch * (corner - centre)
+            assert wrenches.contains(np.concatenate([carried, torque])) is held
+    for normal, offset in zip(hull.equations[:, :3], hull.equations[:, 3], strict=True):
+        best = linprog(-(normal @ wrenches.rays[3:]), *wrenches_limits(wrenches), wrenches.rays[:3], carried, (0, None))
+        assert -best.fun == pytest.approx(-offset, abs=1e-6 * state.robot.weight)
+
+
+def wrenches_limits(wrenches: WrenchSet) -> tuple[Array | None, Array | None]:
+    if np.all(np.isinf(wrenches.max_normal_force)):
+        return None, None
+    return np.kron(np.eye(len(wrenches.points)), np.ones(4)), wrenches.max_normal_force
+
+
+def test_slices_of_stances_without_area_are_flat() -> None:
+    state, contacts = stance("go2", 1)
+    f = wrench_set(state, contacts).cones[0].rays[0] * 40.0
+    one = wrench_set(state, contacts).torques(f)
+    assert np.allclose(one, [np.cross(contacts.positions(state)[0] - state.com, f)])
+    state, contacts = stance("go2", 2)
+    two = wrench_set(state, contacts).torques()
+    assert np.linalg.matrix_rank(two - two[0], tol=1e-7) == 2
+
+
+def test_a_force_that_pulls_has_no_torques() -> None:
+    state, contacts = stance("go2", 4)
+    assert wrench_set(state, contacts).torques([0.0, 0.0, -1.0]).shape == (0, 3)
+    assert np.allclose(wrench_set(state, contacts).torques(np.zeros(3)), np.zeros((1, 3)))
+
+
+# where a robot can stand
+
+
+def counter_clockwise(polygon: Array) -> bool:
+    x, y = polygon.T
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) > 0
+
+
+def depth(polygon: Array, at: Array) -> float:
+    """How far inside a counter-clockwise polygon a point is, m."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    inwards = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
+    return float(np.min(np.sum(inwards * (at - polygon), axis=1)))
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.7])
+@pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("solo8", 4), ("talos", 2), ("talos", 1)])
+def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(name: str, feet: int, mu: float) -> None:
+    robot, state = judges.load(name), judges.load(name).standing()
+    contacts = judges.stance(robot, mu).only(*[foot.frame for foot in robot.feet][:feet])
+    region = wrench_set(state, contacts).support_region()
+    places = contacts.positions(state)[:, :2]
+    assert len(region) == (3 if feet == 3 else 4)
+    assert counter_clockwise(region)
+    assert max(np.min(np.linalg.norm(places - corner, axis=1)) for corner in region) < 1e-9
+    assert min(depth(region, place) for place in places) > -1e-9
+
+
+@settings(max_examples=25)
+@given(seeds, st.integers(1, 8))
+def test_on_level_ground_this_holds_for_feet_anywhere(seed: int, feet: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.column_stack([rng.uniform(-1, 1, (feet, 2)) + 5.0, np.full(feet, 0.3)])
+    region = of(points, [UP] * feet, mu=rng.uniform(0.05, 1)).support_region()
+    hull = points[ConvexHull(points[:, :2]).vertices, :2] if feet > 2 else points[:, :2]
+    assert region.shape == hull.shape
+    assert max(np.min(np.linalg.norm(hull - corner, axis=1)) for corner in region) < 1e-8
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(seed: int) -> None:
+    wrenches = feet_on_slopes(seed)
+    region = wrenches.support_region()
+    judge = Judge(wrenches.points, np.array([cone.normal for cone in wrenches.cones]), 0.6, exact=False)
+    low, high = region.min(axis=0), region.max(axis=0)
+    margin = 0.2 * (high - low)
+    seen = set()
+    for x in np.linspace(low[0] - margin[0], high[0] + margin[0], 9):
+        for y in np.linspace(low[1] - margin[1], high[1] + margin[1], 9):
+            inside = depth(region, np.array([x, y]))
+            if abs(inside) > 1e-3:
+                held = judge.margin(np.array([x, y, 0.8]), np.array([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])) > 0
+                assert held == (inside > 0)
+                seen.add(held)
+    assert seen == {True, False}
+
+
+def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() -> None:
+    feet = np.array([[0.5, 0.0, 0.0], [-0.5, 0.3, 0.0], [-0.5, -0.3, 0.0]])
+    area = ConvexHull(feet[:, :2]).volume
+    outwards = np.column_stack([feet[:, :2], np.full(3, 0.8)])  # feet on a hilltop: friction must hold them
+    inwards = np.column_stack([-feet[:, :2], np.full(3, 0.8)])  # feet in a bowl
+    on_top, in_bowl = (of(feet, normals, 0.3).support_region() for normals in (outwards, inwards))
+    areas = [ConvexHull(region).volume if len(region) > 2 else 0.0 for region in (on_top, in_bowl)]
+    assert areas[0] < 0.9 * area
+    steep = np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]])
+    assert of(feet[:2], steep, 0.1).support_region().shape[0] <= 2
+    # a wall on the right to lean on: the CoM may stand beside the feet
+    wall = of(np.vstack([feet, [[1.0, 0.0, 1.0]]]), [*([UP] * 3), [-1.0, 0.0, 0.0]], 0.7)
+    assert np.max(wall.support_region()[:, 0]) > 0.5 + 0.1
+
+
+def test_too_steep_a_slope_carries_nobody() -> None:
+    for angle, stands in ((np.arctan(0.4) - 1e-3, True), (np.arctan(0.4) + 1e-3, False)):
+        normals = [[np.sin(angle), 0.0, np.cos(angle)]] * 3
+        region = of(
+            [[0.0, 0.0, 0.0], [1.0, 0.0, -np.tan(angle)], [0.0, 1.0, 0.0]], normals, 0.4, 4, inside=False
+        ).support_region()
+        assert region.shape == ((3, 2) if stands else (0, 2))
+
+
+def test_limits_on_the_normal_force_cut_the_corners_off() -> None:
+    square = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+    region = of(square, [UP] * 4, limit=50.0).support_region()
+    assert {tuple(np.round(corner, 9)) for corner in region} == {(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)}
+    assert of(square, [UP] * 4, limit=20.0).support_region().shape == (0, 2)
+
+
+def test_the_robot_stands_where_its_centre_of_mass_is_in_the_region() -> None:
+    for name, feet in STANCES:
+        state, contacts = stance(name, feet)
+        wrenches = wrench_set(state, contacts)
+        region = wrenches.support_region()
+        inside = depth(region, state.com[:2]) if len(region) > 2 else -1.0
+        assert wrenches.contains([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0]) == (inside > 0)
+
+
+def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
+    chimney = of(
+        [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]], [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], 0.5
+    )
+    assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
+    with pytest.raises(InputError, match="has no end: .* Give max_normal_force"):
+        chimney.torques()
+    with pytest.raises(InputError, match="has no end"):
+        chimney.support_region()
+    limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
+    assert limited.contains([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])
+    assert len(limited.support_region()) >= 3
+    assert len(limited.torques()) >= 4
+
+
+def test_a_grip_from_all_sides_makes_every_wrench() -> None:
+    directions = np.vstack([np.eye(3), -np.eye(3)])
+    grip = of(directions, -directions, 0.7)
+    assert grip.rows.shape == (0, 6)
+    assert grip.equalities.shape == (0, 6)
+    assert all(grip.margin(w) == np.inf for w in np.random.default_rng(0).normal(size=(5, 6)))
+
+
+# frames
+
+
+@settings(max_examples=12)
+@given(seeds)
+def test_moving_everything_changes_nothing(seed: int) -> None:
+    here = feet_on_slopes(seed)
+    step = np.random.default_rng(seed).normal(size=3)
+    there = WrenchSet(here.points + step, here.cones, here.about + step, here.weight, here.max_normal_force)
+    assert np.allclose(there.rays, here.rays)
+    region, moved = here.support_region(), there.support_region()
+    assert region.shape == moved.shape
+    assert all(np.min(np.linalg.norm(moved - step[:2] - corner, axis=1)) < 1e-7 for corner in region)
+
+
+@settings(max_examples=12)
+@given(seeds)
+def test_turning_everything_turns_the_wrenches(seed: int) -> None:
+    """Facets may start elsewhere after the turn, but inner polyhedra stay within outer ones, nearly the same."""
+    rng = np.random.default_rng(seed)
+    R = judges.rotation(rng.normal(size=3))
+    here = feet_on_slopes(seed, 3, 48)
+    normals = np.array([cone.normal for cone in here.cones]) @ R.T
+    inner, outer = (of(here.points @ R.T, normals, 0.6, 48, inside) for inside in (True, False))
+    for w in random_wrenches(here, 5, seed):
+        turned = np.kron(np.eye(2), R) @ w
+        assert outer.contains(turned) or not here.contains(w)
+        assert inner.margin(turned) == pytest.approx(here.margin(w), abs=0.02 * np.linalg.norm(w))
+
+
+def test_turning_a_robot_about_the_vertical_turns_its_support_region() -> None:
+    wrenches = feet_on_slopes(1)
+    R = judges.rotation([0.0, 0.0, np.pi / 2])
+    normals = np.array([cone.normal for cone in wrenches.cones]) @ R.T
+    inner, outer = (of(wrenches.points @ R.T, normals, 0.6, 40, inside).support_region() for inside in (True, False))
+    here = feet_on_slopes(1, 4, 40).support_region()
+    assert all(depth(outer, R[:2, :2] @ corner) > -1e-9 for corner in here)
+    assert all(depth(inner, R[:2, :2] @ corner) > -0.01 for corner in here)
+
+
+# input
+
+
+def test_results_cannot_be_written_to() -> None:
+    wrenches = feet_on_slopes(1)
+    for array in (
+        wrenches.points,
+        wrenches.rays,
+        wrenches.rows,
+        wrenches.equalities,
+        wrenches.torques(),
+        wrenches.support_region(),
+    ):
+        assert not array.flags.writeable
+
+
+def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
+    state, contacts = stance("go2", 4)
+    rope = LinearConstraint("rope", 1, lambda s, t: (np.eye(1, s.robot.nv), np.zeros(1)))
+    cases = [
+        (lambda: wrench_set(state, fb.Contacts.none()), "at least one contact point"),
+        (lambda: wrench_set(state, contacts + fb.Contacts([rope])), "rope has forces without a cone"),
+        (lambda: wrench_set(contacts, contacts), "needs a State first, not Contacts"),  # type: ignore[arg-type]
+        (lambda: wrench_set(state, state), "needs Contacts second"),  # type: ignore[arg-type]
+        (lambda: wrench_set(state, contacts, facets=2), "facets is 2"),
+        (lambda: wrench_set(state, contacts, max_normal_force=0.0), "one number > 0 or 4 of them"),
+        (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "one number > 0 or 4 of them"),
+        (lambda: wrench_set(state, contacts, max_normal_force="much"), "one number > 0 or 4 of them"),
+        (lambda: wrench_set(state, contacts, max_normal_force=9.0).rows, "without limits on the normal force"),
+        (lambda: wrench_set(state, contacts).margin(np.zeros(3)), r"wrench has shape \(3,\)"),
+        (lambda: wrench_set(state, contacts).support([np.nan] * 6), "direction holds nan"),
+        (lambda: wrench_set(state, contacts).reach(np.zeros(6)), "direction is the zero wrench"),
+        (lambda: wrench_set(state, contacts).torques([1.0]), r"force has shape \(1,\)"),
+        (
+            lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
+            "one FrictionPolyhedron for each of the 2",
+        ),
+    ]
+    for call, message in cases:
+        with pytest.raises(InputError, match=message):
+            call()

@@ -1,0 +1,409 @@
+"""The active-set solver: right answers, an honest record of the way, and an end on every problem."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import judges
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+import floatbase as fb
+from floatbase.errors import InfeasibleError, InputError, SolverError, UnknownNameError
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ActiveSetRun, active_set, solve, table_top
+
+Array = np.ndarray
+BOX = np.vstack([np.eye(2), -np.eye(2)])
+
+
+def problem(H: object, g: object, G: object = (), h: object = (), A: object = (), b: object = ()) -> QP:
+    """A QP of small arrays; rows that are not given are none."""
+    n = len(np.asarray(g))
+    rows = [np.asarray(M, dtype=np.float64).reshape(-1, n) for M in (A, G)]
+    return QP(np.asarray(H), np.asarray(g), rows[0], np.asarray(b), rows[1], np.asarray(h))
+
+
+def check_optimum(run: ActiveSetRun, tolerance: float = 1e-7) -> None:
+    """Karush, Kuhn and Tucker: sufficient for a convex problem, whoever solved it."""
+    qp, r = run.solution.qp, run.solution.residuals
+    scale = 1.0 + float(np.max(np.abs(qp.H) @ np.abs(run.solution.x) + np.abs(qp.g)))
+    assert r.stationarity < tolerance * scale
+    assert r.equality < tolerance
+    assert r.inequality < 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_lengths, initial=1.0))
+    assert r.complementarity < tolerance * scale
+    assert r.dual == 0.0
+
+
+def check_record(run: ActiveSetRun) -> None:
+    """Each iteration starts where the last arrived, satisfies all rows, raises no objective and says what it did."""
+    qp = run.solution.qp
+    scale = 1.0 + abs(run.iterations[0].objective)
+    for now, after in pairwise(run.iterations):
+        assert np.allclose(now.arrival, after.x)
+        assert after.objective <= now.objective + 1e-9 * scale
+        if now.blocking is not None:
+            assert now.multipliers == {} and now.dropped is None
+            assert after.working == (*now.working, now.blocking)
+        else:
+            assert now.dropped is not None and now.multipliers[now.dropped] < 0
+            assert after.working == tuple(row for row in now.working if row != now.dropped)
+    for step in run.iterations:
+        assert np.all(qp.G @ step.x - qp.h <= 10 * FEASIBILITY_TOLERANCE * qp.row_lengths)
+        assert np.allclose(qp.A @ step.x, qp.b, atol=1e-7)
+        held = [qp.inequality_names.index(row) for row in step.working]
+        assert np.allclose((qp.G @ step.x - qp.h)[held], 0.0, atol=1e-7)
+        assert np.linalg.matrix_rank(qp.G[held] @ qp.equality_space.A) == len(held)
+        assert step.objective == pytest.approx(qp.objective(step.x), rel=1e-9, abs=1e-9)
+    last = run.iterations[-1]
+    assert last.length == 1.0 and last.blocking is None and last.dropped is None
+    assert last.working == run.working
+    assert np.allclose(last.arrival, run.solution.x)
+    for now, after in pairwise(run.phase_one):
+        assert after.objective <= now.objective + 1e-12
+
+
+# the document's table ------------------------------------------------------------------------------------------------
+
+
+def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there() -> None:
+    run = active_set(table_top(minimum=(0.5, 1.0)))
+    assert np.allclose(run.solution.x, [0.5, 1.0])
+    assert run.solution.active == () == run.working
+
+
+def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equality() -> None:
+    qp = table_top(minimum=(0.5, -1.0))
+    found = active_set(qp).solution
+    equality = solve(QP(qp.H, qp.g, qp.G, qp.h, np.zeros((0, 2)), np.zeros(0)))
+    assert found.active == ("table",)
+    assert np.allclose(found.x, [0.5, 0.0])
+    assert np.allclose(found.x, equality.x)
+    assert found.multipliers["table"] == pytest.approx(1.0)  # the minimum lies 1 m below, at curvature 1
+
+
+def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> None:
+    first, second = active_set(table_top((0.5, -1.0)), start=(0.0, 1.0)).iterations
+    assert (first.working, first.blocking, first.length) == ((), "table", 0.5)
+    assert np.allclose(first.direction, [0.5, -2.0])
+    assert np.allclose(first.arrival, [0.25, 0.0])
+    assert (second.working, second.blocking, second.length) == (("table",), None, 1.0)
+    assert np.allclose(second.direction, [0.25, 0.0])
+    assert second.multipliers == {"table": pytest.approx(1.0)}
+    assert second.dropped is None
+
+
+def test_a_row_that_would_have_to_pull_is_dropped() -> None:
+    first, second = active_set(table_top((0.5, 1.0)), start=(0.0, 0.0), working=["table"]).iterations
+    assert first.multipliers == {"table": pytest.approx(-1.0)}
+    assert first.dropped == "table"
+    assert second.working == ()
+    assert np.allclose(second.arrival, [0.5, 1.0])
+
+
+def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised() -> None:
+    run = active_set(table_top((0.5, -1.0)), start=(0.0, -3.0))
+    assert run.phase_one[0].objective == pytest.approx(3.0)  # the largest violation, m
+    assert np.allclose(run.iterations[0].x, [0.0, 0.0])
+    assert run.solution.iterations == len(run.phase_one) + len(run.iterations)
+    check_record(run)
+
+
+# the controller's problems -------------------------------------------------------------------------------------------
+
+
+def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP]:
+    """n problems of random states near standing, half of them calm, half far off; motors with part of their torque."""
+    robot = judges.load(name)
+    limits = torque * robot.torque_limits
+    controller = fb.WholeBodyController(
+        robot, judges.stance(robot, mu), fb.standing_tasks(robot.standing()), torque_limits=limits
+    )
+    return [controller.qp(robot.random_state(seed, (0.05, 0.15)[seed % 2])) for seed in range(n)]
+
+
+@pytest.mark.parametrize(("name", "n", "torque"), [("go2", 200, 0.4), ("solo12", 200, 0.3), ("talos", 100, 0.3)])
+def test_it_agrees_with_daqp_on_500_problems_of_three_robots(name: str, n: int, torque: float) -> None:
+    friction = motors = 0
+    for qp in controller_qps(name, n, torque):
+        run, daqp = active_set(qp), solve(qp)
+        assert np.max(np.abs(run.solution.x - daqp.x)) < 1e-7
+        check_optimum(run)
+        friction += any("facet" in row or "normal" in row for row in run.solution.active)
+        motors += any("torque" in row for row in run.solution.active)
+    assert friction > n / 3
+    assert motors > n / 10
+
+
+@pytest.mark.parametrize("name", judges.ROBOTS)
+def test_it_solves_the_controllers_problem_of_every_robot_and_records_an_honest_way(name: str) -> None:
+    for qp in controller_qps(name, 6, torque=0.7):
+        try:
+            expected = solve(qp)
+        except InfeasibleError:
+            with pytest.raises(InfeasibleError):
+                active_set(qp)
+            continue
+        run = active_set(qp)
+        assert np.allclose(run.solution.x, expected.x, atol=1e-7)
+        check_optimum(run)
+        check_record(run)
+
+
+def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
+    """The problems of consecutive ticks while the centre of mass is asked to sway more than a slippery floor allows."""
+    robot = judges.load(name)
+    state = robot.standing()
+    com = fb.CoMTask(lambda t: state.com + np.array([0.0, 0.1 * np.sin(6.0 * t), 0.0]), kp=300.0)
+    tasks = [com, *fb.standing_tasks(state)[1:]]
+    contacts = judges.stance(robot, mu=0.25)
+    controller = fb.WholeBodyController(robot, contacts, tasks, torque_limits=0.6 * robot.torque_limits)
+    qps: list[QP] = []
+    for tick in range(ticks):
+        qps.append(controller.qp(state, 0.2 + tick * dt))
+        v = state.v + dt * solve(qps[-1])["qdd"]
+        state = state.replace(pin.integrate(robot.model, state.q, dt * v), v)
+    return qps
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12", "talos"])
+def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str) -> None:
+    cold, warm, last = [], [], None
+    for qp in swaying_qps(name, 100):
+        run = active_set(qp)
+        if last is not None:
+            again = active_set(qp, start=last.solution.x, working=last.working)
+            assert np.allclose(again.solution.x, run.solution.x, atol=1e-7)
+            cold.append(run.solution.iterations)
+            warm.append(again.solution.iterations)
+        last = run
+    print(f"{name}: {np.mean(cold):.2f} iterations cold, {np.mean(warm):.2f} warm")
+    assert sum(warm) < 0.7 * sum(cold)
+    assert np.median(warm) == 1  # most ticks keep the active set of the last one
+
+
+def test_the_controller_runs_on_it() -> None:
+    robot = judges.load("go2")
+    state = robot.random_state(3, 0.1)
+    tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
+    readable = fb.WholeBodyController(robot, contacts, tasks, solver="active_set")(state.q, state.v)
+    assert readable.solution.solver == "active_set"
+    assert np.allclose(readable.tau, fb.WholeBodyController(robot, contacts, tasks)(state.q, state.v).tau, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["solo12", "go2", "talos"])
+def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name: str) -> None:
+    robot = judges.load(name)
+    tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
+    controller = fb.WholeBodyController(robot, contacts, tasks, min_normal_force=2000.0, solver="active_set")
+    with pytest.raises(InfeasibleError, match="contradict each other") as caught:
+        controller(robot.standing().q, robot.standing().v)
+    check_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
+
+
+# degenerate, infeasible, unbounded -----------------------------------------------------------------------------------
+
+
+def check_smallest_conflict(qp: QP, names: tuple[str, ...]) -> None:
+    """Together impossible, possible without any one of them: by a linear program on the whole problem."""
+    rows = [qp.inequality_names.index(name) for name in names]
+    assert not feasible(qp, rows)
+    for row in rows:
+        assert feasible(qp, [i for i in rows if i != row])
+
+
+def feasible(qp: QP, rows: list[int]) -> bool:
+    return bool(least(np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, (None, None)).status == 0)
+
+
+def least(c: Array, G: Array, h: Array, A: Array, b: Array, bounds: tuple[float | None, float | None]) -> Any:
+    """The linear program min cᵀ x with G x ≤ h, A x = b; scipy wants None where there are no rows."""
+    upper, equal = (G, h) if len(G) else (None, None), (A, b) if len(A) else (None, None)
+    return linprog(c, *upper, *equal, bounds=bounds, method="highs")
+
+
+CORNER = [[1, 0], [0, 1], [1, 1], [2, 1], [1, 2], [1, 0]]  # six rows through one point of the plane
+
+DEGENERATE = {
+    "duplicate rows": problem(np.eye(2), [-3, -1], [[1, 0], [1, 0], [2, 0], [1, 0]], [1, 1, 2, 1]),
+    "dependent rows": problem(np.eye(2), [-3, -3], [[1, 0], [0, 1], [1, 1]], [1, 1, 2]),
+    "a vertex of more rows than variables": problem(np.eye(2), [-5, -4], CORNER, np.zeros(6)),
+    "a cone of 64 facets, pushed into its tip": problem(
+        np.eye(3),
+        [0, 0, 1],
+        [[np.cos(a), np.sin(a), -0.7] for a in np.linspace(0, 2 * np.pi, 64, endpoint=False)],
+        np.zeros(64),
+    ),
+    "a single point": problem(np.eye(2), [1, 2], BOX, [1, 1, -1, -1]),
+    "a single point between three walls": problem(np.eye(2), [1, 2], [[-1, 0], [0, -1], [1, 1]], [-1, -1, 2]),
+    "a single point left by the equalities": problem(np.eye(2), [1, 2], [[1, 0]], [1], np.eye(2), [1, 1]),
+    "an equality written as two rows": problem(np.eye(2), [-3, -1], [[1, 1], [-1, -1]], [1, -1]),
+    "equalities that repeat": problem(np.eye(2), [1, 2], -np.eye(2), [0, 0], [[1, 1], [1, 1], [2, 2]], [1, 1, 2]),
+    "a row that the equalities decide": problem(np.eye(3), [1, 2, 3], [[1, 1, 1]], [1], [[1, 1, 1]], [1]),
+    "a row of zeros": problem(np.eye(2), [1, 2], [[0, 0], [1, 0]], [0, -2]),
+    "the same table in other units": problem(np.eye(2), [-3, -1], [[1e6, 0], [1e-6, 0]], [1e6, 1e-6]),
+    "a weakly active row": problem(np.eye(2), [-1, 0], [[1, 0], [0, -1]], [1, 0]),
+    "no curvature, a box": problem(np.zeros((2, 2)), [1, -2], BOX, np.ones(4)),
+    "no curvature along one axis": problem(np.diag([1.0, 0.0]), [1, -2], [[1, 1]], [3]),
+    "a flat valley": problem(np.diag([1.0, 0.0]), [1, 0], [[1, 1]], [3]),
+    "no objective at all": problem(np.zeros((2, 2)), [0, 0], BOX, [1, 1, -1, -0.5]),
+}
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+@pytest.mark.parametrize("start", [None, (0.0, 0.0, 0.0), (7.0, -5.0, 3.0)])
+def test_degenerate_problems_end_at_the_optimum(name: str, start: tuple[float, ...] | None) -> None:
+    qp = DEGENERATE[name]
+    run = active_set(qp, None if start is None else start[: qp.n])
+    check_optimum(run)
+    check_record(run)
+    assert run.solution.objective == pytest.approx(solve(qp, "cvxpy").objective, abs=1e-6)
+    again = active_set(qp, run.solution.x, qp.inequality_names)  # every row at once: dependent ones are left out
+    assert np.allclose(again.solution.objective, run.solution.objective)
+
+
+def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends() -> None:
+    """Beale (1955): by the steepest multiplier and no rule for ties the simplex method comes back to its start."""
+    rows = [[0.25, -60.0, -1 / 25, 9.0], [0.5, -90.0, -1 / 50, 3.0], [0.0, 0.0, 1.0, 0.0], *-np.eye(4)]
+    qp = problem(np.zeros((4, 4)), [-0.75, 150.0, -1 / 50, 6.0], rows, [0, 0, 1, 0, 0, 0, 0])
+    run = active_set(qp, np.zeros(4), [f"inequality {i}" for i in range(3, 7)])
+    assert run.solution.objective == pytest.approx(-1 / 20)
+    assert any(step.length == 0.0 for step in run.iterations)  # it does stand still on the way
+    check_optimum(run)
+    check_record(run)
+
+
+@pytest.mark.parametrize(
+    "qp",
+    [
+        problem(np.eye(2), [1, 2], [[1, 0], [-1, 0]], [-1, -1]),
+        problem(np.eye(2), [1, 2], [[1, 0], [1, 0], [-1, 0], [0, 1], [1, 1]], [1, 1, -2, 5, 9]),
+        problem(np.eye(2), [1, 2], [[-1, 0], [0, -1], [1, 1], [1, 0]], [-1, -1, 1.9, 7]),
+        problem(np.eye(2), [1, 2], [[1, 0]], [0.5], [[1, 0]], [1]),
+        problem(np.eye(2), [1, 2], [[1, 0]], [0.5], np.eye(2), [1, 1]),
+        problem(np.eye(2), [1, 2], [[0, 0]], [-1]),
+        problem(np.zeros((2, 2)), [1, 2], [[1, 0], [-1, 0]], [-1, -1]),
+        problem(np.eye(2), [1, 2], [[1, 0], [-1, 0]], [1, -1 - 1e-6]),
+    ],
+)
+def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp: QP) -> None:
+    for start in (None, (0.0, 0.0), (50.0, -20.0)):
+        with pytest.raises(InfeasibleError, match="Loosen or drop any one of them") as caught:
+            active_set(qp, start)
+        check_smallest_conflict(qp, caught.value.rows)
+    with pytest.raises(InfeasibleError):
+        solve(qp, "active_set")
+
+
+@pytest.mark.parametrize(
+    "qp",
+    [
+        problem(np.zeros((2, 2)), [1, -2], np.eye(2), [1, 1]),
+        problem(np.diag([1.0, 0.0]), [1, -2]),
+        problem(np.diag([1.0, 0.0]), [1, -2], [[1, 0]], [0]),
+        problem(np.ones((2, 2)), [0, -2], (), (), [[1, 1]], [2]),
+        problem(np.diag([1.0, 0.0]), [0, -1], [[1, -1], [-1, -1]], [0, 0]),
+    ],
+)
+def test_an_objective_that_falls_for_ever_is_an_error_that_says_so(qp: QP) -> None:
+    with pytest.raises(SolverError, match="no minimum: it falls for ever .* regularisation"):
+        active_set(qp)
+
+
+def test_an_objective_that_curves_downwards_is_an_error_that_says_so() -> None:
+    with pytest.raises(SolverError, match="not convex: along one direction its curvature is -1"):
+        active_set(problem(np.diag([1.0, -1.0]), [0, 1], BOX, np.ones(4)))
+
+
+def test_curvature_only_counts_where_the_equalities_hold() -> None:
+    found = active_set(problem(np.diag([1.0, -1.0]), [-2, 0], (), (), [[0, 1]], [3])).solution
+    assert np.allclose(found.x, [2.0, 3.0])
+
+
+# random problems -----------------------------------------------------------------------------------------------------
+
+
+def random_qp(seed: int) -> QP:
+    """Whole numbers, so that rows repeat, depend and meet; H of any rank; feasible or not, bounded or not."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 7))
+    rows, equalities = int(rng.integers(0, 4 * n + 1)), int(rng.integers(0, min(3, n) + 1))
+
+    def whole(*shape: int) -> Array:
+        return rng.integers(-2, 3, shape).astype(np.float64)
+
+    root, G, A, inside = whole(int(rng.integers(0, n + 1)), n), whole(rows, n), whole(equalities, n), whole(n)
+    h = whole(rows) if rng.random() < 0.3 else G @ inside + rng.integers(0, 2, rows)
+    return QP(root.T @ root, whole(n), A, A @ inside, G, h)
+
+
+def verdict(qp: QP) -> str:
+    """By linear programs: is there a point, and a direction without curvature or row where the objective falls?"""
+    if least(np.zeros(qp.n), qp.G, qp.h, qp.A, qp.b, (None, None)).status == 2:
+        return "infeasible"
+    flat = np.vstack([qp.H, qp.A])
+    falls = least(qp.g, qp.G, np.zeros(len(qp.G)), flat, np.zeros(len(flat)), (-1.0, 1.0))
+    return "unbounded" if falls.fun < -1e-9 else "optimal"
+
+
+@given(st.integers(0, 10**9))
+@hypothesis_settings(max_examples=400)
+def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed: int) -> None:
+    qp, expected = random_qp(seed), verdict(random_qp(seed))
+    try:
+        run = active_set(qp)
+    except InfeasibleError as error:
+        assert expected == "infeasible"
+        check_smallest_conflict(qp, error.rows)
+    except SolverError as error:
+        assert expected == "unbounded", error
+    else:
+        assert expected == "optimal"
+        check_optimum(run)
+        check_record(run)
+
+
+@given(st.integers(0, 10**9))
+@hypothesis_settings(max_examples=100)
+def test_random_problems_have_the_optimum_that_cvxpy_finds(seed: int) -> None:
+    flat = random_qp(seed)
+    qp = QP(flat.H + 0.5 * np.eye(flat.n), flat.g, flat.A, flat.b, flat.G, flat.h)  # curved: the optimum is one point
+    if verdict(qp) == "optimal":
+        assert np.allclose(active_set(qp).solution.x, solve(qp, "cvxpy").x, atol=1e-4)
+
+
+@given(st.integers(0, 10**9), st.integers(0, 10**9))
+@hypothesis_settings(max_examples=200)
+def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed: int, other: int) -> None:
+    qp, rng = random_qp(seed), np.random.default_rng(other)
+    if verdict(qp) != "optimal":
+        return
+    working = [name for name in qp.inequality_names if rng.random() < 0.4]
+    run = active_set(qp, 3.0 * rng.normal(size=qp.n), working)
+    check_optimum(run)
+    check_record(run)
+    assert run.solution.objective == pytest.approx(active_set(qp).solution.objective, rel=1e-8, abs=1e-8)
+
+
+# arguments -----------------------------------------------------------------------------------------------------------
+
+
+def test_arguments_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(InputError, match=r"start has shape \(3,\); it must have shape \(2,\)"):
+        active_set(table_top(), start=(0.0, 0.0, 0.0))
+    with pytest.raises(UnknownNameError, match="unknown inequality row 'tabel'; near names: table"):
+        active_set(table_top(), working=["tabel"])
+
+
+def test_a_run_is_a_value_and_the_same_every_time() -> None:
+    qp = DEGENERATE["a vertex of more rows than variables"]
+    first, second = active_set(qp, (-1.0, -2.0)), active_set(qp, (-1.0, -2.0))
+    assert [step.working for step in first.iterations] == [step.working for step in second.iterations]
+    assert np.array_equal(first.solution.x, second.solution.x)
+    assert not first.iterations[0].x.flags.writeable
+    assert not first.solution.x.flags.writeable

@@ -1,0 +1,285 @@
+"""Quadratic programs: solvers agree, answers prove themselves, infeasible problems say why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+
+import judges
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+import floatbase as fb
+from floatbase.errors import InfeasibleError, InputError, UnknownNameError
+from floatbase.qp import QP, Residuals, Solution, conflicting_rows, conflicts, solve, solvers
+
+seeds = st.integers(0, 100_000)
+
+
+def random_qp(rng: np.random.Generator, n: int, m: int, inequalities: int) -> QP:
+    """A strictly convex problem that has feasible points, some rows of which push at the optimum."""
+    root, inside = rng.normal(size=(n, n)), rng.normal(size=n)
+    A, G = rng.normal(size=(m, n)), rng.normal(size=(inequalities, n))
+    h = G @ inside + rng.uniform(0.0, 0.3, inequalities)
+    return QP(root @ root.T + 0.1 * np.eye(n), 3.0 * rng.normal(size=n), A, A @ inside, G, h)
+
+
+def empty(n: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.zeros((0, n)), np.zeros(0)
+
+
+def feasible(G: np.ndarray, h: np.ndarray) -> bool:
+    """By another linear program than the package's: no objective, the constraints as they stand."""
+    if not len(G):
+        return True
+    found = linprog(np.zeros(G.shape[1]), A_ub=G, b_ub=h, bounds=(None, None), method="highs")
+    return bool(found.status == 0)
+
+
+@given(seeds, st.integers(2, 8), st.integers(0, 3), st.integers(0, 12))
+def test_every_solver_gives_the_same_optimum_and_proves_it(seed: int, n: int, m: int, inequalities: int) -> None:
+    qp = random_qp(np.random.default_rng(seed), n, min(m, n - 1), inequalities)
+    found = {solver: solve(qp, solver) for solver in solvers()}
+    for solution in found.values():
+        r = solution.residuals
+        assert r.stationarity < 1e-5
+        assert r.equality < 1e-8
+        assert r.inequality < 1e-7
+        assert r.complementarity < 1e-5
+        assert r.dual == 0.0
+        assert np.allclose(solution.x, found["cvxpy"].x, atol=1e-5)
+        assert solution.objective <= found["cvxpy"].objective + 1e-6
+
+
+def test_rows_that_push_are_named_and_their_multipliers_say_what_room_is_worth() -> None:
+    """min ½‖x - (3, 1)‖² with x0 ≤ 1, x1 ≤ 5: the first row pushes with the force 2, the second is idle."""
+    qp = QP(np.eye(2), [-3.0, -1.0], *empty(2), np.eye(2), [1.0, 5.0], inequality_names=("left wall", "roof"))
+    for solver in solvers():
+        solution = solve(qp, solver)
+        assert np.allclose(solution.x, [1.0, 1.0], atol=1e-7)
+        assert solution.active == ("left wall",)
+        assert solution.multipliers["left wall"] == pytest.approx(2.0, abs=1e-5)
+        step = 1e-4
+        wider = QP(qp.H, qp.g, qp.A, qp.b, qp.G, qp.h + [step, 0.0])
+        assert (solution.objective - solve(wider, solver).objective) / step == pytest.approx(2.0, abs=1e-2)
+
+
+def test_equality_multipliers_balance_the_slope() -> None:
+    """min ½‖x‖² with x0 + x1 = 2: x = (1, 1), ν = -1."""
+    qp = QP(np.eye(2), np.zeros(2), [[1.0, 1.0]], [2.0], *empty(2))
+    for solver in solvers():
+        solution = solve(qp, solver)
+        assert np.allclose(solution.x, 1.0, atol=1e-7)
+        assert np.allclose(solution.equality_multipliers, -1.0, atol=1e-6)
+
+
+@given(seeds, st.integers(3, 8), st.integers(1, 3), st.integers(0, 2))
+def test_the_equality_space_holds_all_solutions_and_nothing_else(seed: int, n: int, rank: int, repeated: int) -> None:
+    rng = np.random.default_rng(seed)
+    rank = min(rank, n - 1)
+    A = rng.normal(size=(rank, n))
+    A = np.vstack([A, rng.normal(size=(repeated, rank)) @ A])  # rows that repeat others
+    x = rng.normal(size=n)
+    space = QP(np.eye(n), np.zeros(n), A, A @ x, *empty(n)).equality_space
+    assert space.n_in == n - rank
+    assert np.allclose(A @ space(rng.normal(size=n - rank)), A @ x, atol=1e-9)
+    beta = np.linalg.lstsq(space.A, x - space.b)[0]
+    assert np.allclose(space(beta), x, atol=1e-9)
+    assert np.allclose(space.A.T @ space.A, np.eye(n - rank), atol=1e-12)
+    assert np.allclose(space.b, np.linalg.pinv(A) @ A @ x, atol=1e-9)
+
+
+def test_equalities_that_leave_one_point_leave_nothing_to_choose() -> None:
+    qp = QP(np.eye(2), np.ones(2), np.eye(2), [1.0, 2.0], [[1.0, 0.0]], [5.0])
+    for solver in solvers():
+        assert np.allclose(solve(qp, solver).x, [1.0, 2.0], atol=1e-8)
+    tight = QP(np.eye(2), np.ones(2), np.eye(2), [1.0, 2.0], [[1.0, 0.0]], [0.5], inequality_names=("wall",))
+    for solver in solvers():
+        with pytest.raises(InfeasibleError, match="wall") as caught:
+            solve(tight, solver)
+        assert caught.value.rows == ("wall",)
+
+
+def test_a_single_point_on_a_wall_that_pushes_still_proves_itself() -> None:
+    qp = QP(np.eye(2), np.array([-3.0, 0.0]), np.eye(2), [1.0, 2.0], [[1.0, 0.0]], [1.0])
+    assert solve(qp).residuals.stationarity < 1e-9
+
+
+# residuals ---------------------------------------------------------------------------------------------------------------
+
+SQUARE = QP(np.eye(2), [-3.0, 0.0], [[0.0, 1.0]], [1.0], [[1.0, 0.0], [-1.0, 0.0]], [1.0, 4.0])
+
+
+def answer(x: list[float], nu: float, mu: list[float]) -> Residuals:
+    return Solution(SQUARE, np.array(x), np.array([nu]), np.array(mu), "by hand").residuals
+
+
+def test_an_optimum_found_by_hand_leaves_nothing() -> None:
+    assert answer([1.0, 1.0], -1.0, [2.0, 0.0]) == Residuals(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("residuals", "fields"),
+    [
+        (answer([1.0, 1.0], 0.0, [2.0, 0.0]), {"stationarity": 1.0}),
+        (answer([1.0, 1.5], -1.5, [2.0, 0.0]), {"equality": 0.5}),
+        (answer([1.5, 1.0], -1.0, [1.5, 0.0]), {"inequality": 0.5, "complementarity": 0.75}),
+        (answer([0.0, 1.0], -1.0, [3.0, 0.0]), {"complementarity": 3.0}),
+        (answer([1.0, 1.0], -1.0, [1.0, -1.0]), {"dual": 1.0, "complementarity": 5.0}),
+    ],
+)
+def test_each_residual_measures_its_own_mistake(residuals: Residuals, fields: dict[str, float]) -> None:
+    for name in ("stationarity", "equality", "inequality", "complementarity", "dual"):
+        assert getattr(residuals, name) == pytest.approx(fields.get(name, 0.0), abs=1e-12), name
+
+
+# infeasible problems ---------------------------------------------------------------------------------------------------------
+
+
+@given(seeds, st.integers(1, 3), st.integers(2, 8))
+def test_conflicting_rows_are_a_smallest_contradiction_as_brute_force_finds_them(seed: int, n: int, rows: int) -> None:
+    rng = np.random.default_rng(seed)
+    G, h = rng.normal(size=(rows, n)), rng.normal(size=rows) - 0.5
+    found = list(conflicting_rows(G, h))
+    if feasible(G, h):
+        assert found == []
+        return
+    assert found
+    assert not feasible(G[found], h[found])
+    smallest = [set(some) for size in range(1, n + 2) for some in combinations(range(rows), size) if is_smallest(G, h, some)]
+    assert set(found) in smallest
+
+
+def is_smallest(G: np.ndarray, h: np.ndarray, rows: tuple[int, ...]) -> bool:
+    """Contradictory together, satisfiable without any one of them."""
+    some = list(rows)
+    if feasible(G[some], h[some]):
+        return False
+    return all(feasible(G[[i for i in some if i != row]], h[[i for i in some if i != row]]) for row in some)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_conflicts_are_found_whatever_the_unit_of_the_rows(scale: float) -> None:
+    G = scale * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    h = scale * np.array([1.0, -2.0, 3.0, 100.0])  # x ≤ 1 and x ≥ 2
+    assert conflicting_rows(G, h) == (0, 1)
+
+
+def test_one_row_alone_can_be_impossible() -> None:
+    assert conflicting_rows(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([-1.0, 0.0])) == (0,)
+
+
+def test_rows_that_can_be_met_do_not_conflict() -> None:
+    assert conflicting_rows(np.zeros((0, 3)), np.zeros(0)) == ()
+    assert conflicting_rows(np.array([[1.0], [-1.0]]), np.array([1.0, -1.0])) == ()  # only just: x = 1
+
+
+@pytest.mark.parametrize("solver", solvers())
+def test_the_error_of_an_infeasible_problem_names_its_rows_and_says_what_to_do(solver: str) -> None:
+    G, h = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]]), np.array([1.0, -2.0, 3.0])
+    qp = QP(np.eye(2), np.zeros(2), *empty(2), G, h, inequality_names=("x ≤ 1", "x ≥ 2", "y ≤ 3"))
+    with pytest.raises(InfeasibleError) as caught:
+        solve(qp, solver)
+    assert caught.value.rows == ("x ≤ 1", "x ≥ 2")
+    assert "no point satisfies all rows" in str(caught.value)
+    assert "these contradict each other: x ≤ 1, x ≥ 2." in str(caught.value)
+    assert "Loosen or drop any one of them" in str(caught.value)
+
+
+def test_many_rows_in_conflict_are_grouped_by_kind_and_counted() -> None:
+    robot = judges.load("go2")
+    standing, contacts = robot.standing(), fb.Contacts.points(robot)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing), min_normal_force=2000.0)
+    with pytest.raises(InfeasibleError) as caught:
+        controller(standing.q, standing.v)
+    lines = str(caught.value).splitlines()
+    assert lines[0] == "no point satisfies all rows. Given the equalities, these contradict each other:"
+    assert lines[1] == "  4 × normal force: FL_foot, FR_foot, RL_foot, RR_foot"
+    assert lines[-1] == "Loosen or drop any one of them: at least one has to go."
+    counted = [line.split(" × ") for line in lines[1:-1]]
+    assert sum(int(count) for count, _ in counted) == len(caught.value.rows) == sum(line.count(",") + 1 for line in lines[1:-1])
+    upper = [name for name in robot.joint_names if f"torque limit {name} upper" in caught.value.rows]
+    assert f"  {len(upper)} × upper torque limit: {', '.join(upper)}" in lines
+    mixed = conflicts.contradiction(["FL_foot facet 2", "x is 1", "FL_foot facet 3", "a", "b"])
+    assert str(mixed).splitlines()[1:3] == [
+        "  2 × friction: FL_foot facet 2, FL_foot facet 3",
+        "  3 × other rows: x is 1, a, b",
+    ]
+
+
+@pytest.mark.parametrize("solver", solvers())
+def test_equalities_that_contradict_each_other_are_named(solver: str) -> None:
+    A = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]])
+    qp = QP(np.eye(3), np.zeros(3), A, [1.0, 5.0, 3.0], *empty(3), equality_names=("a", "b", "c"))
+    with pytest.raises(InfeasibleError, match=r"these equality rows contradict each other: a, c\.") as caught:
+        solve(qp, solver)
+    assert caught.value.rows == ("a", "c")
+
+
+def test_equalities_that_repeat_each_other_are_no_contradiction() -> None:
+    A = np.array([[1.0, 0.0], [2.0, 0.0]])
+    for solver in solvers():
+        assert np.allclose(solve(QP(np.eye(2), np.zeros(2), A, [1.0, 2.0], *empty(2)), solver).x, [1.0, 0.0], atol=1e-7)
+
+
+# bad input ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: QP(np.eye(3), np.zeros(2), *empty(2), *empty(2)), r"H has shape \(3, 3\); it must have shape \(2, 2\)"),
+        (lambda: QP(np.eye(2), np.zeros(2), *empty(3), *empty(2)), r"A has shape \(0, 3\); it must have shape \(any, 2\)"),
+        (lambda: QP(np.eye(2), np.zeros(2), np.eye(2), [1.0], *empty(2)), r"b has shape \(1,\); .* \(2,\)"),
+        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), [1.0]), r"h has shape \(1,\); .* \(2,\)"),
+        (lambda: QP(np.eye(2), [0.0, np.nan], *empty(2), *empty(2)), r"g holds nan at index \[1\]"),
+        (lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]), r"h holds inf at index \[0\]"),
+        (
+            lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [1.0, 1.0], inequality_names=("a",)),
+            "1 inequality names for 2 rows; give one for each row, or none at all",
+        ),
+        (lambda: solve(SQUARE)["torques"], "this problem has no block 'torques'"),
+    ],
+)
+def test_problems_that_do_not_fit_together_are_refused(make: Callable[[], object], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        make()
+
+
+def test_an_unknown_solver_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(UnknownNameError, match="unknown solver 'osqp'; .*daqp"):
+        solve(SQUARE, "osqp")
+
+
+def test_a_cost_that_curves_downwards_is_no_quadratic_program() -> None:
+    """DAQP must not return a point for min -½x² on -1 ≤ x ≤ 2."""
+    from floatbase.errors import FloatbaseError
+
+    qp = QP([[-1.0]], [0.0], *empty(1), [[1.0], [-1.0]], [2.0, 1.0])
+    for solver in solvers():
+        with pytest.raises(FloatbaseError):
+            solve(qp, solver)
+
+
+def test_a_cost_without_a_lowest_point_is_an_error_and_no_answer() -> None:
+    from floatbase.errors import FloatbaseError
+
+    qp = QP(np.zeros((1, 1)), [1.0], *empty(1), [[1.0]], [2.0])
+    for solver in solvers():
+        with pytest.raises(FloatbaseError):
+            solve(qp, solver)
+
+
+def test_states_of_the_catalogue_give_problems_whose_equalities_have_solutions() -> None:
+    import floatbase as fb
+
+    for name in judges.ROBOTS:
+        robot = judges.load(name)
+        controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+        for state in judges.states(name, 3):
+            qp = controller.qp(state)
+            space = qp.equality_space
+            assert np.max(np.abs(qp.A @ space(np.ones(space.n_in)) - qp.b)) < 1e-9 * (1.0 + np.max(np.abs(qp.b)))
