@@ -16,14 +16,14 @@ Symbols
     J, b, A     Jacobian of the contact points (k, nv); A q̈ = b, with A (m, nv): the motion that contacts allow         (5)-(7)
     ζ, η        affine maps τ -> λ (9) and τ -> q̈ (14)
     C, B        matrices of (10) and (12); β: coordinates of their null spaces, (11) (13) (17)
-    G_f, G_τ    net force and net moment about the centre of mass of the contact forces                                 (20) (21)
+    G_f, G_τ    net force and net moment about the centre of mass of the contact forces                               (20) (21)
     μ           friction coefficient; also the multipliers of inequality rows, where a quadratic program is solved
     H, g, c     the cost ½ xᵀ H x + gᵀ x + c; rows A x = b and G x ≤ h of a quadratic program
 
 Frames and order
 ----------------
 The world's z axis points up. Twists and wrenches have the linear part first, then the angular part. Contact Jacobians, forces
-and drifts are in world axes at the contact point. Velocities of frames (`State.frame_velocity`) are in world axes at the frame's
+and drifts are in world axes at the contact point. Velocities of frames (`State.frame_velocity`) are in world axes at its
 origin. The base velocity inside v is the exception: it is in the base frame, as in Pinocchio. Quaternions are x y z w. Rotation
 matrices take vectors of the frame to the world. A frame that could be doubted stands in the name: `p_world`, `J_foot_world`.
 
