@@ -1,15 +1,10 @@
-"""What runs, stores, maps and publishes the lessons."""
+"""What runs, stores, maps and publishes the lessons: `python -m floatbase.lessons.publish`.
 
-from floatbase.lessons.publish.notebooks import FOLDER, execute, read, run, solved, without_outputs
-from floatbase.lessons.publish.workspace import MINE, prepare
+`pages` and `prose` are imported by name: they need the extra `pages`.
+"""
 
-__all__ = [
-    "FOLDER",
-    "MINE",
-    "execute",
-    "prepare",
-    "read",
-    "run",
-    "solved",
-    "without_outputs",
-]
+from floatbase.lessons.publish.contents import lesson_table, title_of
+from floatbase.lessons.publish.notebooks import execute, read, run, solved
+from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare, without_outputs
+
+__all__ = ["FOLDER", "MINE", "execute", "lesson_table", "prepare", "read", "run", "solved", "title_of", "without_outputs"]
