@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, Torques, joint_servo
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, all_exercises, check, numbers, reveal, show_progress
 
@@ -13,7 +14,7 @@ _PANELS = ("SliderPanel", "live", "push_panel", "slider_panel")  # imported at f
 
 __all__ = [
     "ConstantTorques", "Exercise", "Numeric", "Shaped", "SliderPanel", "Torques", "Verdict", "all_exercises", "check",
-    "joint_servo", "live", "numbers", "push_panel", "reveal", "show_progress", "slider_panel",
+    "joint_servo", "live", "numbers", "progress", "push_panel", "reveal", "show_progress", "slider_panel",
 ]  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from floatbase.errors import InputError
-from floatbase.lessons.publish import FOLDER, prepare, run
+from floatbase.lessons.publish import FOLDER, README, prepare, readme_with_table, run
 
 PAGES = Path("build/pages")
 
@@ -47,11 +47,10 @@ def _run(lessons: Sequence[Path]) -> None:
 
 
 def _map() -> None:
-    from floatbase.lessons.publish import contents, equations
+    from floatbase.lessons.publish import equations
 
     (FOLDER / "equations.md").write_text(equations.table(), encoding="utf-8")
-    text = contents.README.read_text(encoding="utf-8")
-    contents.README.write_text(contents.readme_with_table(text), encoding="utf-8")
+    README.write_text(readme_with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def _pages(sources: Sequence[Path], folder: Path) -> None:
