@@ -45,7 +45,7 @@ help:
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
 
 lab: setup
-	@$(BIN)/python -m floatbase.lessons.publish.workspace
+	@$(BIN)/python -m floatbase.lessons.publish workspace
 	@mkdir -p $(SETTINGS) && echo '$(SAVING)' > $(SETTINGS)/overrides.json
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
 		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
@@ -56,7 +56,7 @@ test: setup
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 pages: setup
-	$(BIN)/python -m floatbase.lessons.publish.pages $(PAGES_ARGS)
+	$(BIN)/python -m floatbase.lessons.publish pages $(PAGES_ARGS)
 
 setup: $(VENV)/ready-$(KEY)
 
