@@ -242,7 +242,7 @@ class Viewer:
 
     def static_html(self, title: str | None = None) -> str:
         """The scene as it is now, as a page that needs neither server nor network."""
-        return page.file_page(self.window.scene.lasting(), title or self.robot.name)
+        return page.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
     def slider(
         self, name: str, changed: Callable[[float], None], value: float, low: float, high: float, step: float = 0.01

@@ -320,7 +320,7 @@ def test_controls_in_the_page_call_back(page, viewer: Viewer, standing: State) -
             break
         page.wait_for_timeout(20)
     assert heard == [0.9, "pushed"]
-    assert b"set_control" not in b"".join(viewer.window.scene.lasting())
+    assert b"set_control" not in b"".join(viewer.window.scene.file_commands())
 
 
 def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
