@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import time
+from collections.abc import Callable
 
 import numpy as np
 from browsers import SCREENSHOTS
@@ -12,7 +14,7 @@ from floatbase.viewer import Viewer, Window, wire
 
 SIZE = {"width": 900, "height": 600}
 SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
-CONTEXTS = 6  # WebGL contexts of the tests' browser: an ordinary one has 16, which take many displays to use up
+CONTEXTS = 4  # WebGL contexts of the tests' browser: an ordinary one has 16, which take many displays to use up
 
 # world position of a node, in our coordinates
 WHERE = """(path) => {
@@ -22,6 +24,16 @@ WHERE = """(path) => {
 }"""
 EYE = "viewer.camera.position.toArray()"
 DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render"
+
+PATIENCE = 60.0  # s for what takes a moment on an idle machine: no test may fail because others keep the machine busy
+
+
+def until(true: Callable[[], bool]) -> None:
+    """Wait until it is true."""
+    deadline = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < deadline, "it has not come true"
+        time.sleep(0.01)
 
 
 def settle(page, title: str | None = None) -> None:
