@@ -4,9 +4,9 @@ Needs the packages trimesh, pycollada and fast-simplification. Reading the resul
 
 It loads the visuals of a robot's URDF material by material, welds them, decimates them to a number of faces for the whole
 robot, splits them at creases so that edges look sharp, and merges them into one mesh with coloured vertices for each joint.
-The file `assets/meshes/<robot>.npz` contains, for part i: `joints[i]`, its joint's name; rows `vertex_start[i]:vertex_start[i + 1]` of
-`vertices` (int16, times `steps[i]` metres, in the joint's frame) and of `colours` (index into `palette`, 0-255); rows
-`face_start[i]:face_start[i + 1]` of `faces` (index into the part's own vertices).
+The file `assets/meshes/<robot>.npz` contains, for part i: `joints[i]`, its joint's name; rows
+`vertex_start[i]:vertex_start[i + 1]` of `vertices` (int16, times `steps[i]` metres, in the joint's frame) and of `colours`
+(index of `palette`, 0-255); rows `face_start[i]:face_start[i + 1]` of `faces` (indices of the part's own vertices).
 """
 
 from __future__ import annotations
@@ -56,13 +56,13 @@ def lighten(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
         points, triangles = fast_simplification.simplify(
             mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32), target_count=faces, agg=7
         )
-        mesh = trimesh.Trimesh(np.clip(points, *mesh.bounds), triangles)  # decimation may move a vertex out of the original's box
+        mesh = trimesh.Trimesh(np.clip(points, *mesh.bounds), triangles)  # back into the original's box
     mesh.update_faces(mesh.nondegenerate_faces())
     return trimesh.graph.smooth_shade(mesh, angle=CREASE) if len(mesh.faces) else mesh
 
 
 def merge(pieces: list[Light], palette: list[bytes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, m, faces, and colours as indices of the palette, of the pieces of one joint. Adds new colours to the palette."""
+    """Vertices, m, faces and palette indices of the pieces of one joint. Adds new colours to the palette."""
     vertices, faces, colours, start = [], [], [], 0
     for colour, mesh in pieces:
         code = np.clip(np.round(255 * colour), 0, 255).astype(np.uint8).tobytes()
