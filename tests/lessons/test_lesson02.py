@@ -73,7 +73,7 @@ def test_the_equation_is_drawn_and_the_collapse_is_played(go2: Robot) -> None:
     states = lesson02.collapse(state, contacts, motion, True, 0.02)
     view = fb.Viewer(go2)
     try:
-        assert "with b" in str(lesson02.play_collapse(view, states, states, contacts, 0.02).window.scene.lasting())
+        assert "with b" in str(lesson02.play_collapse(view, states, states, contacts, 0.02).window.scene.file_commands())
     finally:
         view.close()
     axis = lesson02.plot_strayed({"a": lesson02.strayed(states, contacts)}, 0.02)
@@ -102,7 +102,7 @@ def test_the_arm_without_its_drift_leaves_and_both_are_played() -> None:
     assert lesson02.tool_path(record)[-1] > 1.0
     view = fb.Viewer(arm)
     try:
-        drawn = str(lesson02.play_tools(view, record, record).window.scene.lasting())
+        drawn = str(lesson02.play_tools(view, record, record).window.scene.file_commands())
         assert "with b" in drawn
         assert "way" in drawn
     finally:

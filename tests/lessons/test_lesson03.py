@@ -171,7 +171,7 @@ def test_the_veil_of_a_motion_is_not_called_a_posture() -> None:
     view = fb.Viewer(GO2)
     try:
         show_beta(view, space, standing_still(space) + 5.0)
-        drawn = str(view.window.scene.lasting())
+        drawn = str(view.window.scene.file_commands())
     finally:
         view.close()
     assert "leads in a quarter" in drawn and "posture" not in drawn
