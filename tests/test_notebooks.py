@@ -40,9 +40,10 @@ def ids(path: Path) -> str:
 def nbval(path: Path, home: Path) -> str:
     """Run a lesson by nbval, for a learner whose home is `home`; what it printed."""
     # pytest's other plugins take as long to load as a lesson takes to run
-    command = [sys.executable, *"-m pytest -p nbval.plugin --nbval -q -p no:cacheprovider -c".split(), os.devnull]
+    options = ["-p", "nbval.plugin", "--nbval", "-q", "-p", "no:cacheprovider", "-c", os.devnull]
     environment = {**os.environ, MARK: str(os.getpid()), "FLOATBASE_HOME": str(home), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    done = subprocess.run([*command, str(path)], capture_output=True, text=True, cwd=path.parent, timeout=200, env=environment)
+    command = [sys.executable, "-m", "pytest", *options, str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=path.parent, timeout=200, env=environment)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
     return done.stdout
 
