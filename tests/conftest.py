@@ -12,7 +12,8 @@ import hypothesis
 import numpy as np
 import pytest
 
-SLOWEST = ("test_lab", "test_notebooks", "test_displays", "test_main")  # started first, so that no worker ends with one alone
+# started first, so that no worker is left alone with one of them at the end
+SLOWEST = ("test_lab", "test_notebooks", "test_browser", "test_displays", "test_main")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices of 30 rows: more threads only wait for one another
