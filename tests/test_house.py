@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import inspect
 import json
-from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -57,10 +56,6 @@ def said(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def module_of(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-
-
 def floor(path: Path) -> int:
     return HEIGHT[path.relative_to(PACKAGE).parts[0].removesuffix(".py")]
 
@@ -80,44 +75,32 @@ def parsed(path: Path) -> ast.Module:
 
 
 @cache
-def imports(path: Path) -> tuple[Import, ...]:
+def imports(path: Path) -> list[Import]:
     """All imports from the package that happen when the program runs, inside functions too."""
-    return tuple(found for found in _imports(parsed(path), path) if found.module.split(".")[0] == "floatbase")
-
-
-def _imports(node: ast.AST, path: Path) -> Iterator[Import]:
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
-            for other in child.orelse:
-                yield from _imports(other, path)
-        elif isinstance(child, ast.Import):
-            yield from (Import(child.lineno, alias.name, None) for alias in child.names)
-        elif isinstance(child, ast.ImportFrom):
-            for alias in child.names:
-                assert not child.level or path not in MODULES, f"{said(path)}:{child.lineno} imports by dots, not by name"
+    blocks = [node for node in ast.walk(parsed(path)) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)]
+    for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
+    found = []
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Import) and node not in for_types:
+            found += [Import(node.lineno, alias.name, None) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node not in for_types:
+            assert not node.level or path not in MODULES, f"{said(path)}:{node.lineno} imports by dots, not by name"
+            for name in [alias.name for alias in node.names]:
                 # `from floatbase import viewer` is the module behind the word import, `from floatbase import Viewer` is a name
-                named = f"{child.module}.{alias.name}"
-                is_module = file_of(named) is not None
-                yield Import(child.lineno, named if is_module else str(child.module), None if is_module else alias.name)
-        else:
-            yield from _imports(child, path)
+                inner, outer = f"{node.module}.{name}", str(node.module)
+                found.append(Import(node.lineno, inner, None) if file_of(inner) else Import(node.lineno, outer, name))
+    return [one for one in found if one.module.split(".")[0] == "floatbase"]
 
 
-def circles(graph: dict[str, set[str]]) -> list[frozenset[str]]:
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
     """Sets of files that reach one another."""
-
-    def reached(start: str) -> set[str]:
-        found: set[str] = set()
-        todo = list(graph[start])
-        while todo:
-            node = todo.pop()
-            if node not in found:
-                found.add(node)
-                todo += graph[node]
-        return found
-
-    reach = {node: reached(node) for node in graph}
-    return list({frozenset(other for other in reach[node] if node in reach[other]) for node in graph if node in reach[node]})
+    reach = {node: set(targets) for node, targets in graph.items()}
+    for middle in graph:  # Warshall: whoever reaches the middle reaches what the middle reaches
+        for found in reach.values():
+            if middle in found:
+                found |= reach[middle]
+    rings = {frozenset(other for other in reach[node] if node in reach[other]) for node in graph}
+    return [set(ring) for ring in rings if ring]
 
 
 def test_every_room_has_a_floor() -> None:
