@@ -29,6 +29,9 @@ def cost_on_space(
     """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β.
 
     A cost on all three at once is moved by `cost.pullback(space.map)`.
+
+    space: β -> (q̈, τ, λ), as from `feasible_space`.
+    qdd, tau, forces: costs on vectors of shape (nv,), (d,) and (k,).
     """
     total = Quadratic.zero(space.dimension)
     for cost, part in ((qdd, space.qdd), (tau, space.tau), (forces, space.forces)):

@@ -19,8 +19,6 @@ ALL = fb.Contacts.points(GO2)
 @pytest.mark.parametrize(
     ("make", "kind", "text"),
     [
-        (lambda: fb.Contacts([]), InputError, r"no contacts given; use fb\.Contacts\.none\(\) when the robot really touches"),
-        (lambda: ALL.only(), InputError, r"no contacts given; use fb\.Contacts\.none\(\)"),
         (lambda: fb.Contacts.points(UR5), InputError, r'ur5 has no feet; name the frames that touch: frames=\["…"\]'),
         (lambda: fb.Contacts.points(GO2, mu=0.0), InputError, "coefficient mu of FL_foot is 0; it must be > 0"),
         (lambda: fb.Contacts.points(GO2, mu=-0.5), InputError, "coefficient mu of FL_foot is -0.5; it must be > 0"),

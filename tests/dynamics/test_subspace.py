@@ -323,16 +323,18 @@ def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_t
         assert np.allclose(found, given, atol=1e-12)
 
 
-def test_contacts_whose_forces_push_where_nothing_is_kept_are_refused() -> None:
-    """A thruster is no contact: the rows must keep what the forces push along."""
+def test_contacts_whose_forces_act_where_nothing_is_held_are_refused() -> None:
+    """A thruster is no contact: the rows must hold what the forces act along."""
 
     class Thruster(PointContact):
+        J_is_A = False
+
         def constraint(self, state: fb.State, t: float = 0.0) -> tuple[Array, Array]:
             A, b = super().constraint(state, t)
             return A[:2], b[:2]
 
     state = judges.load("go2").standing()
-    with pytest.raises(fb.FloatbaseError, match="forces push along motions that the contacts do not keep"):
+    with pytest.raises(fb.FloatbaseError, match="forces act along motions that the contacts do not hold"):
         dynamics.feasible_space(fb.equations_of_motion(state, fb.Contacts([Thruster("FL_foot", radius=0.022)])))
 
 

@@ -142,7 +142,7 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_wanted(name: 
     for state in judges.states(name, 3):
         contacts = judges.stance(state.robot)
         a, spin = rng.normal(size=3), rng.normal(size=3)
-        cost = objectives.wrench_objective(state, contacts, *objectives.wanted_wrench(state, a, spin))
+        cost = objectives.wrench_objective(state, contacts, *objectives.desired_wrench(state, a, spin))
         forces = cost.minimiser()
         assert cost(forces) < 1e-12 * state.robot.weight**2
         rate = momentum_rate(state, contacts, forces, np.zeros(state.robot.d))
@@ -152,7 +152,7 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_wanted(name: 
 
 def test_standing_still_wants_the_weight_upwards_and_no_moment(name: str) -> None:
     state = judges.load(name).standing()
-    force, moment = objectives.wanted_wrench(state, np.zeros(3))
+    force, moment = objectives.desired_wrench(state, np.zeros(3))
     assert np.allclose(force, [0.0, 0.0, 9.81 * mass_of_links(state)])
     assert np.array_equal(moment, np.zeros(3))
 
@@ -263,13 +263,13 @@ def test_with_the_bias_the_forces_of_a_wanted_wrench_are_unique_and_cvxpys() -> 
     """(22) + w (23): what §3.1.1 is for. Without the bias six directions cost nothing."""
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, normals=LEAN)
-    wrench = objectives.wrench_objective(state, contacts, *objectives.wanted_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2]))
+    wrench = objectives.wrench_objective(state, contacts, *objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2]))
     assert np.linalg.matrix_rank(wrench.H) == 6
     cost = wrench + 0.1 * objectives.force_bias(contacts, 0.5, 30.0)
     assert np.linalg.eigvalsh(cost.H)[0] > 1e-3
     x = cp.Variable((4, 3))
     points = contacts.positions(state)
-    force, moment = objectives.wanted_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
+    force, moment = objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
     terms = [0.5 * cp.sum_squares(cp.sum(x, axis=0) - force)]
     terms.append(0.5 * cp.sum_squares(sum(pin.skew(p - state.com) @ x[i] for i, p in enumerate(points)) - moment))
     for i, n in enumerate(LEAN):
@@ -422,7 +422,7 @@ def test_other_values_that_do_not_fit_are_named() -> None:
     with pytest.raises(fb.FloatbaseError, match=r"force has shape \(2,\); it must have shape \(3,\) \(N\)"):
         objectives.wrench_objective(state, contacts, [1.0, 2.0], np.zeros(3))
     with pytest.raises(fb.FloatbaseError, match=r"com_acceleration has shape \(2,\)"):
-        objectives.wanted_wrench(state, [0.0, 0.0])
+        objectives.desired_wrench(state, [0.0, 0.0])
     found = objectives.torque_for_forces(fb.equations_of_motion(state, contacts))
     for call in (found.gap, found.nearest):
         with pytest.raises(fb.FloatbaseError, match=r"forces has shape \(9,\); it must have shape \(12,\)"):

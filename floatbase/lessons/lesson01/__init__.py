@@ -2,14 +2,11 @@
 
 from floatbase.lessons.lesson01.pictures import (
     EXERCISES,
-    PLATE,
     PRESSING,
     PRESSING_VIEW,
     Torques,
     base_turn,
     joint_servo,
-    momentum,
-    momentum_rate,
     play_floating,
     play_pressing,
     pressing_panel,
@@ -17,10 +14,11 @@ from floatbase.lessons.lesson01.pictures import (
     stance_panel,
     thruster_panel,
     turn,
-    unbolted,
     wave,
     weightless,
 )
+from floatbase.objectives import momentum, momentum_rate
+from floatbase.robots import PLATE, unbolted
 
 __all__ = [
     "EXERCISES",

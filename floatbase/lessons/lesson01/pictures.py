@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import ipywidgets as widgets
@@ -19,41 +16,15 @@ import floatbase as fb
 from floatbase._arrays import Array, read_only
 from floatbase.dynamics import fixed_frame
 from floatbase.lessons import Exercise, Numeric, Shaped, Verdict, numbers, slider_panel
-from floatbase.objectives import Task
-from floatbase.robots import Foot, Robot
+from floatbase.objectives import Task, momentum_rate
+from floatbase.robots import PLATE, Robot, unbolted
 from floatbase.simulation import Rollout
 from floatbase.viewer import MEASURED, Item, Picture, View, Viewer, below, marks, props, recording, shapes
 
 PRESSING = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
-PLATE = (0.4, 0.03)  # width and thickness, m, of the plate that the arm without bolts stands on
-_FLIGHT_HEIGHT = 1.0  # m: where the arm without a plate floats
-_HOUSE = tempfile.TemporaryDirectory(prefix="floatbase-")  # goes when Python ends
 
 
 # robots -----------------------------------------------------------------------------------------------------------------
-
-
-def unbolted(arm: Robot, plate: bool = False) -> Robot:
-    """The arm of the same URDF with its base free to move: the links and joints are the same, the bolts are gone.
-
-    plate: let it stand on a square plate that has no weight, see `PLATE`; else it touches nothing and floats 1 m up.
-    """
-    root = ElementTree.parse(arm.urdf).getroot()
-    for kind, name in (("link", "world"), ("joint", "world_joint")):  # what the URDF bolts the arm with
-        for element in root.findall(kind):
-            if element.get("name") == name:
-                root.remove(element)
-    urdf = Path(_HOUSE.name) / f"{arm.name}.urdf"
-    urdf.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
-    half, thick = 0.5 * PLATE[0], PLATE[1]
-    corners = np.array([[x, y, -thick] for x, y in ((half, half), (half, -half), (-half, -half), (-half, half))])
-    return fb.load_urdf(
-        urdf,
-        name=arm.name,
-        feet=[Foot("base_link", corners=corners)] if plate else [],
-        torque_limits=arm.torque_limits,
-        posture=np.concatenate([[0.0, 0.0, thick if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0], arm.posture]),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,20 +81,6 @@ def weightless(robot: Robot) -> fb.Simulation:
     sim = fb.Simulation(robot)
     sim.model.opt.gravity[:] = 0.0
     return sim
-
-
-def momentum(state: fb.State) -> Array:
-    """Linear momentum, kg·m/s, and angular momentum about the centre of mass, kg·m²/s, world; shape (6,)."""
-    model = state.robot.model
-    found = pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v)
-    return read_only(np.concatenate([found.linear, found.angular]))
-
-
-def momentum_rate(state: fb.State, qdd: npt.ArrayLike) -> Array:
-    """Time derivative of `momentum` when the robot accelerates with q̈, shape (nv,); N and N·m, shape (6,)."""
-    model = state.robot.model
-    rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, np.array(qdd))
-    return read_only(np.concatenate([rate.linear, rate.angular]))
 
 
 def base_turn(record: Rollout) -> Array:
