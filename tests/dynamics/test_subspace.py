@@ -19,7 +19,7 @@ import scipy.linalg
 
 import floatbase as fb
 from floatbase import dynamics, linear_algebra
-from floatbase.dynamics import EquationsOfMotion, FlatFootContact, PointContact, fixed_frame
+from floatbase.dynamics import EquationsOfMotion, PointContact, fixed_frame
 from floatbase.robots import Foot
 
 Array = npt.NDArray[np.float64]
