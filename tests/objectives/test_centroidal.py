@@ -16,7 +16,7 @@ from floatbase.affine import Quadratic
 from floatbase.dynamics import EquationsOfMotion, fixed_frame
 
 Array = npt.NDArray[np.float64]
-TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12, "max_iter": 200}
+TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
 LEAN = judges.random_normals(4, 5)
 
 
