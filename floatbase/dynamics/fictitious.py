@@ -79,8 +79,8 @@ def inertia_rate(state: State) -> Array:
 def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
     """App. A: vᵀ (Ṁ - 2 C) v, W, which is zero: fictitious forces do no net work.
 
-    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f is left. Ṁ comes
-    from central differences of M along the motion, which know nothing of C; they leave about 1e-9 of the two terms.
+    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f remains. Ṁ
+    comes from central differences of M along the motion, which know nothing of C; their error is about 1e-9 of the two terms.
 
     C: shape (nv, nv), the matrix to try, `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
     """

@@ -55,8 +55,7 @@ def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
     """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
-    pairs = _pairs(eom, contact_space(eom))
-    return _orthonormal(Affine.stack(tau=pairs["tau"], forces=pairs["forces"]))
+    return _orthonormal(_pairs(eom, contact_space(eom)))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -69,7 +68,7 @@ def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 class FeasibleSpace:
     """(13)(16)(17) All (q̈, τ, λ) that satisfy (7), as the map β -> v + V⊥ β with orthonormal V⊥.
 
-    map: `Affine` with blocks "qdd", "tau", "forces". Source: the document, §2.2.2.
+    eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: the document, §2.2.2.
     """
 
     eom: EquationsOfMotion
@@ -110,7 +109,7 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     """(13) The space of all motions that the robot and its contacts allow at this state: v + V⊥ β.
 
     The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the resolved part
-    of the contacts (`contact_space`), which gives the same space as the SVD of B, and a sane one where J nearly loses rank.
+    of the contacts (`contact_space`): the same space as by the SVD of B, and one of bounded numbers where J nearly loses rank.
     """
     pairs = _pairs(eom, contact_space(eom))
     qdd = _motion_of(eom, pairs["tau"], pairs["forces"])
@@ -138,9 +137,12 @@ def undetermined_forces(eom: EquationsOfMotion) -> Array:
 class Dimensions:
     """Sizes, ranks and dimensions of (7) at one state, by singular values.
 
-    d, k, nv: lengths of τ, λ, q̈. rank_J, rank_J_base: of J and of its base columns. null_B, null_C: dimensions of the null
-    spaces of (12) and (10), both d + k - rank J. internal: of null(J_bᵀ), of which torques choose internal - undetermined.
-    undetermined: of null(Jᵀ). rank_V_qdd: how many of the directions of β move the robot at all: d - rank J + rank J_b.
+    nv, d, k: lengths of q̈, τ, λ.
+    rank_J, rank_J_base: ranks of J and of its base columns J_b.
+    null_B, null_C: dimensions of the null spaces of (12) and (10), both d + k - rank J.
+    internal: dimension of null(J_bᵀ), of which torques choose internal - undetermined.
+    undetermined: dimension of null(Jᵀ).
+    rank_V_qdd: how many of the directions of β move the robot at all: d - rank J + rank J_b.
     """
 
     nv: int
@@ -159,12 +161,12 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Counts every dimension of §2.2 at this state.
 
     The rank of J is decided once (`contact_space`). B and C are then counted, each by its own singular values, with the
-    resolved rows and forces in place of A and J, whose r numbers say the same; null(Jᵀ) comes on top.
+    resolved rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
     space = contact_space(eom)
-    push = np.linalg.qr(eom.J.T @ space.lift)[0]
-    B = np.block([[eom.M, -eom.S, -push], [space.rows, np.zeros((space.r, eom.d + space.r))]])
-    C = space.rows @ np.linalg.solve(eom.M, np.hstack([eom.S, push]))
+    reactions = np.linalg.qr(eom.J.T @ space.lift)[0]
+    B = np.block([[eom.M, -eom.S, -reactions], [space.rows, np.zeros((space.r, eom.d + space.r))]])
+    C = space.rows @ np.linalg.solve(eom.M, np.hstack([eom.S, reactions]))
     free = eom.k - space.r
     return Dimensions(
         nv=eom.nv,

@@ -20,7 +20,6 @@ from floatbase.objectives.pullback import (
     best_coordinates,
     cost_on_space,
     cost_on_torques,
-    minimise_on,
     pullback,
     seen_from_best,
     seen_from_smallest,
@@ -42,7 +41,7 @@ from floatbase.objectives.tasks import (
 __all__ = [
     "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask", "Task", "TorqueForForces", "TorqueTask",
     "best_coordinates", "com_wrench", "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "force_sum",
-    "grasp_matrix", "minimise_on", "moment_sum", "momentum", "momentum_rate", "nearest_rotation", "normal_bias", "pullback",
+    "grasp_matrix", "moment_sum", "momentum", "momentum_rate", "nearest_rotation", "normal_bias", "pullback",
     "rotational_inertia", "seen_from_best", "seen_from_smallest", "smallest_coordinates", "standing_tasks", "tangential_bias",
     "torque_for_forces", "wrench_objective",
 ]

@@ -25,7 +25,7 @@ from floatbase.robots import State, check_unit_lengths
 
 Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 _ZERO3 = (0.0, 0.0, 0.0)
-_ROTATION_TOLERANCE = 1e-6  # R Rᵀ - 1 of matrices printed with seven digits or kept as float32 is below
+_ROTATION_TOLERANCE = 1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
 _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 
 
@@ -269,7 +269,7 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
     """The tasks that keep a robot where `state` has it: centre of mass, base orientation, posture.
 
     To go elsewhere, replace the centre of mass's target, and mind the posture: its weight, 0.1, holds the joints back. go2
-    asked to go 30 mm to the left ends 12 mm short; with a posture task of weight 1e-3 it ends within 1 mm.
+    with a target 30 mm to the left ends 12 mm short; with a posture task of weight 1e-3 it ends within 1 mm.
     """
     if not isinstance(state, State):
         raise InputError(f"standing_tasks needs a State, as robot.standing(), not {type(state).__name__}.")

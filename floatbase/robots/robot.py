@@ -142,7 +142,7 @@ class Robot:
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
-        """Names of all frames that can be asked for: bodies, joints and fixed frames."""
+        """Names of all frames: bodies, joints and fixed frames."""
         return tuple(str(f.name) for f in self.model.frames if f.name != "universe")
 
     @cached_property
@@ -198,7 +198,7 @@ class Robot:
         """A random state around standing, the same for the same seed.
 
         spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with
-        that deviation in rad/s and m/s. Joint limits are kept.
+        that deviation in rad/s and m/s. Joints stay within their limits.
         """
         from floatbase.robots.state import State
 

@@ -13,7 +13,7 @@ from floatbase.robots.state import State
 
 _TOLERANCE = 1e-11  # m and rad: a hundred roundings of a robot of 1 m
 _STEPS = 50  # ten do from any posture that stands nearly
-_LARGEST_STEP = 0.2  # m and rad: keeps Gauss-Newton where its Jacobian holds
+_LARGEST_STEP = 0.2  # m and rad: Gauss-Newton's Jacobian is good that far
 
 
 def stand(robot: Robot, height: float | None = None) -> State:
@@ -56,10 +56,10 @@ def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Arr
     J_base = np.eye(state.robot.nv)[:6]
     errors += list(pin.log3(posture.frame_pose("base").rotation.T @ R))
     rows += list(J_base[3:])
-    place = state.q[:3] - posture.q[:3] if height is None else state.q[:3] - [*posture.q[:2], height]
-    kept = 2 if height is None else 3
-    errors += list(place[:kept])
-    rows += list((R @ J_base[:3])[:kept])
+    offset = state.q[:3] - [*posture.q[:2], 0.0 if height is None else height]
+    fixed = 2 if height is None else 3
+    errors += list(offset[:fixed])
+    rows += list((R @ J_base[:3])[:fixed])
     return np.array(errors), np.array(rows)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cvxpy as cp
 import judges
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +14,6 @@ from floatbase.dynamics import EquationsOfMotion, fixed_frame
 
 Array = npt.NDArray[np.float64]
 BLOCKS = ("qdd", "tau", "forces")
-TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9, "max_iter": 200}
 
 
 def eom_of(name: str, feet: int, seed: int | None = None) -> EquationsOfMotion:
@@ -268,16 +266,6 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
         beta = objectives.best_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)
         assert np.allclose(N.T @ (space.forces(beta) - wanted), 0.0, atol=1e-3), weight
-
-
-def test_minimising_on_a_subspace_is_what_cvxpy_finds_there() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        A, r = rng.normal(size=(9, 7)), rng.normal(size=9)
-        line = Affine(rng.normal(size=(7, 3)), rng.normal(size=7))
-        x, beta = cp.Variable(7), cp.Variable(3)
-        cp.Problem(cp.Minimize(cp.sum_squares(A @ x - r)), [x == line.A @ beta + line.b]).solve(**TIGHT)
-        assert np.allclose(objectives.minimise_on(Quadratic.from_residual(A, r), line), x.value, atol=1e-6)
 
 
 def test_minimised_over_a_span_is_the_schur_complement() -> None:
