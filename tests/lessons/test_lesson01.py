@@ -8,7 +8,8 @@ from hints import missed, right
 
 import floatbase as fb
 from floatbase.lessons import joint_servo, lesson01
-from floatbase.robots import Robot
+from floatbase.objectives import momentum, momentum_rate
+from floatbase.robots import Robot, unbolted
 
 F_R = np.array([-60.0, 0.0, 0.0])
 
@@ -24,7 +25,7 @@ def go2() -> Robot:
 
 
 def test_the_arm_without_bolts_is_the_same_arm(arm: Robot) -> None:
-    cut = lesson01.unbolted(arm)
+    cut = unbolted(arm)
     assert cut.joint_names == arm.joint_names
     state, free = arm.standing(), cut.standing()
     assert np.allclose(free.M[6:, 6:], state.M)
@@ -35,14 +36,14 @@ def test_the_arm_without_bolts_is_the_same_arm(arm: Robot) -> None:
 
 def test_momentum_is_mass_times_velocity_and_its_rate_is_the_weight(go2: Robot) -> None:
     state = go2.random_state(3)
-    assert np.allclose(lesson01.momentum(state)[:3], go2.mass * state.com_velocity)
+    assert np.allclose(momentum(state)[:3], go2.mass * state.com_velocity)
     qdd = np.linalg.solve(state.M, go2.S @ np.arange(12.0) - state.h)
-    rate = lesson01.momentum_rate(state, qdd)
+    rate = momentum_rate(state, qdd)
     assert np.allclose(rate, [0, 0, -go2.weight, 0, 0, 0], atol=1e-8)
 
 
 def test_a_servo_follows_its_path_at_its_ends(arm: Robot) -> None:
-    state = lesson01.unbolted(arm).standing()
+    state = unbolted(arm).standing()
     path = lesson01.turn(joint=2, angle=0.7, duration=1.5)
     assert np.allclose(path(0.0), 0.0)
     assert np.allclose(path(9.0), 0.7 * np.eye(6)[2])
@@ -69,7 +70,7 @@ def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(go2: Robot, 
 
 
 def test_wrong_moments_of_the_bolts_get_their_hint(arm: Robot) -> None:
-    state, cut = arm.standing(), lesson01.unbolted(arm).standing()
+    state, cut = arm.standing(), unbolted(arm).standing()
     tool = state.point("tool0")
     whole = cut.h[:6] - (cut.frame_jacobian("tool0")[:3].T @ F_R)[:6]
     wrong = [

@@ -11,7 +11,9 @@ import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import fixed_frame
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers, vector_text
-from floatbase.lessons.lesson01.pictures import PRESSING, momentum_rate, unbolted
+from floatbase.lessons.lesson01.pictures import PRESSING
+from floatbase.objectives import momentum_rate
+from floatbase.robots import unbolted
 
 
 @cache

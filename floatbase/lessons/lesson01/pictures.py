@@ -2,65 +2,23 @@
 
 from __future__ import annotations
 
-import tempfile
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 import floatbase as fb
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array
 from floatbase.lessons.exercises import vector_text
 from floatbase.lessons.panels import SliderPanel, slider_panel
-from floatbase.objectives import Task
-from floatbase.robots import Foot, Robot
+from floatbase.objectives import Task, momentum_rate
+from floatbase.robots import PLATE
 from floatbase.simulation import Rollout
 from floatbase.viewer import MEASURED, Item, Picture, View, Viewer, below, marks, props, recording, shapes
 
 PRESSING = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
-PLATE = (0.4, 0.03)  # width and thickness, m, of the plate that the arm without bolts stands on
-_FLIGHT_HEIGHT = 1.0  # m: where the arm without a plate floats
-_HOUSE = tempfile.TemporaryDirectory(prefix="floatbase-")  # goes when Python ends
 
 
-def unbolted(arm: Robot, plate: bool = False) -> Robot:
-    """The arm of the same URDF with its base free to move: the links and joints are the same, the bolts are gone.
-
-    plate: let it stand on a square plate that has no weight, see `PLATE`; else it touches nothing and floats 1 m up.
-    """
-    root = ElementTree.parse(arm.urdf).getroot()
-    for kind, name in (("link", "world"), ("joint", "world_joint")):  # what the URDF bolts the arm with
-        for element in root.findall(kind):
-            if element.get("name") == name:
-                root.remove(element)
-    urdf = Path(_HOUSE.name) / f"{arm.name}.urdf"
-    urdf.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
-    half, thick = 0.5 * PLATE[0], PLATE[1]
-    corners = np.array([[x, y, -thick] for x, y in ((half, half), (half, -half), (-half, -half), (-half, half))])
-    return fb.load_urdf(
-        urdf,
-        name=arm.name,
-        feet=[Foot("base_link", corners=corners)] if plate else [],
-        torque_limits=arm.torque_limits,
-        posture=np.concatenate([[0.0, 0.0, thick if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0], arm.posture]),
-    )
-
-
-def momentum(state: fb.State) -> Array:
-    """Linear momentum, kg·m/s, and angular momentum about the centre of mass, kg·m²/s, world; shape (6,)."""
-    model = state.robot.model
-    found = pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v)
-    return read_only(np.concatenate([found.linear, found.angular]))
-
-
-def momentum_rate(state: fb.State, qdd: npt.ArrayLike) -> Array:
-    """Time derivative of `momentum` when the robot accelerates with q̈, shape (nv,); N and N·m, shape (6,)."""
-    model = state.robot.model
-    rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, np.array(qdd))
-    return read_only(np.concatenate([rate.linear, rate.angular]))
 
 
 PRESSING_VIEW = View(66.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
