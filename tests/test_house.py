@@ -25,6 +25,7 @@ FLOORS = (
     ("simulation",),
     ("viewer",),
     ("lessons",),
+    ("playground",),
     ("__main__",),
 )
 HEIGHT = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}

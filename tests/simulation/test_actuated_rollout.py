@@ -135,7 +135,7 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
     tasks = fb.standing_tasks(state) if robot.is_floating else (fb.PostureTask(state.q),)
     controller, sim = fb.WholeBodyController(robot, judges.stance(robot), tasks), fb.Simulation(robot)
     actuators = HydraulicActuators(robot)
-    pose = actuators.cylinders.at(actuators.cylinders.centre)
+    pose = actuators.cylinders.pose(actuators.cylinders.centre)
     inertia = 1.0 / np.diag(np.linalg.inv(state.M))[-robot.d :]
     assert np.max(np.sqrt(pose.lever**2 * pose.stiffness / inertia)) * sim.timestep < 1.75
     actuators.reset(controller(state.q, state.v).tau)
