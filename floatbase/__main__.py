@@ -46,7 +46,8 @@ def _view(options: argparse.Namespace) -> int:
     ended = threading.Event()
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        playground = Playground(fb.load(options.robot), friction=options.friction, background=options.background, port=options.port)
+        robot = fb.load(options.robot)
+        playground = Playground(robot, friction=options.friction, background=options.background, port=options.port)
         try:
             playground.start()
             print(f"{options.robot} at {playground.view.url} (end with Ctrl-C)", flush=True)

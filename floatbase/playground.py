@@ -1,4 +1,4 @@
-"""The page of `python -m floatbase view`: a robot on the physics under the controller, live in a browser, without a notebook."""
+"""The page of `python -m floatbase view`: a robot on the physics under the controller, live, without a notebook."""
 
 from __future__ import annotations
 
