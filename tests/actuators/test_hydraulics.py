@@ -264,7 +264,7 @@ def test_the_integrator_agrees_with_a_tight_one() -> None:
         assert abs(found[-1, 0] - exact[-1]) < 5e-4 * limit
 
 
-@pytest.mark.parametrize("bandwidth", [10.0, 50.0, 100.0])
+@pytest.mark.parametrize("bandwidth", [10.0, 100.0])
 def test_a_torque_step_is_followed_as_fast_as_the_bandwidth_says_and_exactly_in_the_end(bandwidth: float) -> None:
     """10 to 90 % within 0.35 / bandwidth, as a first-order lag would; less than 10 % too much; no error that stays."""
     actuators = joints(replace(HYQ, loop_bandwidth=bandwidth))
@@ -378,7 +378,7 @@ def test_oil_that_is_pulled_apart_boils_instead_of_pulling() -> None:
 # memory
 
 
-def test_a_reset_puts_the_oil_under_the_torques_asked_for_and_forgets_the_rest() -> None:
+def test_a_reset_puts_the_oil_under_the_desired_torques_and_forgets_the_rest() -> None:
     robot, actuators = judges.load("go2"), joints()
     run(actuators, robot.torque_limits, 0.02)
     tau, q = 0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12), actuators.cylinders.centre + 0.3

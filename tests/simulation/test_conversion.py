@@ -76,9 +76,10 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and
     assert np.allclose(sim.q, state.q)
     assert np.allclose(judges.Mujoco(loose).at(state).M, state.M, atol=1e-9)
     lift = fb.Push([0.0, 0.0, 2.0 * loose.weight], duration=1.0)  # it falls upwards with g
-    for _ in range(100):
-        sim.step(np.ones(6), (lift,))
-    assert sim.state.com_velocity[2] - state.com_velocity[2] == pytest.approx(0.1 * loose.gravity, rel=0.01)
+    sim.reset(state.replace(v=np.zeros(12)))
+    for _ in range(20):
+        sim.step(np.zeros(6), (lift,))
+    assert sim.state.com_velocity[2] == pytest.approx(0.02 * loose.gravity, rel=0.01)
 
 
 def test_a_foot_without_a_possible_inertia_is_joined_to_the_leg_that_carries_it() -> None:
