@@ -169,7 +169,7 @@ def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Pu
     until(lambda: panel.line.value == "fell: press reset, or push again")
     panel.buttons["reset"].click()
     assert (panel.force.value, panel.towards.value, panel.line.value) == (0.0, 90.0, "running")
-    until(lambda: panel.sim.time > 0.1 and panel.arrow is None)
+    until(lambda: panel.run.sim.time > 0.1 and panel.arrow is None)
     assert panel.run.status == "running"
     panel.buttons["pause"].click()
     assert panel.line.value == "paused"

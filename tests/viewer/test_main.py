@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from floatbase import Contacts, Simulation, WholeBodyController, standing_tasks
-from floatbase.__main__ import PERIODS, Pace, Playground, control_period, main
+from floatbase.__main__ import main
+from floatbase.playground import PERIODS, Pace, Playground, control_period
 from floatbase.robots import Robot, catalogue, load
 
 from .looks import picture
@@ -135,14 +136,14 @@ def test_the_pace_is_simulated_time_over_time() -> None:
     pace = Pace(lambda: now[0])
     for i in range(101):
         now[0] = 0.03 * i
-        told = pace.at(0.5 * now[0])
+        told = pace.update(0.5 * now[0])
         assert (told is None) == (now[0] <= 0.5)
     assert told == pytest.approx(0.5)
     now[0] += 60.0  # a pause
-    assert pace.at(2.0) is None
+    assert pace.update(2.0) is None
     now[0] += 0.6
-    assert pace.at(2.6) == pytest.approx(1.0)
-    assert pace.at(0.0) is None  # a reset
+    assert pace.update(2.6) == pytest.approx(1.0)
+    assert pace.update(0.0) is None  # a reset
 
 
 def test_the_control_period_leaves_room_and_the_robot_where_it_stood(go2: Robot) -> None:
