@@ -195,7 +195,9 @@ def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[RowL
     bound = limits.torque_limits[limited]
     joints = [robot.joint_names[i] for i in limited]
     names = tuple(
-        RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side in ("upper", "lower") for joint in joints
+        RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint)
+        for side in ("upper", "lower")
+        for joint in joints
     )
     return np.vstack([rows, -rows]), np.concatenate([bound, bound]), names
 

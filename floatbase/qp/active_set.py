@@ -41,14 +41,13 @@ from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
+from floatbase.qp.conflicts import SHARE, infeasible, not_convex, unbounded
 from floatbase.qp.labels import RowLabel
 from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP, ReducedQP
 from floatbase.qp.solution import Solution, with_equality_multipliers
-from floatbase.qp.verdicts import infeasible, not_convex, unbounded
 
 _ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60 terms
 _COUNTS = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
-_SHARE = 1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
 _VIOLATION = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 
 
@@ -212,7 +211,7 @@ def _feasible_start(problem: ReducedQP, y: Array, rows: list[int]) -> _Walk:
     walk = _walk(elastic, np.append(y, violation[worst]), [*rows, worst], last=s_row)
     if walk.x[-1] > FEASIBILITY_TOLERANCE:
         share = walk.multipliers * elastic.row_lengths[walk.rows]  # those of the violated rows add up to 1
-        raise infeasible(problem.inequality_names[i] for i in sorted(np.array(walk.rows)[share > _SHARE]))
+        raise infeasible(problem.inequality_names[i] for i in sorted(np.array(walk.rows)[share > SHARE]))
     found = _independent_rows(problem, [i for i in walk.rows if i != s_row])
     return _Walk(walk.x[:-1], found, np.zeros(0), walk.iterations)
 
@@ -238,14 +237,7 @@ def _direction(problem: ReducedQP, x: Array, rows: list[int]) -> tuple[Array, fl
 
 
 def _longest_step(problem: ReducedQP, x: Array, p: Array, reach: float, rows: list[int]) -> tuple[float, int | None]:
-    """How far all rows hold: the length α, and the (first) row that forbids more.
-
-    problem: the rows.
-    x: (n,), where the step starts.
-    p: (n,), its direction.
-    reach: the length asked for, 1 or inf.
-    rows: W, which p does not leave.
-    """
+    """How far from x along p, at most `reach`, all rows hold: the length α, and the (first) row that forbids more."""
     size = problem.row_lengths
     speed, slack = problem.G @ p, problem.h - problem.G @ x
     closing = speed > _ROUNDING * size * np.linalg.norm(p)
@@ -269,12 +261,7 @@ def _multipliers(problem: ReducedQP, x: Array, rows: list[int]) -> Array:
 
 
 def _row_to_drop(problem: ReducedQP, x: Array, rows: list[int], mu: Array, stuck: bool) -> int | None:
-    """The row of W with the most negative multiplier (rows at equal size), or None where none is wrong-signed.
-
-    problem, x: the point x, (n,), that the step arrived at.
-    rows, mu: W and its multipliers there, (len(rows),).
-    stuck: whether the last step had length 0; then the first of the wrong-signed rows is taken (Bland's rule).
-    """
+    """The row of W with the most negative multiplier, rows at equal size, or None; when stuck, the first of wrong sign."""
     force = mu * problem.row_lengths[rows]
     wrong = [row for row, f in zip(rows, force, strict=True) if f < -_slope_rounding(problem, x)]
     if not wrong:

@@ -12,9 +12,9 @@ import numpy as np
 from floatbase._arrays import Array
 from floatbase.errors import SolverError
 from floatbase.qp.active_set import active_set as run_active_set
+from floatbase.qp.conflicts import not_convex, unbounded
 from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP, ReducedQP
 from floatbase.qp.solution import Solution, with_equality_multipliers
-from floatbase.qp.verdicts import not_convex, unbounded
 
 BackEnd = Callable[[QP], Solution | None]
 
@@ -65,8 +65,8 @@ def active_set(qp: QP) -> Solution | None:
     found = run_active_set(qp).solution
     space = qp.equality_space
     polished = _polished(qp, space.A.T @ (found.x - space.b), found.inequality_multipliers)
-    if polished is None:
-        return found
+    if polished is None or np.any(qp.G @ space(polished[0]) - qp.h > FEASIBILITY_TOLERANCE * qp.row_lengths):
+        return found  # an optimum that is not unique: the steps may lead past rows that are not active
     return with_equality_multipliers(qp, space(polished[0]), polished[1], found.solver, found.iterations)
 
 

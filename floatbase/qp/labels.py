@@ -23,7 +23,7 @@ class RowLabel(str):
 
     kind: str
     owner: str
-    index: int | None
+    index: int | None  # type: ignore[assignment]  # a text's own method of that name finds a part of it
 
     def __new__(cls, text: str, kind: str = OTHER, owner: str | None = None, index: int | None = None) -> RowLabel:
         label = super().__new__(cls, text)

@@ -108,9 +108,7 @@ class QP:
         Z, x0 = self.equality_space
         # what vanishes on the space must come out as zero: its rounding would pass for a curvature, a slope or a row
         H = _without_rounding(Z.T @ self.H @ Z, np.max(np.abs(self.H), initial=0.0))
-        g = _without_rounding(
-            Z.T @ (self.H @ x0 + self.g), np.max(np.abs(self.H) @ np.abs(x0) + np.abs(self.g), initial=0.0)
-        )
+        g = _without_rounding(Z.T @ (self.H @ x0 + self.g), np.max(np.abs(self.H) @ np.abs(x0) + np.abs(self.g), initial=0.0))
         G, h = self.G @ Z, self.h - self.G @ x0
         G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_lengths] = 0.0
         h[np.abs(h) <= _ROUNDING * (np.abs(self.G) @ np.abs(x0) + np.abs(self.h))] = 0.0

@@ -1,13 +1,12 @@
-"""The one entry to all solvers: `solve` maps a `QP` to its `Solution`, by any back end, or raises the error that says why not."""
+"""The one entry, above the back ends: `solve` returns the `Solution` of a `QP` or raises the error that says why not."""
 
 from __future__ import annotations
 
 from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_name
 from floatbase.qp.backends import ALWAYS, OPTIONAL, installed
-from floatbase.qp.conflicts import conflicting_rows
+from floatbase.qp.conflicts import conflicting_rows, infeasible
 from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP
 from floatbase.qp.solution import Solution
-from floatbase.qp.verdicts import infeasible
 
 
 def solve(qp: QP, solver: str = "daqp") -> Solution:

@@ -18,7 +18,6 @@ from floatbase.viewer.colours import (
     X_AXIS,
     hexadecimal,
 )
-from floatbase.viewer.cones import cone_status, polyhedron_status
 from floatbase.viewer.displays import Displays
 from floatbase.viewer.figures import FIGURES
 from floatbase.viewer.lowering import code
@@ -56,14 +55,12 @@ __all__ = [
     "Window",
     "below",
     "code",
-    "cone_status",
     "geometry",
     "hexadecimal",
     "marks",
     "nice",
     "page",
     "plots",
-    "polyhedron_status",
     "props",
     "push_at",
     "recording",
