@@ -15,20 +15,32 @@ def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
 
     absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding altogether.
     """
-    s = np.linalg.svd(np.asarray(A, dtype=np.float64), compute_uv=False)
-    largest = 1.0 if absolute else float(s.max(initial=0.0))
-    return int(np.sum(s > RANK_TOLERANCE * largest))
+    return _rank(np.linalg.svd(np.asarray(A, dtype=np.float64), compute_uv=False), absolute)
+
+
+def ranked_svd(A: npt.ArrayLike, absolute: bool = False) -> tuple[Array, Array, Array, int]:
+    """The singular value decomposition A = U diag(s) Vᵀ and the rank r of A: (U, s, Vᵀ, r); absolute as for `rank`.
+
+    A: (m, n). U: (m, m), its first r columns span the range of A, the others what A does not reach. s: falling. Vᵀ: (n, n),
+    its last n - r rows span the null space of A.
+    """
+    U, s, Vt = np.linalg.svd(np.asarray(A, dtype=np.float64))
+    return U, s, Vt, _rank(s, absolute)
 
 
 def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
     """Orthonormal columns that span {x : A x = 0}, shape (n, n - rank); absolute as for `rank`."""
-    A = np.asarray(A, dtype=np.float64)
-    if A.size == 0:
-        return np.eye(A.shape[1])
-    return read_only(np.linalg.svd(A)[2][rank(A, absolute) :].T)
+    _, _, Vt, r = ranked_svd(A, absolute)
+    return read_only(Vt[r:].T)
 
 
 def row_lengths(rows: Array) -> Array:
     """Euclidean length of each row, shape (m,), 1 for a row of zeros: the unit to compare violations of rows in."""
     size = np.linalg.norm(rows, axis=1)
     return np.where(size > 0.0, size, 1.0)
+
+
+def _rank(s: Array, absolute: bool) -> int:
+    """How many of the singular values count."""
+    largest = 1.0 if absolute else float(s.max(initial=0.0))
+    return int(np.sum(s > RANK_TOLERANCE * largest))

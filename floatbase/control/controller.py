@@ -18,7 +18,7 @@ from floatbase.control.tick.tables import obstacle
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives import Task
-from floatbase.qp import QP, Solution, check_solver, finished, solve
+from floatbase.qp import QP, Solution, check_solver, solve, with_equality_multipliers
 from floatbase.robots import Robot, State, torque_limits_of
 
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
@@ -140,7 +140,8 @@ class WholeBodyController:
         assert tick is not None  # it answered
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         qp = build_qp(eom, tick.tasks(targets), self.limits, t)
-        return finished(qp, numbers[: tick.size], tick.multipliers(numbers, n_active, len(qp.G)), "compiled", n_active)
+        mu = tick.multipliers(numbers, n_active, len(qp.G))
+        return with_equality_multipliers(qp, numbers[: tick.size], mu, "compiled", n_active)
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""

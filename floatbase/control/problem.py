@@ -15,7 +15,7 @@ from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equati
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import ForceTask, Task, TorqueTask
-from floatbase.qp import QP
+from floatbase.qp import QP, RowLabel
 from floatbase.robots import Robot, State, torque_limits_of
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
@@ -171,35 +171,44 @@ def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 # what does not depend on the state is built once for each contacts, robot and limits (all immutable)
 @lru_cache(maxsize=64)
-def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
+def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
     """Friction facets and normal force of every point: G λ ≤ h, and the names of the rows."""
     per_point = limits.facets + 1
     G = np.zeros((per_point * contacts.n_points, contacts.k))
     h = np.zeros(len(G))
-    names: list[str] = []
+    names: list[RowLabel] = []
     for i, point in enumerate(contacts.point_names):
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
         rows = slice(per_point * i, per_point * (i + 1))
         G[rows, contacts.point_entries[3 * i : 3 * i + 3]] = np.vstack([cone.rows, -cone.normal])
         h[rows.stop - 1] = -limits.min_normal_force
-        names += [f"{point} {name}" for name in cone.names] + [f"{point} normal force"]
+        names += [RowLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
+        names.append(RowLabel(f"{point} normal force", "normal force", point))
     return G, h, tuple(names)
 
 
 @lru_cache(maxsize=64)
-def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
+def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
     """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h, and the names of the rows."""
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
     rows = np.eye(robot.d)[limited]
     bound = limits.torque_limits[limited]
-    names = tuple(f"torque limit {robot.joint_names[i]} {side}" for side in ("upper", "lower") for i in limited)
+    joints = [robot.joint_names[i] for i in limited]
+    names = tuple(
+        RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint)
+        for side in ("upper", "lower")
+        for joint in joints
+    )
     return np.vstack([rows, -rows]), np.concatenate([bound, bound]), names
 
 
 @lru_cache(maxsize=64)
-def _equality_names(robot: Robot, contacts: Contacts) -> tuple[str, ...]:
+def _equality_names(robot: Robot, contacts: Contacts) -> tuple[RowLabel, ...]:
     """Names of the rows of (7)."""
-    base = [f"dynamics base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
-    joints = [f"dynamics {joint}" for joint in robot.joint_names]
-    motion = [f"motion {contact.name} {row}" for contact in contacts for row in contact.row_names]
-    return tuple((base if robot.is_floating else []) + joints + motion)
+    axes = [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"] if robot.is_floating else []
+    owners = [*axes, *robot.joint_names]
+    motion = [(contact.name, i, row) for contact in contacts for i, row in enumerate(contact.row_names)]
+    return (
+        *(RowLabel(f"dynamics {owner}", "dynamics", owner) for owner in owners),
+        *(RowLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion),
+    )

@@ -1,4 +1,4 @@
-"""Friction (28): the force taken apart, the exact cone, and the polyhedron with n facets that stands in for it.
+"""Friction (28): a force's normal and tangential parts, the exact cone, and the polyhedron with n facets in its place.
 
 Everything here is about one contact force f, shape (3,), N, world: what the ground does to the robot. The normal
 points out of the ground. Source: the document, §4.2 and Figure 3.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,14 +16,18 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked, positive, read_only, unit_vector
 from floatbase.errors import InputError
 
-TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding, well below what a solver leaves
+TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
+NEAR = 0.02  # part of the friction limit μ α_⊥ within which a force counts as on the surface: planned forces reach it exactly,
+# measured ones scatter by a percent or two
+
+Status: TypeAlias = Literal["inside", "active", "outside"]
 
 
 def tangents(normal: npt.ArrayLike) -> Array:
     """Two unit vectors t1, t2 with t1 × t2 = normal, as rows, shape (2, 3).
 
-    t1 is the world's x axis laid into the surface (its y axis where x stands on it), so pictures and rows do not
-    jump.
+    normal: shape (3,), world, out of the ground, made unit. t1 is the world's x axis projected onto the surface (its y axis
+    where x is nearly normal to it), so pictures and rows do not jump.
     """
     n = unit_vector("normal", normal)
     axis = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
@@ -33,10 +38,12 @@ def tangents(normal: npt.ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Decomposition:
-    """Figure 3: a contact force taken apart along the normal and in the surface; f = f_perp + f_par.
+    """Figure 3: the normal and the tangential part of a contact force, f = f_perp + f_par.
 
-    f_perp = n nᵀ f and f_par = (I - n nᵀ) f, shape (3,), N, world. alpha_perp: α_⊥ = nᵀ f, N, negative where the
-    force pulls. alpha_par: α_∥ = ‖f_par‖ ≥ 0, N.
+    f_perp: n nᵀ f, shape (3,), N, world.
+    f_par: (I - n nᵀ) f, shape (3,), N, world.
+    alpha_perp: α_⊥ = nᵀ f, N, negative where the force pulls on the ground.
+    alpha_par: α_∥ = ‖f_par‖ ≥ 0, N.
     """
 
     f_perp: Array
@@ -48,8 +55,7 @@ class Decomposition:
 def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
     """(28) The two components of a contact force that friction compares: α_∥ ≤ μ α_⊥.
 
-    force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source: the document, Figure
-    3.
+    force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source: the document, Figure 3.
     """
     f, n = checked("force", force, (3,), "N"), unit_vector("normal", normal)
     alpha = float(n @ f)
@@ -62,8 +68,8 @@ def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
 class FrictionCone:
     """(28) The forces that Coulomb friction can make: α_∥ ≤ μ α_⊥, a round cone about the normal.
 
-    normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. (28) keeps the force
-    pushing too: α_⊥ ≥ α_∥ / μ ≥ 0. Source: the document, §4.2.
+    normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. (28) also says that the ground
+    only pushes: α_⊥ ≥ α_∥ / μ ≥ 0. Source: the document, §4.2.
     """
 
     normal: Array
@@ -91,12 +97,16 @@ class FrictionCone:
         """(28) Whether friction can make this force: margin ≥ -tolerance, N."""
         return self.margin(force) >= -positive("tolerance", tolerance, "N", allow_zero=True)
 
+    def status(self, force: npt.ArrayLike) -> Status:
+        """(28) "inside", "active" (on the surface, within `NEAR` of the limit μ α_⊥) or "outside"; force: shape (3,), N."""
+        parts = decompose(force, self.normal)
+        return _status(parts.alpha_par, self.mu * parts.alpha_perp)
+
     def project(self, force: npt.ArrayLike) -> Array:
         """The force of the cone nearest to the one given, shape (3,), N: the Euclidean projection.
 
-        A force inside stays. One that pulls so hard that no force of the cone has a part along it (μ α_∥ ≤ -α_⊥, the
-        polar cone) gives 0. Any other falls at a right angle onto the line of the surface below it, n + μ f_par /
-        α_∥.
+        A force inside stays. A force of the polar cone, μ α_∥ ≤ -α_⊥, makes no acute angle with any of the cone and gives 0.
+        Any other is projected at a right angle onto the line n + μ f_par / α_∥ of the surface.
         """
         parts = decompose(force, self.normal)
         if parts.alpha_par <= self.mu * parts.alpha_perp:
@@ -109,11 +119,15 @@ class FrictionCone:
 
 @dataclass(frozen=True, eq=False)
 class FrictionPolyhedron:
-    """(28) as linear rows: a polyhedron with n facets in place of the cone ‖f_tangent‖ ≤ μ f_normal.
+    """(28) as linear rows: a polyhedron with n facets in place of the cone α_∥ ≤ μ α_⊥.
 
-    normal: shape (3,), world, out of the ground. mu: coefficient of friction. facets: n ≥ 3. inside: the polyhedron
-    lies inside the cone (safe: it allows no force that slips) or outside it, touching it (optimistic). Inside, a
-    facet allows μ cos(π/n) and only the edges reach μ. Source: the document, §4.2.
+    normal: shape (3,), world, out of the ground, made unit.
+    mu: coefficient of friction, > 0.
+    facets: n ≥ 3.
+    inside: whether the polyhedron lies inside the cone (safe: it allows no force that slips) or outside it, touching it
+        (optimistic). Inside, the middle of a facet allows μ cos(π/n) and only the edges reach μ.
+
+    Source: the document, §4.2.
     """
 
     normal: Array
@@ -133,8 +147,7 @@ class FrictionPolyhedron:
 
     @property
     def area_ratio(self) -> float:
-        """Area of the polyhedron's cross-section over the cone's: sin(2π/n) / (2π/n) inside, tan(π/n) / (π/n)
-        outside."""
+        """Area of the polyhedron's cross-section over the cone's: sin(2π/n) / (2π/n) inside, tan(π/n) / (π/n) outside."""
         half = np.pi / self.facets
         return float(np.sin(2.0 * half) / (2.0 * half) if self.inside else np.tan(half) / half)
 
@@ -142,25 +155,19 @@ class FrictionPolyhedron:
     def rows(self) -> Array:
         """Rows, shape (n, 3), with rows @ f ≤ 0 for f in the polyhedron; each is d_i - μ_facet · normal.
 
-        d_i is the unit tangent that facet i looks along; facet 0 looks along t1 of `tangents`. Their intersection
-        also keeps normal · f ≥ 0.
+        d_i is the unit tangent that facet i faces; facet 0 faces t1 of `tangents`. All rows together also imply
+        normal · f ≥ 0.
         """
         return read_only(self._directions(0.0) - self.mu_facet * self.normal)
 
     @cached_property
     def rays(self) -> Array:
-        """The edges, shape (n, 3), each with normal component 1: forces in the polyhedron are their sums with weights
-        ≥ 0.
+        """The edges, shape (n, 3), each with normal component 1; ray i lies between facets i and i + 1.
 
-        Ray i lies between facets i and i + 1.
+        The forces of the polyhedron are the sums of its rays with weights ≥ 0.
         """
         reach = self.mu_facet / float(np.cos(np.pi / self.facets))
         return read_only(self.normal + reach * self._directions(0.5))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """A name for each row."""
-        return tuple(f"facet {i}" for i in range(self.facets))
 
     def margin(self, force: npt.ArrayLike) -> float:
         """How far inside its facets a force is, N: the smallest of -rows @ f; negative outside.
@@ -174,12 +181,18 @@ class FrictionPolyhedron:
         """Whether a force lies in the polyhedron: margin ≥ -tolerance, N."""
         return self.margin(force) >= -positive("tolerance", tolerance, "N", allow_zero=True)
 
-    def active_facets(self, force: npt.ArrayLike, tolerance: float = 1e-6) -> tuple[str, ...]:
-        """Names of the facets that a force lies on or has passed, within a tolerance in N; all of them for no
-        force."""
-        slack = -self.rows @ checked("force", force, (3,), "N")
-        reached = slack <= positive("tolerance", tolerance, "N", allow_zero=True)
-        return tuple(name for name, at in zip(self.names, reached, strict=True) if at)
+    def status(self, force: npt.ArrayLike) -> Status:
+        """As `FrictionCone.status`, against the facets: the limit is μ_facet α_⊥."""
+        slides, limit = self._slides(force)
+        return _status(float(slides.max()), limit)
+
+    def active_facets(self, force: npt.ArrayLike) -> tuple[int, ...]:
+        """Numbers of the facets that a force, shape (3,), N, has reached (within `NEAR` of their limit) or passed.
+
+        Empty for a force that does not push on the ground: it has no limit to reach.
+        """
+        slides, limit = self._slides(force)
+        return tuple(np.flatnonzero(slides > (1.0 - NEAR) * limit).tolist()) if limit > 0.0 else ()
 
     def project(self, force: npt.ArrayLike) -> Array:
         """The force of the polyhedron nearest to the one given, shape (3,), N: min ‖raysᵀ w - f‖ over weights w ≥ 0."""
@@ -192,11 +205,24 @@ class FrictionPolyhedron:
         weights, _ = nnls(self.rays.T, f / size)
         return read_only(size * (self.rays.T @ weights))
 
+    def _slides(self, force: npt.ArrayLike) -> tuple[Array, float]:
+        """The force along each facet's d_i, shape (n,), N, and what they all may be at most, μ_facet α_⊥, N."""
+        f = checked("force", force, (3,), "N")
+        limit = self.mu_facet * float(self.normal @ f)
+        return self.rows @ f + limit, limit
+
     def _directions(self, shift: float) -> Array:
         """Unit tangents, shape (n, 3), turned by `shift` of a facet's angle."""
         angles = 2.0 * np.pi * (np.arange(self.facets) + shift) / self.facets
         t1, t2 = tangents(self.normal)
         return np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
+
+
+def _status(slide: float, limit: float) -> Status:
+    """slide: a tangential force, N. limit: the largest that friction allows, N; negative where the force pulls."""
+    if slide > (1.0 + NEAR) * limit:
+        return "outside"
+    return "active" if slide > (1.0 - NEAR) * limit else "inside"
 
 
 def _whole_facets(facets: object) -> int:

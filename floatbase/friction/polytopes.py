@@ -14,19 +14,23 @@ from scipy.spatial import ConvexHull, QhullError
 
 from floatbase._arrays import Array
 from floatbase.errors import SolverError
+from floatbase.linear_algebra import ranked_svd
 from floatbase.qp import linear_program
 
-FLAT = 1e-9  # part of the size below which a set counts as flat, a point as on a facet
+_FLAT = 1e-9  # part of the size below which a set counts as flat, a point as on a facet: above a linear program's rounding
 _ROUNDS = 200  # of looking for farther points; each adds one at least, and the stances of the course need about ten
-_SAME_DIRECTION = 1e-6  # rad, normals nearer than this are one
+_QHULL = 1e-8  # part of the size by which qhull's facets may miss the points on them
+_SLIVER = 1e-7  # singular value, of the largest, below which rays are too nearly dependent to fix a facet
+_SAME_DIRECTION = 1e-6  # rad, normals nearer than this are one: qhull's triangles of one facet
+_DIGITS = 9  # to which the equations of qhull's triangles of one facet agree
 
 
 def cone_rows(rays: Array) -> tuple[Array, Array]:
     """The cone {Σ w_j ray_j, w ≥ 0} as rows: (G, E) with G x ≤ 0 and E x = 0, each row of unit length.
 
-    rays: shape (n, N), one ray a column. E, shape (n - r, n), spans what no ray reaches, r being their rank. Where
-    some rays together point in opposite directions the cone holds whole lines; G is zero along them, and empty
-    altogether where the cone is a subspace. Source: facets of a cone are facets of its cross-section, whose convex
+    rays: shape (n, N), one ray a column. E, shape (n - r, n), spans the directions that no ray reaches, r being the rays'
+    rank. Where some rays together point in opposite directions the cone contains whole lines; G is zero along them, and has
+    no rows where the cone is a subspace. Source: facets of a cone are facets of its cross-section, whose convex
     hull qhull finds (Barber, Dobkin, Huhdanpaa, The Quickhull algorithm for convex hulls, 1996).
     """
     rays = rays / np.linalg.norm(rays, axis=0)  # length does not matter in a cone
@@ -41,13 +45,16 @@ def cone_rows(rays: Array) -> tuple[Array, Array]:
 def vertices(farthest: Callable[[Array], Array], n: int, size: float) -> Array:
     """The vertices of a bounded convex polytope in R^n, n ≤ 3, shape (k, n), from its farthest points.
 
-    farthest: direction (n,) -> a point of the set with the largest direction · x. size: a length by which smallness
-    is judged. The hull of the points known is pushed outwards at each of its facets until none of them gives way, so
-    the answer is exact, not a sampling. In the plane the vertices come counter-clockwise. A flat set gives what it
-    is: one point, the two ends of a segment, a polygon in space. Source: for the support region, Bretl and Lall,
-    Testing static equilibrium for legged robots, IEEE Transactions on Robotics, 2008.
+    farthest: direction (n,) -> a point of the set with the largest direction · x.
+    n: dimension of the space.
+    size: a length of the set; `_FLAT` of it counts as zero.
+
+    The hull of the known points grows at each of its facets until no point lies beyond any, so the answer is exact, not a
+    sampling. In the plane the vertices come counter-clockwise. A flat set gives one point, the two ends of a segment, or a
+    polygon in space. Source: for the support region, Bretl and Lall, Testing static equilibrium for legged robots, IEEE
+    Transactions on Robotics, 2008.
     """
-    tolerance = FLAT * size
+    tolerance = _FLAT * size
     basis, points = _affine_hull(farthest, n, tolerance)
     origin = points[0]
     if basis.shape[1] == 0:
@@ -68,8 +75,7 @@ def vertices(farthest: Callable[[Array], Array], n: int, size: float) -> Array:
 
 def _span(rays: Array) -> tuple[Array, Array]:
     """Orthonormal bases of what the rays span, shape (n, r), and of the rest, as rows, shape (n - r, n)."""
-    U, s, _ = np.linalg.svd(rays)
-    rank = int(np.sum(s > FLAT * s[0]))
+    U, _, _, rank = ranked_svd(rays)
     return U[:, :rank], U[:, rank:].T
 
 
@@ -108,7 +114,7 @@ def _rays_on_facets(section: Array) -> set[frozenset[int]]:
     """For each facet of the convex hull of the points, all the points that lie on it."""
     equations = _hull(section).equations
     distance = section @ equations[:, :-1].T + equations[:, -1]
-    near = np.abs(distance) < 1e-8 * float(np.max(np.abs(section)))
+    near = np.abs(distance) < _QHULL * float(np.max(np.abs(section)))
     return {frozenset(np.flatnonzero(column).tolist()) for column in near.T}
 
 
@@ -116,7 +122,7 @@ def _row_through(rays: Array, chosen: list[int]) -> Array | None:
     """The unit row that is 0 on the rays chosen and ≤ 0 on the others; None where they do not fix it (a sliver)."""
     U, s, _ = np.linalg.svd(rays[:, chosen])
     n = len(rays)
-    if np.sum(s > 1e-7 * s[0]) != n - 1:
+    if np.sum(s > _SLIVER * s[0]) != n - 1:
         return None
     row = U[:, -1]
     return -np.sign(row @ rays.sum(axis=1)) * row
@@ -147,9 +153,8 @@ def _hull(points: Array) -> ConvexHull:
 
 
 def _facets(hull: ConvexHull) -> tuple[Array, Array]:
-    """Unit normals, shape (m, n), and offsets, shape (m,), of the hull's facets, triangles of one facet taken
-    together."""
-    _, first = np.unique(np.round(hull.equations, 9), axis=0, return_index=True)
+    """Unit normals, shape (m, n), and offsets, shape (m,), of the hull's facets; triangles of one facet count once."""
+    _, first = np.unique(np.round(hull.equations, _DIGITS), axis=0, return_index=True)
     return hull.equations[first, :-1], hull.equations[first, -1]
 
 

@@ -1,4 +1,4 @@
-"""The wrenches that a stance can produce: friction cones (28) summed through (20) and (21), and their slices.
+"""The wrenches that a stance can produce: the sum of its friction cones (28) by (20) and (21), and slices of it.
 
 A wrench is w = (f_c, τ_c), shape (6,): the total contact force, N, and its moment about the centre of mass, N·m, both
 world: τ_c = Σ (x_i - x_c) × f_i. Which torques the motors would need, and whether they have them, is no part of these
@@ -23,7 +23,8 @@ from floatbase.objectives import grasp_matrix
 from floatbase.qp import INFEASIBLE, UNBOUNDED, linear_program
 from floatbase.robots import State
 
-TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets
+TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets: what a linear program leaves
+_ROUNDING = 1e-12  # part of the largest gain along a direction that may be rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +33,15 @@ class WrenchSet:
     cone (CWC), also called gravito-inertial wrench cone, of the stance.
 
     `wrench_set` makes it from a state and its contacts.
-    points: x_i, shape (P, 3), m, world. cones: a `FrictionPolyhedron` for each point. about: x_c, shape (3,), m,
-    world. weight: of the robot, N; (0, 0, weight) is the force that `torques` and `support_region` assume.
-    max_normal_force: N, one number for each point, +inf where there is no limit. Without limits the set is a cone;
-    with a limit on every point it is bounded. Torque limits of the joints are no part of it.
+
+    points: x_i, shape (P, 3), m, world.
+    cones: a `FrictionPolyhedron` for each point.
+    about: x_c, shape (3,), m, world.
+    weight: of the robot, N; (0, 0, weight) is the force that `torques` and `support_region` assume.
+    max_normal_force: shape (P,), N, +inf where there is no limit. Without limits the set is a cone; with a limit on every
+        point it is bounded.
+
+    The torque limits of the joints do not enter.
     """
 
     points: Array
@@ -89,11 +95,6 @@ class WrenchSet:
         """
         return self._halfspaces[1]
 
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """A name for each row."""
-        return tuple(f"wrench facet {i}" for i in range(len(self.rows)))
-
     def margin(self, wrench: npt.ArrayLike) -> float:
         """How far inside its facets every contact force can be, N, when together they make the wrench, shape (6,).
 
@@ -123,8 +124,8 @@ class WrenchSet:
         gains = checked("direction", direction, (6,)) @ self.rays
         ends = np.cumsum([cone.facets for cone in self.cones])
         best = np.array([np.max(part) for part in np.split(gains, ends[:-1])])
-        pushing = best > 1e-12 * float(np.max(np.abs(gains)))
-        return float(np.sum(best[pushing] * self.max_normal_force[pushing]))
+        helps = best > _ROUNDING * float(np.max(np.abs(gains)))
+        return float(np.sum(best[helps] * self.max_normal_force[helps]))
 
     def reach(self, direction: npt.ArrayLike, start: npt.ArrayLike | None = None) -> float:
         """The largest s with start + s · direction in the set: how hard the stance can push in just this direction.
@@ -162,8 +163,8 @@ class WrenchSet:
     def support_region(self) -> Array:
         """Where the CoM may be for the robot to stand still: vertices of a polygon, shape (k, 2), m, world x and y.
 
-        All horizontal positions c for which forces in the polyhedra carry the weight without torque about c, at
-        whatever height, counter-clockwise; `about` plays no part. On level ground it is the convex hull of the feet;
+        All horizontal positions c for which forces in the polyhedra carry the weight without torque about c; its height and
+        `about` do not matter. The vertices come counter-clockwise. On level ground it is the convex hull of the feet;
         on slopes it may be smaller, larger or elsewhere. Two rows are a segment, one is a point, none says that the
         stance cannot carry the weight at all. Raises `InputError` when it has no end.
         """
@@ -243,9 +244,12 @@ def wrench_set(
 ) -> WrenchSet:
     """(20)(21)(28) The wrenches about the centre of mass that a state's contacts can produce.
 
+    state: where the robot is.
+    contacts: its contacts, each with a friction cone.
     facets, inside: the friction polyhedron of every point (see `FrictionPolyhedron`); by default the controller's.
-    max_normal_force: N, one number or one for each contact point; no limit by default. Raises `InputError` for contacts
-    that make no set of wrenches: none at all, or such whose forces have no cone. Source: the document, §3.1, §4.2.
+    max_normal_force: N, one number or one for each contact point; no limit by default.
+
+    Raises `InputError` where there is no contact, or one whose forces have no cone. Source: the document, §3.1, §4.2.
     """
     if not isinstance(state, State):
         raise InputError(f"wrench_set needs a State first, not {type(state).__name__}.")

@@ -1,59 +1,15 @@
 """Quadratic programs: named rows, optimality, back ends, and rows in conflict (§4, App. C of the document)."""
 
-from floatbase.qp.active_set import (
-    ActiveSetRun,
-    Iteration,
-    active_set,
-    aim,
-    feasible_start,
-    independent_rows,
-    longest_step,
-    multipliers,
-    row_to_drop,
-    starting_point,
-    table_top,
-)
-from floatbase.qp.conflicts import conflicting_rows, contradicting_equalities, contradiction
-from floatbase.qp.linear_programs import INFEASIBLE, UNBOUNDED, linear_program
-from floatbase.qp.problem import (
-    FEASIBILITY_TOLERANCE,
-    QP,
-    Residuals,
-    Solution,
-    check_solver,
-    finished,
-    not_convex,
-    solve,
-    solvers,
-    unbounded,
-)
+from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set, table_top
+from floatbase.qp.conflicts import conflicting_rows
+from floatbase.qp.labels import RowLabel
+from floatbase.qp.linear_programs import INFEASIBLE, OPTIMAL, UNBOUNDED, linear_program
+from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP
+from floatbase.qp.solution import Residuals, Solution, with_equality_multipliers
+from floatbase.qp.solve import check_solver, solve, solvers
 
 __all__ = [
-    "FEASIBILITY_TOLERANCE",
-    "INFEASIBLE",
-    "QP",
-    "UNBOUNDED",
-    "ActiveSetRun",
-    "Iteration",
-    "Residuals",
-    "Solution",
-    "active_set",
-    "aim",
-    "check_solver",
-    "conflicting_rows",
-    "contradicting_equalities",
-    "contradiction",
-    "feasible_start",
-    "finished",
-    "independent_rows",
-    "linear_program",
-    "longest_step",
-    "multipliers",
-    "not_convex",
-    "row_to_drop",
-    "solve",
-    "solvers",
-    "starting_point",
-    "table_top",
-    "unbounded",
-]
+    "FEASIBILITY_TOLERANCE", "INFEASIBLE", "OPTIMAL", "QP", "UNBOUNDED", "ActiveSetRun", "Iteration", "Residuals", "RowLabel",
+    "Solution", "active_set", "check_solver", "conflicting_rows", "linear_program", "solve", "solvers", "table_top",
+    "with_equality_multipliers",
+]  # fmt: skip

@@ -13,12 +13,12 @@ Symbols
     μ  multipliers of the rows of W, from H x + g + Gᵀ μ = 0
 
 Algorithm
-    0. `feasible_start`: a point that satisfies all rows (phase 1: the same method, on the problem "least violation").
-    1. `aim`: p, in the null space of the rows of W.
-    2. `longest_step`: α = 1, unless a row outside W forbids it. Go there.
+    0. `_feasible_start`: a point that satisfies all rows (phase 1: the same method, on the problem "least violation").
+    1. `_direction`: p, in the null space of the rows of W.
+    2. `_longest_step`: α = 1, unless a row outside W forbids it. Go there.
     3. Forbidden: that row blocks, it joins W; back to 1.
-    4. Arrived: `multipliers`. All ≥ 0: every row of W pushes, this is the optimum.
-       Otherwise a row with μ < 0 pulls: `row_to_drop` leaves W; back to 1.
+    4. Arrived: `_multipliers`. All ≥ 0: this is the optimum.
+       Otherwise a multiplier is wrong-signed (μ < 0): its row, `_row_to_drop`, leaves W; back to 1.
 
 At a degenerate point (more rows meet than there are coordinates) steps of length 0 can follow one another. As long as
 they do, both choices fall on the row with the least index (Bland's rule), which keeps a working set from coming back.
@@ -40,11 +40,14 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
-from floatbase.qp.conflicts import contradiction
-from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP, Solution, finished, not_convex, unbounded
+from floatbase.linear_algebra import RANK_TOLERANCE, null_space
+from floatbase.qp.conflicts import SHARE, infeasible, not_convex, unbounded
+from floatbase.qp.labels import RowLabel
+from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP, ReducedQP
+from floatbase.qp.solution import Solution, with_equality_multipliers
 
-_ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding
-_INDEPENDENT = 1e-9  # part of a row's size that must be left once the rows before it are taken out
+_ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60 terms
+_COUNTS = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
 _VIOLATION = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 
 
@@ -52,10 +55,14 @@ _VIOLATION = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 class Iteration:
     """One round of the method, for a lesson to draw: from x along direction, as far as length.
 
-    working: names of the rows in W. x: (n,) the point it starts from. direction: (n,) p. length: α. blocking: the row
-    that forbade a longer step and joins W, or None. multipliers: μ of the rows of W, by name, where the step arrived;
-    empty when a row blocked. dropped: the row that leaves W, or None. objective: ½ xᵀ H x + gᵀ x at x; in phase 1 the
-    largest violation at x, in units of the rows' length.
+    working: names of the rows in W.
+    x: (n,), the point it starts from.
+    direction: (n,), p.
+    length: α.
+    blocking: name of the row that forbade a longer step and joins W, or None.
+    multipliers: μ of the rows of W, by name, where the step arrived; empty when a row blocked.
+    dropped: name of the row that leaves W, or None.
+    objective: ½ xᵀ H x + gᵀ x at x; in phase 1 the largest violation at x, in units of the rows' length.
     """
 
     working: tuple[str, ...]
@@ -77,9 +84,10 @@ class Iteration:
 class ActiveSetRun:
     """The answer of `active_set` and the way to it.
 
-    solution: as from `solve`. iterations: from a feasible point to the optimum, objective falling. phase_one: from the
-    start to that feasible point, violation falling; empty when the start was feasible. working: names of the rows in W
-    at the end, which is what the next problem can start from.
+    solution: the optimum, with its multipliers.
+    iterations: from a feasible point to the optimum, objective falling.
+    phase_one: from the start to that feasible point, violation falling; empty when the start was feasible.
+    working: names of the rows in W at the end, which the next problem can start from.
     """
 
     solution: Solution
@@ -91,23 +99,25 @@ class ActiveSetRun:
 def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str] = ()) -> ActiveSetRun:
     """App. C: solve a convex QP by the active-set method of this module, keeping a record of every iteration.
 
-    start: (n,) a guess of x, such as the last problem's; it need not satisfy any row. Without one, the method starts
-    from the minimiser of the objective on the rows of `working`, as if there were no other rows. working: names of
-    inequality rows to start with in W, such as the last run's `working`: a warm start. Rows that depend on earlier ones
-    are left out. Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has
-    no minimum or is not convex, `UnknownNameError` for a row that does not exist, `InputError` for a start of another
-    shape.
+    qp: the problem.
+    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. Without one, the method starts from
+        the minimiser of the objective on the rows of `working`, as if there were no other rows.
+    working: names of inequality rows to start with in W, such as the last run's `working`: a warm start. Rows that depend
+        on earlier ones are left out.
+
+    Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum or is
+    not convex, `UnknownNameError` for a row that does not exist, `InputError` for a start of another shape.
     """
-    space, problem = qp.equality_space, _Problem(qp.reduced, qp.row_lengths)
-    rows = independent_rows(problem, [_index(qp, name) for name in working])
+    space, problem = qp.equality_space, qp.reduced
+    rows = _independent_rows(problem, [_index(qp, name) for name in working])
     y = None if start is None else space.A.T @ (checked("start", start, (qp.n,)) - space.b)
-    search = feasible_start(problem, starting_point(problem, y, rows), rows)
+    search = _feasible_start(problem, _starting_point(problem, y, rows), rows)
     walk = _walk(problem, search.x, search.rows)
     mu = np.zeros(len(qp.G))
     mu[walk.rows] = np.maximum(walk.multipliers, 0.0)
     taken = len(search.iterations) + len(walk.iterations)
     return ActiveSetRun(
-        solution=finished(qp, space(walk.x), mu, "active_set", taken),
+        solution=with_equality_multipliers(qp, space(walk.x), mu, "active_set", taken),
         iterations=tuple(_in_x(step, space, qp.objective(space.b)) for step in walk.iterations),
         phase_one=tuple(_in_x(step, space, 0.0) for step in search.iterations),
         working=tuple(qp.inequality_names[i] for i in walk.rows),
@@ -133,14 +143,6 @@ def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
-    """A problem without equalities, and the size of each row, in which violations of different rows are compared."""
-
-    qp: QP
-    size: Array
-
-
-@dataclass(frozen=True, eq=False)
 class _Walk:
     """Where a walk ended: point, rows of W and their multipliers, and the iterations that led there."""
 
@@ -150,146 +152,142 @@ class _Walk:
     iterations: list[Iteration]
 
 
-def _walk(problem: _Problem, x: Array, rows: list[int], goal: int | None = None) -> _Walk:
-    """Steps 1 to 4, from a point that satisfies all rows and lies on those of W; ends early when row `goal` blocks."""
-    qp, rows, stuck = problem.qp, list(rows), False
+def _walk(problem: ReducedQP, x: Array, rows: list[int], last: int | None = None) -> _Walk:
+    """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W; ends early when row `last` blocks."""
+    rows, stuck = list(rows), False
     iterations: list[Iteration] = []
-    for _ in range(100 + 20 * (qp.n + len(qp.G))):
-        p, reach = aim(problem, x, rows)
-        length, blocking = longest_step(problem, x, p, reach, rows)
+    for _ in range(100 + 20 * (problem.n + len(problem.G))):
+        p, reach = _direction(problem, x, rows)
+        length, blocking = _longest_step(problem, x, p, reach, rows)
         arrival = x + length * p
-        mu = multipliers(qp, arrival, rows) if blocking is None else np.zeros(0)
-        drop = row_to_drop(problem, arrival, rows, mu, stuck) if blocking is None else None
-        iterations.append(_record(qp, x, rows, p, length, blocking, mu, drop))
+        mu = _multipliers(problem, arrival, rows) if blocking is None else np.zeros(0)
+        drop = _row_to_drop(problem, arrival, rows, mu, stuck) if blocking is None else None
+        iterations.append(_record(problem, x, rows, p, length, blocking, mu, drop))
         if blocking is not None:
             rows.append(blocking)
-        if drop is None and blocking in (None, goal):
+        if drop is None and blocking in (None, last):
             return _Walk(arrival, rows, mu, iterations)
         if drop is not None:
             rows.remove(drop)
         stuck = length * np.linalg.norm(p) <= _ROUNDING * (1.0 + np.linalg.norm(x))
         x = arrival
-    raise SolverError(f"the active set still changes after {len(iterations)} iterations on {qp!r}; check its scaling.")
+    raise SolverError(
+        f"active_set did not converge: its rows still change after {len(iterations)} iterations on {problem!r}. "
+        "Check the scaling of the problem."
+    )
 
 
-def starting_point(problem: _Problem, y: Array | None, rows: list[int]) -> Array:
+def _starting_point(problem: ReducedQP, y: Array | None, rows: list[int]) -> Array:
     """The point on the rows of W that is nearest to y, or without y the minimiser there."""
-    qp, W = problem.qp, problem.qp.G[rows]
-    origin = np.zeros(qp.n) if y is None else y
-    point = origin + np.linalg.pinv(W) @ (qp.h[rows] - W @ origin)
-    p, reach = aim(problem, point, rows)
+    W = problem.G[rows]
+    origin = np.zeros(problem.n) if y is None else y
+    point = origin + np.linalg.pinv(W) @ (problem.h[rows] - W @ origin)
+    p, reach = _direction(problem, point, rows)
     return point + p if y is None and np.isfinite(reach) else point
 
 
-def feasible_start(problem: _Problem, y: Array, rows: list[int]) -> _Walk:
+def _feasible_start(problem: ReducedQP, y: Array, rows: list[int]) -> _Walk:
     """Phase 1: a point that satisfies all rows, with rows of W that it lies on.
 
     Minimises s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h on the others, by the
-    same method. s = 0 is reached exactly if all rows can hold; the rows that stop s above 0 contradict each other.
+    same method. s = 0 is reached exactly if all rows can hold; otherwise the rows that stop s above 0 are in conflict.
     """
-    qp, size = problem.qp, problem.size
-    violation = (qp.G @ y - qp.h) / size
+    n, size = problem.n, problem.row_lengths
+    violation = (problem.G @ y - problem.h) / size
     violation[rows] = 0.0
-    broken = violation > FEASIBILITY_TOLERANCE
-    if not np.any(broken):
+    violated = violation > FEASIBILITY_TOLERANCE
+    if not np.any(violated):
         return _Walk(y, rows, np.zeros(0), [])
-    s_row = len(qp.G)
-    elastic = QP(
-        H=np.zeros((qp.n + 1, qp.n + 1)),
-        g=np.eye(qp.n + 1)[-1],
-        A=np.zeros((0, qp.n + 1)),
-        b=np.zeros(0),
-        G=np.block([[qp.G, -(size * broken)[:, None]], [np.zeros((1, qp.n)), -np.ones((1, 1))]]),
-        h=np.append(qp.h, 0.0),
-        inequality_names=(*qp.inequality_names, _VIOLATION),
+    s_row = len(problem.G)
+    elastic = ReducedQP(
+        H=np.zeros((n + 1, n + 1)),
+        g=np.eye(n + 1)[-1],
+        G=np.block([[problem.G, -(size * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]),
+        h=np.append(problem.h, 0.0),
+        row_lengths=np.append(size, 1.0),
+        inequality_names=(*problem.inequality_names, RowLabel(_VIOLATION)),
     )
     worst = int(np.argmax(violation))
-    walk = _walk(_Problem(elastic, np.append(size, 1.0)), np.append(y, violation[worst]), [*rows, worst], goal=s_row)
+    walk = _walk(elastic, np.append(y, violation[worst]), [*rows, worst], last=s_row)
     if walk.x[-1] > FEASIBILITY_TOLERANCE:
-        push = walk.multipliers * np.append(size, 1.0)[walk.rows]  # those of the elastic rows add up to 1
-        raise contradiction(qp.inequality_names[i] for i in sorted(np.array(walk.rows)[push > 1e-9]))
-    found = independent_rows(problem, [i for i in walk.rows if i != s_row])
+        share = walk.multipliers * elastic.row_lengths[walk.rows]  # those of the violated rows add up to 1
+        raise infeasible(problem.inequality_names[i] for i in sorted(np.array(walk.rows)[share > SHARE]))
+    found = _independent_rows(problem, [i for i in walk.rows if i != s_row])
     return _Walk(walk.x[:-1], found, np.zeros(0), walk.iterations)
 
 
-def aim(problem: _Problem, x: Array, rows: list[int]) -> tuple[Array, float]:
+def _direction(problem: ReducedQP, x: Array, rows: list[int]) -> tuple[Array, float]:
     """The direction p to the minimiser on the rows of W, and how far along it to go: 1, or inf where there is none.
 
     With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u.
     Its curvatures are the eigenvalues of Zᵀ H Z. A direction of zero curvature along which the objective falls leads to
     infinity.
     """
-    qp = problem.qp
-    Z = _null_space(qp.G[rows])
-    curvature, modes = np.linalg.eigh(Z.T @ qp.H @ Z)
-    flat_below = _ROUNDING * float(np.max(np.abs(qp.H), initial=0.0))
-    if np.any(curvature < -1e3 * flat_below):
-        raise not_convex(qp)
+    Z = null_space(problem.G[rows] / problem.row_lengths[rows, None])
+    curvature, modes = np.linalg.eigh(Z.T @ problem.H @ Z)
+    flat_below = _ROUNDING * float(np.max(np.abs(problem.H), initial=0.0))
+    if np.any(curvature < -_COUNTS * flat_below):
+        raise not_convex(problem, float(np.linalg.eigvalsh(problem.H)[0]))
     modes, curved = Z @ modes, curvature > flat_below
-    slope = modes.T @ (qp.H @ x + qp.g)
-    falling = ~curved & (np.abs(slope) > 1e3 * _rounding(qp, x))
+    slope = modes.T @ (problem.H @ x + problem.g)
+    falling = ~curved & (np.abs(slope) > _COUNTS * _slope_rounding(problem, x))
     if np.any(falling):
         return -modes[:, falling] @ slope[falling], np.inf
     return -modes[:, curved] @ (slope[curved] / curvature[curved]), 1.0
 
 
-def longest_step(problem: _Problem, x: Array, p: Array, reach: float, rows: list[int]) -> tuple[float, int | None]:
-    """How far along p, at most `reach`, all rows hold: the length, and the (first) row that forbids more."""
-    qp, room = problem.qp, FEASIBILITY_TOLERANCE * problem.size
-    speed, slack = qp.G @ p, qp.h - qp.G @ x
-    closing = speed > _ROUNDING * problem.size * np.linalg.norm(p)
+def _longest_step(problem: ReducedQP, x: Array, p: Array, reach: float, rows: list[int]) -> tuple[float, int | None]:
+    """How far from x along p, at most `reach`, all rows hold: the length α, and the (first) row that forbids more."""
+    size = problem.row_lengths
+    speed, slack = problem.G @ p, problem.h - problem.G @ x
+    closing = speed > _ROUNDING * size * np.linalg.norm(p)
     closing[rows] = False
     if np.isfinite(reach):
-        closing &= slack - reach * speed < -room
+        closing &= slack - reach * speed < -FEASIBILITY_TOLERANCE * size
     blocking = np.flatnonzero(closing)
     if not blocking.size:
         if reach == np.inf:
-            raise unbounded(qp)
+            raise unbounded(problem)
         return reach, None
-    touching = slack < _ROUNDING * problem.size * (1.0 + np.linalg.norm(x))
+    touching = slack < _ROUNDING * size * (1.0 + np.linalg.norm(x))
     lengths = np.where(touching, 0.0, slack)[blocking] / speed[blocking]
     first = int(np.argmin(lengths))
     return float(lengths[first]), int(blocking[first])
 
 
-def multipliers(qp: QP, x: Array, rows: list[int]) -> Array:
+def _multipliers(problem: ReducedQP, x: Array, rows: list[int]) -> Array:
     """μ of the rows of W at the minimiser on them, shape (len(rows),): solves Gᵀ μ = -(H x + g) in least squares."""
-    return np.linalg.lstsq(qp.G[rows].T, -(qp.H @ x + qp.g), rcond=None)[0]
+    return np.linalg.lstsq(problem.G[rows].T, -(problem.H @ x + problem.g), rcond=None)[0]
 
 
-def row_to_drop(problem: _Problem, x: Array, rows: list[int], mu: Array, stuck: bool) -> int | None:
-    """The row of W that pulls hardest (μ < 0, rows at equal size), or when stuck the first that pulls; or None."""
-    push = mu * problem.size[rows]
-    pulling = [row for row, force in zip(rows, push, strict=True) if force < -_rounding(problem.qp, x)]
-    if not pulling:
+def _row_to_drop(problem: ReducedQP, x: Array, rows: list[int], mu: Array, stuck: bool) -> int | None:
+    """The row of W with the most negative multiplier, rows at equal size, or None; when stuck, the first of wrong sign."""
+    force = mu * problem.row_lengths[rows]
+    wrong = [row for row, f in zip(rows, force, strict=True) if f < -_slope_rounding(problem, x)]
+    if not wrong:
         return None
-    return min(pulling) if stuck else rows[int(np.argmin(push))]
+    return min(wrong) if stuck else rows[int(np.argmin(force))]
 
 
-def independent_rows(problem: _Problem, rows: Sequence[int]) -> list[int]:
+def _independent_rows(problem: ReducedQP, rows: Sequence[int]) -> list[int]:
     """`rows` without those that depend on the ones before them."""
-    kept: list[int] = []
-    basis = np.zeros((0, problem.qp.n))
+    independent: list[int] = []
+    basis = np.zeros((0, problem.n))
     for row in rows:
-        rest = problem.qp.G[row] / problem.size[row]
+        rest = problem.G[row] / problem.row_lengths[row]
         for _ in range(2):  # twice: the first pass leaves rounding
             rest = rest - basis.T @ (basis @ rest)
         length = float(np.linalg.norm(rest))
-        if length > _INDEPENDENT:
-            kept.append(row)
+        if length > RANK_TOLERANCE:
+            independent.append(row)
             basis = np.vstack([basis, rest / length])
-    return kept
+    return independent
 
 
-def _null_space(rows: Array) -> Array:
-    """Orthonormal columns that span the directions along which independent rows stay as they are."""
-    Q = np.linalg.qr(rows.T, mode="complete")[0]
-    return Q[:, len(rows) :]
-
-
-def _rounding(qp: QP, x: Array) -> float:
+def _slope_rounding(problem: ReducedQP, x: Array) -> float:
     """How large an entry of H x + g may come out when it is zero."""
-    return _ROUNDING * float(np.max(np.abs(qp.g), initial=0.0) + np.max(np.abs(qp.H) @ np.abs(x), initial=0.0))
+    H, g = np.abs(problem.H), np.abs(problem.g)
+    return _ROUNDING * float(np.max(g, initial=0.0) + np.max(H @ np.abs(x), initial=0.0))
 
 
 def _index(qp: QP, name: str) -> int:
@@ -299,9 +297,9 @@ def _index(qp: QP, name: str) -> int:
 
 
 def _record(
-    qp: QP, x: Array, rows: list[int], p: Array, length: float, blocking: int | None, mu: Array, drop: int | None
+    problem: ReducedQP, x: Array, rows: list[int], p: Array, length: float, blocking: int | None, mu: Array, drop: int | None
 ) -> Iteration:
-    names = qp.inequality_names
+    names = problem.inequality_names
     return Iteration(
         working=tuple(names[i] for i in rows),
         x=read_only(x),
@@ -310,7 +308,7 @@ def _record(
         blocking=None if blocking is None else names[blocking],
         multipliers={names[i]: float(m) for i, m in zip(rows, mu, strict=False)},
         dropped=None if drop is None else names[drop],
-        objective=qp.objective(x),
+        objective=problem.objective(x),
     )
 
 

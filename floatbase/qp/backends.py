@@ -1,4 +1,4 @@
-"""Who solves a QP: one function a back end, from a QP to its `Solution`, or None when no point satisfies all rows."""
+"""QP back ends: each maps a `QP` to a `Solution`, or None if infeasible."""
 
 from __future__ import annotations
 
@@ -11,16 +11,23 @@ import numpy as np
 
 from floatbase._arrays import Array
 from floatbase.errors import SolverError
-from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP, Solution, finished, not_convex, unbounded
+from floatbase.qp.active_set import active_set as run_active_set
+from floatbase.qp.conflicts import not_convex, unbounded
+from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP, ReducedQP
+from floatbase.qp.solution import Solution, with_equality_multipliers
 
 BackEnd = Callable[[QP], Solution | None]
 
+_DAQP_INFINITY, _PROXQP_INFINITY = 1e30, 1e20  # what these solvers take for no bound
+_CONVEX = 1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
+_POLISHABLE = 1e-4  # part of the largest variable that polishing may move any: beyond it, it mends no last digits
+
 
 def daqp(qp: QP) -> Solution | None:
-    """Eliminate the equalities, then DAQP's dual active set on what is left; what controllers use.
+    """Eliminate the equalities, then DAQP's dual active set on what remains; what controllers use.
 
-    Where weights are so far apart that DAQP finds no end, or one that two steps of Newton's method do not mend, `active_set`
-    answers, in 4 to 40 ms, and `Solution.solver` says so.
+    Where weights are so far apart that DAQP does not converge, or ends where polishing fails, `active_set` answers, in
+    4 to 40 ms, and `Solution.solver` says so.
     """
     import daqp
 
@@ -33,7 +40,7 @@ def daqp(qp: QP) -> Solution | None:
         inner.g / scale,
         inner.G / size[:, None],
         inner.h / size,
-        np.full(rows, -1e30),
+        np.full(rows, -_DAQP_INFINITY),
         np.zeros(rows, dtype=np.int32),
         primal_tol=FEASIBILITY_TOLERANCE,
         eps_prox=-1.0,
@@ -43,49 +50,24 @@ def daqp(qp: QP) -> Solution | None:
     if flag == -3:
         raise unbounded(qp)
     if flag == -5:
-        raise not_convex(qp)
+        raise not_convex(qp, _least_curvature(qp))
     if flag not in (1, 2):  # it cycles, or takes too many iterations
         return active_set(qp)
     mu: Array = np.maximum(np.asarray(info["lam"], dtype=np.float64)[:rows] * scale, 0.0) / size
-    sharpened = _sharpened(qp, np.asarray(y), mu)
-    if sharpened is None:
+    polished = _polished(qp, np.asarray(y), mu)
+    if polished is None:
         return active_set(qp)
-    return finished(qp, qp.equality_space(sharpened[0]), sharpened[1], "daqp", int(info["iterations"]))
-
-
-def _sharpened(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
-    """Two steps of Newton's method on the optimality conditions of the rows that push, for the last digits of y and μ.
-
-    With weights from 1e-8 to 1 the reduced H has few digits left for the slope; here it is summed in extended precision,
-    where the processor has it, from the problem as it was written. None where a step would do more than that.
-    """
-    inner, space, n = qp.reduced, qp.equality_space, len(y)
-    pushing = np.flatnonzero(mu > 0.0)
-    G = inner.G[pushing]
-    K = np.block([[inner.H, G.T], [G, np.zeros((len(G), len(G)))]])
-    Z, H, rows = (np.asarray(part, dtype=np.longdouble) for part in (space.A, qp.H, qp.G[pushing]))
-    found = np.concatenate([y, mu[pushing]]).astype(np.longdouble)
-    for _ in range(2):
-        x = Z @ found[:n] + space.b
-        slope = Z.T @ (H @ x + qp.g + rows.T @ found[n:])
-        left = np.concatenate([slope, rows @ x - qp.h[pushing]]).astype(np.float64)
-        try:
-            step = np.linalg.solve(K, left)
-        except np.linalg.LinAlgError:  # an optimum that is not unique
-            return y, mu
-        if not np.max(np.abs(step[:n]), initial=0.0) < 1e-4 * (1.0 + np.max(np.abs(y), initial=0.0)):
-            return None
-        found -= step
-    better = np.array(mu)
-    better[pushing] = np.maximum(found[n:].astype(np.float64), 0.0)
-    return found[:n].astype(np.float64), better
+    return with_equality_multipliers(qp, qp.equality_space(polished[0]), polished[1], "daqp", int(info["iterations"]))
 
 
 def active_set(qp: QP) -> Solution | None:
-    """The primal active-set method of `active_set.py`, from a cold start; written to be read."""
-    from floatbase.qp.active_set import active_set
-
-    return active_set(qp).solution
+    """The primal active-set method of `active_set.py` from a cold start, its answer polished; written to be read."""
+    found = run_active_set(qp).solution
+    space = qp.equality_space
+    polished = _polished(qp, space.A.T @ (found.x - space.b), found.inequality_multipliers)
+    if polished is None or np.any(qp.G @ space(polished[0]) - qp.h > FEASIBILITY_TOLERANCE * qp.row_lengths):
+        return found  # an optimum that is not unique: the steps may lead past rows that are not active
+    return with_equality_multipliers(qp, space(polished[0]), polished[1], found.solver, found.iterations)
 
 
 def cvxpy(qp: QP) -> Solution | None:
@@ -111,19 +93,20 @@ def cvxpy(qp: QP) -> Solution | None:
             warnings.filterwarnings("ignore", message="Solution may be inaccurate")
             problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=200)
     except cp.error.SolverError as error:
-        raise SolverError(f"Clarabel gave up on {qp!r}: {error}") from None
+        raise SolverError(f"Clarabel did not converge on {qp!r}: {error}") from None
     if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
         return None
     if problem.status in (cp.UNBOUNDED, cp.UNBOUNDED_INACCURATE):
         raise unbounded(qp)
     if step.value is None:
-        raise SolverError(f"Clarabel ended with status {problem.status!r} on {qp!r}.")
+        raise SolverError(f"Clarabel did not converge on {qp!r}: it ended with status {problem.status!r}.")
     mu = np.maximum(np.atleast_1d(constraints[-1].dual_value) * scale, 0.0) if len(qp.G) else np.zeros(0)
-    return finished(qp, origin + np.asarray(step.value), mu, "cvxpy", int(problem.solver_stats.num_iters or 0))
+    iterations = int(problem.solver_stats.num_iters or 0)
+    return with_equality_multipliers(qp, origin + np.asarray(step.value), mu, "cvxpy", iterations)
 
 
 def proxsuite(qp: QP) -> Solution | None:
-    """Eliminate the equalities, then ProxQP's augmented Lagrangian on what is left.
+    """Eliminate the equalities, then ProxQP's augmented Lagrangian on what remains.
 
     Only where the package `proxsuite` is installed. Its torques agree with DAQP's to about 1e-4 N·m.
     """
@@ -136,11 +119,10 @@ def proxsuite(qp: QP) -> Solution | None:
     scale = _objective_size(inner)
     problem = proxqp.dense.QP(inner.n, 0, len(qp.G))
     problem.settings.eps_abs, problem.settings.eps_rel = FEASIBILITY_TOLERANCE, 0.0
-    problem.settings.check_duality_gap = True  # without it ProxQP stops beside the rows that push
+    problem.settings.check_duality_gap = True  # without it ProxQP stops beside the active rows
     problem.settings.eps_duality_gap_abs, problem.settings.eps_duality_gap_rel = FEASIBILITY_TOLERANCE, 0.0
     problem.settings.eps_primal_inf = 1e-8  # at its own 1e-4 it calls standing robots infeasible
-    below = np.full(len(qp.G), -1e20)
-    problem.init(inner.H / scale, inner.g / scale, None, None, inner.G, below, inner.h)
+    problem.init(inner.H / scale, inner.g / scale, None, None, inner.G, np.full(len(qp.G), -_PROXQP_INFINITY), inner.h)
     problem.solve()
     found = problem.results
     if found.info.status == proxqp.PROXQP_PRIMAL_INFEASIBLE:
@@ -148,9 +130,13 @@ def proxsuite(qp: QP) -> Solution | None:
     if found.info.status == proxqp.PROXQP_DUAL_INFEASIBLE:
         raise unbounded(qp)
     if found.info.status != proxqp.PROXQP_SOLVED:
-        raise _gave_up(qp, "ProxQP", f"status {found.info.status.name}")
+        active_set(qp)  # where there is no optimum, this raises the error that says so
+        raise SolverError(
+            f"ProxQP did not converge on {qp!r}: status {found.info.status.name}. Are its weights too far apart? "
+            'solver="active_set" copes with it.'
+        )
     mu = np.maximum(found.z * scale, 0.0)
-    return finished(qp, qp.equality_space(found.x), mu, "proxsuite", int(found.info.iter))
+    return with_equality_multipliers(qp, qp.equality_space(found.x), mu, "proxsuite", int(found.info.iter))
 
 
 ALWAYS: dict[str, BackEnd] = {"daqp": daqp, "cvxpy": cvxpy, "active_set": active_set}
@@ -163,18 +149,48 @@ def installed() -> Mapping[str, BackEnd]:
     return ALWAYS | {name: back_end for name, back_end in OPTIONAL.items() if find_spec(name)}
 
 
+def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
+    """Two steps of Newton's method on the optimality conditions of the active rows, for the last digits of y and μ.
+
+    With weights from 1e-8 to 1 the reduced H has few digits to spare for the slope; here it is summed in extended precision,
+    where the processor has it, from the problem as it was written. None where a step would do more than that.
+
+    qp: the problem.
+    y: (p,), the minimiser of `qp.reduced`.
+    mu: (l,), the multipliers of the inequalities.
+    """
+    inner, space, n = qp.reduced, qp.equality_space, len(y)
+    active = np.flatnonzero(mu > 0.0)
+    G = inner.G[active]
+    K = np.block([[inner.H, G.T], [G, np.zeros((len(G), len(G)))]])
+    Z, H, rows = (np.asarray(part, dtype=np.longdouble) for part in (space.A, qp.H, qp.G[active]))
+    found = np.concatenate([y, mu[active]]).astype(np.longdouble)
+    for _ in range(2):
+        x = Z @ found[:n] + space.b
+        slope = Z.T @ (H @ x + qp.g + rows.T @ found[n:])
+        residual = np.concatenate([slope, rows @ x - qp.h[active]]).astype(np.float64)
+        try:
+            step = np.linalg.solve(K, residual)
+        except np.linalg.LinAlgError:  # an optimum that is not unique
+            return y, mu
+        if not np.max(np.abs(step[:n]), initial=0.0) < _POLISHABLE * (1.0 + np.max(np.abs(y), initial=0.0)):
+            return None
+        found -= step
+    polished = np.array(mu)
+    polished[active] = np.maximum(found[n:].astype(np.float64), 0.0)
+    return found[:n].astype(np.float64), polished
+
+
 def _check_convex(qp: QP) -> None:
     """For solvers that take convexity on trust."""
     H = qp.reduced.H
-    if len(H) and np.linalg.eigvalsh(H)[0] < -1e-10 * np.max(np.abs(H)):
-        raise not_convex(qp)
+    if len(H) and _least_curvature(qp) < -_CONVEX * np.max(np.abs(H)):
+        raise not_convex(qp, _least_curvature(qp))
 
 
-def _gave_up(qp: QP, solver: str, reason: str) -> SolverError:
-    """The error for a solver that came to no end; where there is no optimum, `active_set` raises what says so."""
-    active_set(qp)
-    advice = 'Are its weights too far apart? solver="active_set" copes with it.'
-    return SolverError(f"{solver} gave up on {qp!r}: {reason}. {advice}")
+def _least_curvature(qp: QP) -> float:
+    """The smallest curvature of the objective where the equalities hold."""
+    return float(np.linalg.eigvalsh(qp.reduced.H)[0])
 
 
 def _single_point(qp: QP) -> Solution | None:
@@ -182,10 +198,10 @@ def _single_point(qp: QP) -> Solution | None:
     x = qp.equality_space.b
     if np.any(qp.G @ x - qp.h > FEASIBILITY_TOLERANCE * qp.row_lengths):
         return None
-    return finished(qp, x, np.zeros(len(qp.G)), "the equalities", 0)
+    return with_equality_multipliers(qp, x, np.zeros(len(qp.G)), "the equalities", 0)
 
 
-def _objective_size(qp: QP) -> float:
+def _objective_size(qp: QP | ReducedQP) -> float:
     """What to divide the objective by so that tolerances mean the same for every problem."""
     return float(np.max(np.abs(qp.H), initial=0.0) or np.max(np.abs(qp.g), initial=0.0) or 1.0)
 

@@ -21,9 +21,15 @@ def linear_program(
     bounds: Sequence[tuple[float | None, float | None]] | tuple[float | None, float | None] = (0.0, None),
     tolerance: float | None = None,
 ) -> OptimizeResult:
-    """min costᵀ x, A x = b, G x ≤ h; `.status` is `OPTIMAL`, `INFEASIBLE` or `UNBOUNDED`, never anything else.
+    """min cᵀ x subject to A x = b, G x ≤ h; `.status` is `OPTIMAL`, `INFEASIBLE` or `UNBOUNDED`, never anything else.
 
-    tolerance: what rows and multipliers may be off by, HiGHS's own 1e-7 by default. Raises `SolverError` when HiGHS gives up.
+    cost: c, (n,).
+    equalities: A, b.
+    inequalities: G, h.
+    bounds: (lowest, highest) of every variable, or a list with a pair for each; None where there is none.
+    tolerance: what rows and multipliers may be off by, HiGHS's own 1e-7 by default.
+
+    Raises `SolverError` when HiGHS does not converge.
     """
     from scipy.optimize import linprog  # slow to load, and never needed while all goes well
 
@@ -36,4 +42,4 @@ def linear_program(
         result = linprog(cost, G, h, A, b, bounds, method="highs-ds", options={"presolve": presolve, **options})
         if result.status in (OPTIMAL, INFEASIBLE, UNBOUNDED):
             return result
-    raise SolverError(f"HiGHS could not solve a linear program of {cost.size} variables: {result.message}")
+    raise SolverError(f"HiGHS did not converge on a linear program of {cost.size} variables: {result.message}")

@@ -21,7 +21,6 @@ from floatbase.viewer.colours import (
     X_AXIS,
     hexadecimal,
 )
-from floatbase.viewer.cones import cone_status, polyhedron_status
 from floatbase.viewer.figures import FIGURES
 from floatbase.viewer.meshes import robot_meshes
 from floatbase.viewer.painter import below
@@ -53,13 +52,11 @@ __all__ = [
     "Viewer",
     "Window",
     "below",
-    "cone_status",
     "geometry",
     "hexadecimal",
     "marks",
     "page",
     "plots",
-    "polyhedron_status",
     "props",
     "push_at",
     "recording",

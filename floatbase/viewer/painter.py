@@ -14,11 +14,10 @@ from scipy.spatial.distance import pdist
 from floatbase._arrays import Array, checked
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
-from floatbase.friction import FrictionPolyhedron
+from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.robots import Robot, State
 from floatbase.viewer import lowering, marks, shapes
 from floatbase.viewer.colours import GHOST, MEASURED, PLANNED, RGB
-from floatbase.viewer.cones import cone_status, polyhedron_status
 from floatbase.viewer.ground import LEVEL, Plane, plane_under
 from floatbase.viewer.meshes import JointMesh, robot_meshes
 from floatbase.viewer.shapes import Item, Picture
@@ -220,11 +219,12 @@ class Painter:
         """A cone or polyhedron in the colour that the force gives it; without a force it is grey and faint."""
         judged = None if force is None or self._is_quiet(force) else force
         if self.facets is None:
-            status = "idle" if judged is None else cone_status(judged, normal, mu)
+            status = "idle" if judged is None else _friction_cone(tuple(normal.tolist()), mu).status(judged)
             return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
         polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inside)
-        status, active = ("idle", []) if judged is None else polyhedron_status(judged, polyhedron)
+        status = "idle" if judged is None else polyhedron.status(judged)
         status = "inside" if status == "active" else status  # an active facet has a colour of its own
+        active = () if judged is None else polyhedron.active_facets(judged)
         return shapes.friction_polyhedron(position, polyhedron, height, status, active)
 
     def _is_quiet(self, force: Array) -> bool:
@@ -301,6 +301,12 @@ def kinds(picture: Picture) -> set[str]:
     """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a force is an "idle cone"."""
     idle = shapes.cone_colour("idle")
     return {"idle cone" if item.colour == idle else path.split("/")[0] for path, item in picture.items()}
+
+
+@lru_cache(maxsize=256)
+def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
+    """A cone, once: a ground has few."""
+    return FrictionCone(np.array(normal), mu)
 
 
 @lru_cache(maxsize=256)

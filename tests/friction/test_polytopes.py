@@ -11,7 +11,6 @@ from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
 from floatbase.friction import cone_rows, vertices
-from floatbase.qp import linear_program
 
 Array = npt.NDArray[np.float64]
 seeds = st.integers(0, 100_000)
@@ -82,11 +81,3 @@ def test_points_on_an_edge_are_no_vertices_and_the_plane_is_walked_counter_clock
     assert len(found) == 4
     x, y = found.T
     assert 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) == pytest.approx(4.0)
-
-
-def test_a_linear_program_says_optimal_infeasible_or_unbounded() -> None:
-    one = np.ones(1)
-    assert linear_program(one, (np.eye(1), one)).status == 0
-    assert linear_program(one, (np.eye(1), -one)).status == 2
-    assert linear_program(-one).status == 3
-    assert linear_program(-one, inequalities=(-np.eye(1), -one), bounds=(None, None)).status == 3

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from fractions import Fraction
 
 import judges
 import numpy as np
@@ -10,14 +10,15 @@ import pytest
 
 import floatbase as fb
 from floatbase.errors import InfeasibleError, InputError, SolverError, UnknownNameError
-from floatbase.qp import FEASIBILITY_TOLERANCE, QP, backends, check_solver, solve, solvers
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, check_solver, solve, solvers
 
 NONE = np.zeros((0, 2)), np.zeros(0)
+LAST_DIGITS = 1e-7  # N·m: a rounding of 1e-16 divided by a part of 1e-12 in curvature is 1e-4; polished answers leave some 1e-9
 EXACT = ("daqp", "active_set")  # solvers that end at a vertex of rows rather than near it
 
 
 def corner(scale: float = 1.0, row_scale: float = 1.0, equality_scale: float = 1.0) -> QP:
-    """min ½ x² + ½ y² + ½ z² - 3 x - z, x ≤ 1, y ≥ 0.5, x + z = 2, in other units: (1, 0.5, 1), pushed by 2 and 0.5."""
+    """min ½ x² + ½ y² + ½ z² - 3 x - z, x ≤ 1, y ≥ 0.5, x + z = 2, in other units: (1, 0.5, 1), multipliers 2 and 0.5."""
     return QP(
         scale * np.eye(3),
         scale * np.array([-3.0, 0.0, -1.0]),
@@ -63,13 +64,14 @@ def test_the_unit_of_an_equation_does_not_make_it_disappear(solver: str, equalit
 def test_the_reduced_problem_is_the_problem_on_the_space_of_its_equalities() -> None:
     qp = judges_qp("go2", 1)
     space, inner = qp.equality_space, qp.reduced
-    assert inner.n == space.n_in and not len(inner.A)
+    assert inner.n == space.n_in
     assert inner.inequality_names == qp.inequality_names
     offset = qp.objective(space.b)
     for beta in np.random.default_rng(0).normal(size=(5, inner.n)):
         assert inner.objective(beta) + offset == pytest.approx(qp.objective(space(beta)), rel=1e-9)
         assert np.allclose(inner.G @ beta - inner.h, qp.G @ space(beta) - qp.h, atol=1e-9)
-    assert np.allclose(space(solve(inner).x), solve(qp).x, atol=1e-9)
+    alone = QP(inner.H, inner.g, np.zeros((0, inner.n)), np.zeros(0), inner.G, inner.h)
+    assert np.allclose(space(solve(alone).x), solve(qp).x, atol=1e-9)
 
 
 def test_what_vanishes_on_the_equalities_comes_out_as_zero_and_not_as_rounding() -> None:
@@ -85,13 +87,13 @@ def judges_qp(name: str, seed: int) -> QP:
     robot = judges.load(name)
     limits = 0.4 * robot.torque_limits
     tasks = fb.standing_tasks(robot.standing())
-    controller = fb.WholeBodyController(robot, judges.stance(robot, 0.5), tasks, torque_limits=limits)
+    controller = fb.WholeBodyController(robot, judges.stance(robot, 0.5), tasks, torque_limits=limits, path="readable")
     return controller.qp(robot.random_state(seed, 0.1))
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_every_solver_gives_the_controller_the_same_torques(name: str) -> None:
-    for seed in range(5):
+    for seed in range(3):
         qp = judges_qp(name, seed)
         reference = solve(qp, "active_set")
         for solver in solvers():
@@ -111,10 +113,12 @@ def test_every_solver_gives_the_controller_the_same_torques(name: str) -> None:
         QP(np.diag([1.0, 0.0]), [1.0, -2.0], *NONE, *NONE),
         QP(np.diag([1.0, 0.0]), [1.0, -2.0], *NONE, [[1.0, 0.0]], [0.0]),
         QP(1e-6 * np.diag([1.0, 0.0]), [0.0, -2.0], *NONE, [[1.0, -3.0]], [0.0]),
+        QP(np.ones((2, 2)), [0.0, -2.0], [[1.0, 1.0]], [2.0], *NONE),
+        QP(np.diag([1.0, 0.0]), [0.0, -1.0], *NONE, [[1.0, -1.0], [-1.0, -1.0]], [0.0, 0.0]),
     ],
 )
 def test_every_solver_calls_an_objective_that_falls_for_ever_just_that(solver: str, qp: QP) -> None:
-    with pytest.raises(SolverError, match="has no minimum: it falls for ever"):
+    with pytest.raises(SolverError, match="has no minimum: it falls for ever .* regularisation"):
         solve(qp, solver)
 
 
@@ -140,12 +144,13 @@ def test_rows_that_only_just_meet_leave_a_point(solver: str) -> None:
     assert np.allclose(found.x, [1.0, -2.0])
 
 
-def test_equalities_in_conflict_are_a_smallest_set() -> None:
+@pytest.mark.parametrize("solver", solvers())
+def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> None:
     A = np.array([[1.0, 0.0], [1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [0.0, 3.0]])
     names = ("x is 1", "sum is 3", "x is 1.5", "y is 2", "y is 2 again")
     qp = QP(np.eye(2), np.zeros(2), A, [1.0, 3.0, 3.0, 2.0, 6.0], *NONE, equality_names=names)
-    with pytest.raises(InfeasibleError, match="these equality rows contradict each other: .* Drop one") as caught:
-        solve(qp)
+    with pytest.raises(InfeasibleError, match="these equality rows are inconsistent: .* Drop one of them") as caught:
+        solve(qp, solver)
     kept = [names.index(row) for row in caught.value.rows]
     assert set(caught.value.rows) in ({"x is 1", "x is 1.5"}, {"sum is 3", "x is 1.5", "y is 2"},
                                       {"sum is 3", "x is 1.5", "y is 2 again"})  # fmt: skip
@@ -162,15 +167,7 @@ def test_row_names_that_stand_twice_are_refused() -> None:
 # what is not installed -----------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def without_proxsuite(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(backends, "find_spec", lambda name: None)
-    backends.installed.cache_clear()
-    yield
-    backends.installed.cache_clear()
-
-
-@pytest.mark.usefixtures("without_proxsuite")
+@pytest.mark.skipif("proxsuite" in solvers(), reason="proxsuite is installed")
 def test_a_solver_that_is_not_installed_says_how_to_install_it() -> None:
     assert solvers() == ("daqp", "cvxpy", "active_set")
     for ask in (check_solver, lambda solver: solve(corner(), solver)):
@@ -183,18 +180,41 @@ def test_a_solver_that_does_not_exist_is_refused_with_the_near_names() -> None:
         check_solver("activeset")
 
 
-def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method() -> None:
-    """Clarabel judges: DAQP found no end here, or one that was 0.03 N·m off without a word."""
+def residual_torque(solution: Solution) -> float:
+    """How far, N·m, one Newton step on the optimality conditions of the active rows would still move a torque.
+
+    The residuals are summed in whole fractions, without rounding: what is small along a direction of little curvature would
+    not show in numbers of 16 digits. Then equations in these digits say what step they ask for.
+    """
+    qp = solution.qp
+    active = np.flatnonzero(solution.inequality_multipliers > 0.0)
+    rows = np.vstack([qp.A, qp.G[active]])
+    multipliers = np.concatenate([solution.equality_multipliers, solution.inequality_multipliers[active]])
+    # stationarity along all directions that the rows leave: ν and μ of rows that depend on others are not unique
+    slope = exact_sum(np.hstack([qp.H, rows.T]), np.concatenate([solution.x, multipliers]), qp.g)
+    offset = exact_sum(rows, solution.x, -np.concatenate([qp.b, qp.h[active]]))
+    K = np.block([[qp.H, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+    step = np.linalg.lstsq(K, np.concatenate([slope, offset]), rcond=1e-15)[0]
+    return float(np.max(np.abs(step[qp.blocks["tau"]])))
+
+
+def exact_sum(A: np.ndarray, x: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """A x + b, rounded once."""
+    fractions = [Fraction(float(value)) for value in x]
+    rows = [[(Fraction(float(a)), v) for a, v in zip(row, fractions, strict=True) if a] for row in A]
+    return np.array([float(sum((a * v for a, v in row), Fraction(float(c)))) for row, c in zip(rows, b, strict=True)])
+
+
+def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method_to_the_last_digits() -> None:
+    """DAQP does not converge here, or ends 0.03 N·m off without a word; curvatures of the reduced H run from 1e-11 to 20."""
     robot = judges.load("talos")
     at = robot.standing()
     tasks = [fb.CoMTask(at.com, weight=100.0), fb.OrientationTask("base", weight=100.0)]
-    answers, solvers = [], set()
-    controllers = [
-        fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks, solver=s, path="readable") for s in ("daqp", "cvxpy")
-    ]
+    controller = fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks, path="readable")
+    answered = set()
     for state in (at, robot.random_state(1, 0.1), robot.random_state(2, 0.1)):
-        found, wanted = (controller(state.q, state.v) for controller in controllers)
-        solvers.add(found.solution.solver)
-        answers.append(float(np.max(np.abs(found.tau - wanted.tau))))
-    assert max(answers) < 1e-4
-    assert "active_set" in solvers, "DAQP managed: these states no longer try what this test is about"
+        found = controller(state.q, state.v).solution
+        answered.add(found.solver)
+        assert found.residuals.inequality < FEASIBILITY_TOLERANCE
+        assert residual_torque(found) < LAST_DIGITS
+    assert "active_set" in answered, "DAQP managed: these states no longer try what this test is about"

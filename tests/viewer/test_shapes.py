@@ -21,10 +21,8 @@ from floatbase.viewer import (
     View,
     Viewer,
     below,
-    cone_status,
     geometry,
     marks,
-    polyhedron_status,
     props,
     shapes,
 )
@@ -54,24 +52,6 @@ def test_frame_along_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]
     np.testing.assert_allclose(turned[:, 2], direction, atol=1e-12)
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(turned) == pytest.approx(1.0)
-
-
-def test_a_cones_status_changes_at_the_friction_limit() -> None:
-    up = np.array([0.0, 0.0, 1.0])
-    for slide, status in ((0.0, "inside"), (5.8, "inside"), (6.0, "active"), (6.2, "outside")):
-        for angle in np.linspace(0, 2 * np.pi, 7):
-            force = [slide * np.cos(angle), slide * np.sin(angle), 10.0]
-            assert cone_status(force, up, 0.6) == status
-    assert cone_status([0, 0, -1.0], up, 0.6) == "outside"
-
-
-def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it() -> None:
-    from floatbase.friction import FrictionPolyhedron
-
-    up, force = np.array([0.0, 0.0, 1.0]), np.array([5.0, 0.0, 10.0])
-    assert cone_status(force, up, 0.6) == "inside"
-    assert polyhedron_status(force, FrictionPolyhedron(up, 0.6, 4, True)) == ("outside", [0])
-    assert polyhedron_status(force, FrictionPolyhedron(up, 0.6, 4, False)) == ("inside", [])
 
 
 def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:

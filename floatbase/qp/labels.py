@@ -1,0 +1,49 @@
+"""The label of a row of a `QP`: its name, which is a text, and what kind of row it is, of which owner."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from floatbase.errors import InputError
+
+OTHER = "other rows"  # the kind of a row whose name is a plain text
+
+
+class RowLabel(str):
+    """The name of a row, such as "FL_foot facet 2", that also knows what it names.
+
+    text: the name; label and text are equal, so `"FL_foot facet 2" in command.active` asks as one expects.
+    kind: what the row says, such as "friction", "normal force", "upper torque limit", "dynamics" or "motion".
+    owner: the foot, joint or contact that it says it of; the text itself by default.
+    index: which of its owner's rows of that kind, or None where the owner has one.
+    """
+
+    __slots__ = ("index", "kind", "owner")
+
+    kind: str
+    owner: str
+    index: int | None  # type: ignore[assignment]  # a text's own method of that name finds a part of it
+
+    def __new__(cls, text: str, kind: str = OTHER, owner: str | None = None, index: int | None = None) -> RowLabel:
+        label = super().__new__(cls, text)
+        label.kind, label.owner, label.index = kind, text if owner is None else owner, index
+        return label
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return RowLabel, (str(self), self.kind, self.owner, self.index)
+
+
+def row_labels(names: Iterable[str], rows: int, kind: str) -> tuple[RowLabel, ...]:
+    """A label for each of the rows: the names as labels, or "equality 0", "equality 1", … where there are none.
+
+    kind: "equality" or "inequality". Raises `InputError` for another number of names, or one that stands twice.
+    """
+    labels = tuple(name if isinstance(name, RowLabel) else RowLabel(name) for name in names)
+    labels = labels or tuple(RowLabel(f"{kind} {i}") for i in range(rows))
+    if len(labels) != rows:
+        raise InputError(f"{len(labels)} {kind} names for {rows} rows; give one for each row, or none at all.")
+    if len(set(labels)) != rows:
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise InputError(f"{kind} name {str(twice)!r} stands twice; each row needs a name of its own.")
+    return labels
