@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from types import SimpleNamespace
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, positive, read_only
-from floatbase.control.tick import Compiled, Program, kernel_obstacle, obstacle, told_when_slow, unkept
+from floatbase.control.tick import Compiled, announce_if_slow, cache_warning, obstacle
 from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
@@ -265,7 +266,7 @@ class WholeBodyController:
             evidence=lambda: solution,
         )
 
-    def _fast_tick(self, program: Program, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
+    def _fast_tick(self, program: Compiled, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
         """The program's answer, or None where the readable path must give it, or say what is wrong."""
         try:
             q, v = np.array(q, dtype=np.float64), np.array(v, dtype=np.float64)
@@ -276,14 +277,15 @@ class WholeBodyController:
             return None
         numbers, held, targets = answer
         numbers.setflags(write=False)
-        nv, tail, end = program.nv, program.nv + program.d, program.size
+        nv, tail = self.robot.nv, self.robot.nv + self.robot.d
+        end = tail + self.contacts.k
 
         def evidence() -> Solution:
             eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
             qp = build_qp(eom, program.tasks(targets), self.limits, t)
-            return finished(qp, numbers[:end], program.multipliers(numbers, held, len(qp.G)), program.path, held)
+            return finished(qp, numbers[:end], program.multipliers(numbers, held, len(qp.G)), "compiled", held)
 
-        return Command(numbers[nv:tail], numbers[:nv], numbers[tail:end], self.contacts, evidence, program.path)
+        return Command(numbers[nv:tail], numbers[:nv], numbers[tail:end], self.contacts, evidence, "compiled")
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""
@@ -303,8 +305,8 @@ class WholeBodyController:
     def _warm_up(self) -> None:
         """Run one tick of a fast path before the loop does."""
         if self._program is not None:
-            often = unkept()
-            with told_when_slow(
+            often = cache_warning()
+            with announce_if_slow(
                 f"floatbase compiles its controller{'; ' + often if often else ', once: about half a minute'}."
             ):
                 self._program.warm_up()
@@ -319,23 +321,24 @@ class WholeBodyController:
 
     def _choose_path(self) -> None:
         """Set `path`, `path_reason` and the tables of a fast path, or raise when one was asked for and cannot be."""
-        self._program: Program | None = None
+        self._program: Compiled | None = None
         self.path: Literal["compiled", "readable"] = "readable"
         self.path_reason = "it was asked for"
         if self.asked_path == "readable":
             return
-        reason = kernel_obstacle() or obstacle(self.robot, self.contacts, self.tasks, self.solver)
+        problem: Any = SimpleNamespace(robot=self.robot, contacts=self.contacts, tasks=self.tasks, limits=self.limits)
+        reason = obstacle(problem, self.solver)
         if reason and self.asked_path == "compiled":
             raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
         if reason:
             self.path_reason = reason
             return
-        program = Compiled(self.robot, self.contacts, self.tasks, self.limits)
+        program = Compiled(problem)
         if not program.fits:
             self.path_reason = "a target has the wrong shape"
             return
-        self._program, self.path = program, program.path
-        self.path_reason = "; ".join(filter(None, ("the tasks and contacts are the package's own", unkept())))
+        self._program, self.path = program, "compiled"
+        self.path_reason = "; ".join(filter(None, ("the tasks and contacts are the package's own", cache_warning())))
 
     def __repr__(self) -> str:
         return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"

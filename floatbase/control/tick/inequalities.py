@@ -1,0 +1,143 @@
+"""The inequalities of (27)(28), G β ≤ h, which are written out only for the rows that β violates.
+
+Rows are numbered: for each of P points its F facets and its normal force, then d upper torque limits, then d lower ones.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from floatbase.control.tick.jit import jit
+from floatbase.control.tick.memory import clear
+from floatbase.control.tick.vectors import dot, minus, times
+from floatbase.qp import FEASIBILITY_TOLERANCE
+
+
+class Inequalities(NamedTuple):
+    """The inequalities on forces and torques.
+
+    cones: (P, F + 1, 3), rows of G for the force of each point: F facets, then -normal.
+    lengths: (P, F + 1), of those rows.
+    least_normal: N, least normal force of each point.
+    torque_limits: (d,), N·m.
+    """
+
+    cones: Any
+    lengths: Any
+    least_normal: Any
+    torque_limits: Any
+
+
+@jit
+def affine_value(V, beta, first, last, out):
+    """out (last - first,) = rows first:last of V (·, nb + 1) times (β, 1)."""
+    nb = beta.size
+    for i in range(first, last):
+        total = V[i, nb]
+        for c in range(nb):
+            total += V[i, c] * beta[c]
+        out[i - first] = total
+
+
+@jit
+def forces_of(space, beta, forces):
+    """forces (k,) at β; most of them are a β themselves."""
+    first = space.V.shape[0] - forces.size
+    for i in range(forces.size):
+        if space.beta_of[first + i] >= 0:
+            forces[i] = beta[space.beta_of[first + i]]
+        else:
+            affine_value(space.V, beta, first + i, first + i + 1, forces[i:])
+
+
+@jit
+def cone_row(cones, i, j):
+    """Row j of point i of cones (P, F + 1, 3)."""
+    return cones[i, j, 0], cones[i, j, 1], cones[i, j, 2]
+
+
+@jit
+def worst_facet(cones, i, f):
+    """(28) The facet of point i that the force f violates most, and by how much; -1 where it violates none.
+
+    Forces in the circle that the facets touch violate none.
+    """
+    facets = cones.shape[1] - 1
+    first, normal = cone_row(cones, i, 0), times(-1.0, cone_row(cones, i, facets))
+    mu, along = -dot(first, normal), dot(normal, f)
+    across = minus(f, times(along, normal))
+    if along >= 0.0 and dot(across, across) <= mu * mu * along * along:
+        return -1, 0.0
+    worst, found = 0.0, -1
+    for j in range(facets):
+        excess = dot(cone_row(cones, i, j), f)
+        if excess > worst:
+            worst, found = excess, j
+    return found, worst
+
+
+@jit
+def violated_force_row(limits, forces):
+    """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they violate none."""
+    cones, lengths = limits.cones, limits.lengths
+    worst, found = FEASIBILITY_TOLERANCE, -1
+    facets = cones.shape[1] - 1
+    for i in range(cones.shape[0]):
+        f = forces[3 * i], forces[3 * i + 1], forces[3 * i + 2]
+        facet, excess = worst_facet(cones, i, f)
+        if facet >= 0 and excess > worst * lengths[i, facet]:
+            worst, found = excess / lengths[i, facet], i * (facets + 1) + facet
+        excess = dot(cone_row(cones, i, facets), f) + limits.least_normal
+        if excess > worst * lengths[i, facets]:
+            worst, found = excess / lengths[i, facets], i * (facets + 1) + facets
+    return found
+
+
+@jit
+def violated_torque_row(limits, tau):
+    """The torque limit that tau (d,) violates most, d upper ones before d lower ones; -1 where it violates none."""
+    worst, found = FEASIBILITY_TOLERANCE, -1
+    for j in range(tau.size):
+        if tau[j] - limits.torque_limits[j] > worst:
+            worst, found = tau[j] - limits.torque_limits[j], j
+        if -tau[j] - limits.torque_limits[j] > worst:
+            worst, found = -tau[j] - limits.torque_limits[j], tau.size + j
+    return found
+
+
+@jit
+def violated_row(limits, space, beta, forces, tau):
+    """The number of a row of (27)(28) that β (nb,) violates, -1 for none.
+
+    limits, space: as in `Inequalities` and `Space`.
+    forces, tau: (k,), (d,), memory. Torques are computed only where all forces are feasible, since they cost more.
+    """
+    forces_of(space, beta, forces)
+    found = violated_force_row(limits, forces)
+    if found >= 0:
+        return found
+    affine_value(space.T, beta, 0, tau.size, tau)
+    found = violated_torque_row(limits, tau)
+    return found if found < 0 else limits.cones.shape[0] * limits.cones.shape[1] + found
+
+
+@jit
+def row_in_beta(number, limits, space, out):
+    """A row of (27)(28) by its number: out (nb,) = its row of G. Returns its bound in h."""
+    V, T, cones = space.V, space.T, limits.cones
+    nb, d, force_rows = V.shape[1] - 1, T.shape[0], cones.shape[0] * cones.shape[1]
+    clear(out)
+    if number < force_rows:
+        point, facet = number // cones.shape[1], number % cones.shape[1]
+        first = V.shape[0] - 3 * cones.shape[0] + 3 * point
+        bound = -limits.least_normal if facet == cones.shape[1] - 1 else 0.0
+        for r in range(3):
+            for c in range(nb):
+                out[c] += cones[point, facet, r] * V[first + r, c]
+            bound -= cones[point, facet, r] * V[first + r, nb]
+        return bound
+    joint = (number - force_rows) % d
+    sign = 1.0 if number - force_rows < d else -1.0
+    for c in range(nb):
+        out[c] = sign * T[joint, c]
+    return limits.torque_limits[joint] - sign * T[joint, nb]
