@@ -17,30 +17,20 @@ NO_ROTATION = 1e-10  # part by which a target's columns may miss length 1 and ri
 
 
 class TaskTable(NamedTuple):
-    """N tasks.
+    """N tasks."""
 
-    table: (N, 3), kind, joint, first number in targets.
-    gains: (N, 3), weight, kp, kd.
-    frames: (N, 12), pose of the frame in the joint as in `Bodies`.
-    targets: the targets of all tasks, one after the other: position or rotation row by row, velocity, acceleration.
-    """
-
-    table: Any
-    gains: Any
-    frames: Any
-    targets: Any
+    table: Any  # (N, 3), kind, joint, first number in targets
+    gains: Any  # (N, 3), weight, kp, kd
+    frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
+    targets: Any  # of all tasks, one after the other: position or rotation row by row, velocity, acceleration
 
 
 class Cost(NamedTuple):
-    """½ ‖R (β, 1)‖² + ½ Σ diagonal β² - linearᵀ β.
+    """½ ‖R (β, 1)‖² + ½ Σ diagonal β² - linearᵀ β."""
 
-    R: (·, nb + 1), a multiple of four rows.
-    diagonal, linear: (nb,), from terms on single entries of (q̈, λ) that are a β.
-    """
-
-    R: Any
-    diagonal: Any
-    linear: Any
+    R: Any  # (·, nb + 1), a multiple of four rows
+    diagonal: Any  # (nb,), from terms on single entries of (q̈, λ) that are a β
+    linear: Any  # (nb,), likewise
 
 
 @jit

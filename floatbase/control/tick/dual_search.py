@@ -26,19 +26,14 @@ WRONG_SIGN = 1e-9  # part of the largest multiplier by which one may be negative
 
 
 class ActiveSet(NamedTuple):
-    """The active rows, of which q come first in each array, and their factors.
+    """The active rows, of which q come first in each array, and their factors."""
 
-    numbers, mu, bounds: (nb,), number of each row, its multiplier, its bound in h.
-    rows: (nb, nb), its row of G.
-    W, U: (nb, nb), with W H Wᵀ = 1 and W rowsᵀ = U, upper triangular in its first q columns.
-    """
-
-    numbers: Any
-    mu: Any
-    bounds: Any
-    rows: Any
-    W: Any
-    U: Any
+    numbers: Any  # (nb,), number of each row
+    mu: Any  # (nb,), its multiplier
+    bounds: Any  # (nb,), its bound in h
+    rows: Any  # (nb, nb), its row of G
+    W: Any  # (nb, nb), with W H Wᵀ = 1
+    U: Any  # (nb, nb), W rowsᵀ = U, upper triangular in its first q columns
 
 
 @jit

@@ -21,16 +21,11 @@ INCONSISTENT = 1e-6  # m/s²: by so much motion rows disagree through rounding o
 
 
 class Space(NamedTuple):
-    """All (q̈, λ, τ) that satisfy the equalities, as functions of β.
+    """All (q̈, λ, τ) that satisfy the equalities, as functions of β."""
 
-    V: (n, nb + 1), (q̈, λ) = V (β, 1).
-    beta_of: (n,), the number of the β that an entry of (q̈, λ) is, -1 where it is none.
-    T: (d, nb + 1), τ = T (β, 1).
-    """
-
-    V: Any
-    beta_of: Any
-    T: Any
+    V: Any  # (n, nb + 1), (q̈, λ) = V (β, 1)
+    beta_of: Any  # (n,), the number of the β that an entry of (q̈, λ) is, -1 where it is none
+    T: Any  # (d, nb + 1), τ = T (β, 1)
 
 
 @jit
@@ -69,18 +64,11 @@ def gauss_jordan(B, first, last, top, columns, weights, lengths, pivots):
 
 
 @jit
-def row_lengths(B, lengths):
-    """lengths (m,) = Euclidean length of each row of B (m, n + 1) without its last column."""
-    for row in range(B.shape[0]):
-        square = 0.0
-        for c in range(B.shape[1] - 1):
-            square += B[row, c] * B[row, c]
-        lengths[row] = np.sqrt(square)
+def equalities(A, b, M, h, J, base, lengths, B):
+    """(7) without its joint rows: B (m + base, n + 1) = [A 0 | b] above [M_b -J_bᵀ | -h_b]; see `eliminate`.
 
-
-@jit
-def equalities(A, b, M, h, J, base, B):
-    """(7) without its joint rows: B (m + base, n + 1) = [A 0 | b] above [M_b -J_bᵀ | -h_b], the first `base` rows of M, h."""
+    lengths: (m + base,) receives the length of each row without its last entry.
+    """
     m, nv, k = A.shape[0], A.shape[1], J.shape[0]
     for i in range(m):
         for c in range(nv):
@@ -94,6 +82,11 @@ def equalities(A, b, M, h, J, base, B):
         for c in range(k):
             B[m + i, nv + c] = -J[c, i]
         B[m + i, nv + k] = -h[i]
+    for row in range(m + base):
+        square = 0.0
+        for c in range(nv + k):
+            square += B[row, c] * B[row, c]
+        lengths[row] = np.sqrt(square)
 
 
 @jit_allocating
@@ -139,8 +132,7 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
         base_weights[c] = 1.0 if c < base else (0.1 if c < nv else 0.01)
     for c in range(nv):
         motion_weights[c] = 0.05 if c < base else 1.0
-    equalities(A, b, M, h, J, base, B)
-    row_lengths(B, lengths)
+    equalities(A, b, M, h, J, base, lengths, B)
     least = gauss_jordan(B, 0, m, 0, nv, motion_weights, lengths, pivots)
     if least <= LOST_ROW:
         return least, least

@@ -14,18 +14,12 @@ from floatbase.qp import FEASIBILITY_TOLERANCE
 
 
 class Inequalities(NamedTuple):
-    """The inequalities on forces and torques.
+    """The inequalities on forces and torques."""
 
-    cones: (P, F + 1, 3), rows of G for the force of each point: F facets, then -normal.
-    lengths: (P, F + 1), of those rows.
-    least_normal: N, least normal force of each point.
-    torque_limits: (d,), N·m.
-    """
-
-    cones: Any
-    lengths: Any
-    least_normal: Any
-    torque_limits: Any
+    cones: Any  # (P, F + 1, 3), rows of G for the force of each point: F facets, then -normal
+    lengths: Any  # (P, F + 1), of those rows
+    torque_limits: Any  # (d,), N·m
+    least_normal: Any  # N, least normal force of each point
 
 
 @jit
@@ -94,18 +88,6 @@ def violated_force_row(limits, forces):
 
 
 @jit
-def violated_torque_row(limits, tau):
-    """The torque limit that tau (d,) violates most, d upper ones before d lower ones; -1 where it violates none."""
-    worst, found = FEASIBILITY_TOLERANCE, -1
-    for j in range(tau.size):
-        if tau[j] - limits.torque_limits[j] > worst:
-            worst, found = tau[j] - limits.torque_limits[j], j
-        if -tau[j] - limits.torque_limits[j] > worst:
-            worst, found = -tau[j] - limits.torque_limits[j], tau.size + j
-    return found
-
-
-@jit
 def violated_row(limits, space, beta, forces, tau):
     """The number of a row of (27)(28) that β (nb,) violates, -1 for none.
 
@@ -117,8 +99,12 @@ def violated_row(limits, space, beta, forces, tau):
     if found >= 0:
         return found
     affine_value(space.T, beta, 0, tau.size, tau)
-    found = violated_torque_row(limits, tau)
-    return found if found < 0 else limits.cones.shape[0] * limits.cones.shape[1] + found
+    worst, n_force_rows = FEASIBILITY_TOLERANCE, limits.cones.shape[0] * limits.cones.shape[1]
+    for j in range(tau.size):
+        excess = abs(tau[j]) - limits.torque_limits[j]
+        if excess > worst:
+            worst, found = excess, n_force_rows + (j if tau[j] > 0.0 else tau.size + j)
+    return found
 
 
 @jit

@@ -14,33 +14,21 @@ from floatbase.control.tick.vectors import column_part, cross, minus, plus, rota
 
 
 class Bodies(NamedTuple):
-    """The tree of n joints in one state.
+    """The tree of n joints in one state."""
 
-    tree: (n, 5), parent, first index in v, count in v, first index in q, count in q.
-    poses: (n, 12), world, rotation column by column, then position.
-    J: (6, nv), spatial velocity about the world's origin for each entry of v: linear, then angular.
-    velocity: (n, 6), spatial velocity of each joint about the world's origin: linear, then angular.
-    drift: (n, 6), its derivative at q̈ = 0.
-    """
-
-    tree: Any
-    poses: Any
-    J: Any
-    velocity: Any
-    drift: Any
+    tree: Any  # (n, 5), parent, first index in v, count in v, first index in q, count in q
+    poses: Any  # (n, 12), rotation column by column, then position
+    J: Any  # (6, nv), spatial velocity about the world's origin for each entry of v: linear, then angular
+    velocity: Any  # (n, 6), spatial velocity of each joint about the world's origin: linear, then angular
+    drift: Any  # (n, 6), its derivative at q̈ = 0
 
 
 class ContactTable(NamedTuple):
-    """C contacts with P points.
+    """C contacts with P points."""
 
-    table: (C, 4), joint, kind, first point, number of points.
-    frames: (C, 16), pose of the frame in the joint as in `Bodies`, normal in the world, radius.
-    points: (P, 3), centre of the ball, or corners, in the frame.
-    """
-
-    table: Any
-    frames: Any
-    points: Any
+    table: Any  # (C, 4), joint, kind, first point, number of points
+    frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
+    points: Any  # (P, 3), centre of the ball, or corners, in the frame
 
 
 @jit

@@ -33,7 +33,6 @@ CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
 _POSE = 12  # numbers of a pose: rotation column by column, then position
 
 
-@dataclass(frozen=True, eq=False)
 class Dynamics:
     """Pinocchio's results for one robot.
 
@@ -43,12 +42,13 @@ class Dynamics:
     lock: held from `update` until the views have been read.
     """
 
-    robot: Robot
-    data: pin.Data
-    views: tuple[Array, ...]
-    tree: npt.NDArray[np.int64]
-    links: Array
-    lock: Any
+    def __init__(self, robot: Robot):
+        self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
+        model, data, n = robot.model, self.data, robot.model.njoints
+        poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE), (8 * _POSE, 8))
+        self.views: tuple[Array, ...] = (data.M, data.nle, data.J, data.Ag, poses)
+        tree = [(model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i]) for i in range(n)]
+        self.tree, self.links = np.array(tree, np.int64), np.array([(link.mass, *link.lever) for link in model.inertias])
 
     def update(self, q: Array, v: Array) -> None:
         """Fill the views for a configuration q (nq,) and a velocity v (nv,)."""
@@ -67,13 +67,7 @@ class Dynamics:
 @lru_cache(maxsize=16)
 def dynamics_of(robot: Robot) -> Dynamics:
     """One `Dynamics` for each robot, shared by its controllers."""
-    model, data = robot.model, robot.model.createData()
-    first = data.oMi[0].rotation.T
-    poses = np.lib.stride_tricks.as_strided(first, (model.njoints, _POSE), (8 * _POSE, 8))
-    tree = [(model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i]) for i in range(model.njoints)]
-    links = [(inertia.mass, *inertia.lever) for inertia in model.inertias]
-    views = (data.M, data.nle, data.J, data.Ag, poses)
-    return Dynamics(robot, data, views, np.array(tree, dtype=np.int64), np.array(links), Lock())
+    return Dynamics(robot)
 
 
 class Target(NamedTuple):
@@ -113,11 +107,11 @@ def tables_of(problem: Problem) -> Tables:
     tasks, gains, poses, targets, moving, misfits = _task_tables(problem)
     dynamics, limits = dynamics_of(problem.robot), problem.limits
     sizes = (len(dynamics.tree), len(contacts), len(points), cones.shape[1], len(tasks), len(limits.torque_limits))
-    lengths, bounds = np.linalg.norm(cones, axis=2), (limits.torque_limits, [limits.min_normal_force])
-    real = (dynamics.links, frames, points, cones, lengths, gains, poses, *bounds)
+    lengths, bounds = np.linalg.norm(cones, axis=2), (limits.torque_limits, limits.min_normal_force)
+    real = (0.0, dynamics.links, frames, points, gains, poses, cones, lengths, *bounds)  # a workspace counts in its first entry
     return Tables(
         sizes=np.array(sizes, np.int64),
-        indices=np.concatenate([np.ravel(table) for table in (dynamics.tree, contacts, tasks)]),
+        indices=np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)]),
         numbers=np.concatenate([np.ravel(table) for table in real]),
         targets=targets,
         moving=moving,

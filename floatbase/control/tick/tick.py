@@ -32,32 +32,21 @@ UNIT = 1e-6  # part by which a quaternion or (cos, sin) may miss length 1, as fo
 
 @jit_inline
 def unpack(sizes, indices, numbers, targets):
-    """The tables that `tables.pack` laid out: tree, links, contacts, tasks, limits.
+    """Tree, links, contacts, tasks and limits as `tables.tables_of` laid them out, in that order and row by row.
 
     sizes: number of joints, contacts, points, facets + 1, tasks, driven joints.
-    indices: all tables of whole numbers, one after the other, row by row.
-    numbers: all tables of real numbers likewise.
+    indices, numbers: whole and real numbers of all tables, one table after the other, as in a workspace.
     targets: of all tasks, one after the other.
     """
     n, n_contacts, n_points, n_rows, n_tasks, d = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5]
-    i, j = 5 * n, 5 * n + 4 * n_contacts
-    a = 4 * n
-    b = a + 16 * n_contacts
-    c = b + 3 * n_points
-    e = c + 3 * n_points * n_rows
-    f = e + n_points * n_rows
-    g = f + 3 * n_tasks
-    o = g + 12 * n_tasks
-    contacts = ContactTable(
-        indices[i:j].reshape(n_contacts, 4), numbers[a:b].reshape(n_contacts, 16), numbers[b:c].reshape(n_points, 3)
-    )
-    tasks = TaskTable(
-        indices[j:].reshape(n_tasks, 3), numbers[f:g].reshape(n_tasks, 3), numbers[g:o].reshape(n_tasks, 12), targets
-    )
-    limits = Inequalities(
-        numbers[c:e].reshape(n_points, n_rows, 3), numbers[e:f].reshape(n_points, n_rows), numbers[o + d], numbers[o : o + d]
-    )
-    return indices[:i].reshape(n, 5), numbers[:a].reshape(n, 4), contacts, tasks, limits
+    indices[0], numbers[0] = 1, 1
+    tree, links, contact_table = take_matrix(indices, n, 5), take_matrix(numbers, n, 4), take_matrix(indices, n_contacts, 4)
+    contacts = ContactTable(contact_table, take_matrix(numbers, n_contacts, 16), take_matrix(numbers, n_points, 3))
+    task_table, gains = take_matrix(indices, n_tasks, 3), take_matrix(numbers, n_tasks, 3)
+    tasks = TaskTable(task_table, gains, take_matrix(numbers, n_tasks, 12), targets)
+    cones = take_vector(numbers, n_points * n_rows * 3).reshape(n_points, n_rows, 3)
+    lengths, torque_limits = take_matrix(numbers, n_points, n_rows), take_vector(numbers, d)
+    return tree, links, contacts, tasks, Inequalities(cones, lengths, torque_limits, take_vector(numbers, 1)[0])
 
 
 def workspace_sizes(sizes, m):
