@@ -84,7 +84,7 @@ def tick_times(n: int) -> Iterator[str]:
         controllers = [controller(robot, path) for path in paths]
         for label, spread in SPREADS.items():
             at = states(robot, n, spread)
-            pushing = np.mean([controllers[0]._program(q, v, 0.0)[1] for q, v in at])
+            pushing = np.mean([controllers[0].compiled(q, v, 0.0)[1] for q, v in at])
             numbers = [np.percentile(times, [50, 99]) for times in interleaved(controllers, at, 3)]
             text = " | ".join(f"{number:.1f} µs" for number in np.concatenate(numbers))
             ratios = ", ".join(f"{numbers[-1][0] / fast[0]:.0f} ×" for fast in numbers[:-1])
@@ -98,7 +98,7 @@ def parts(n: int) -> Iterator[str]:
     for name in ROBOTS:
         robot = fb.load(name)
         fast = controller(robot)
-        program = fast._program
+        program = fast.compiled
         answer = np.empty(program.size + 2 * program.entries)
         for label, spread in SPREADS.items():
             spent = []
@@ -119,7 +119,7 @@ def reduced_parts(n: int) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|---|"
     for name in ROBOTS:
         fast = controller(fb.load(name), "reduced")
-        program = fast._program
+        program = fast.compiled
         for label, spread in SPREADS.items():
             spent = []
             for q, v in states(fast.robot, n, spread):

@@ -1,6 +1,24 @@
 """floatbase: controlling floating-based robots, as a course and as a library.
 
-The names below are all a user needs: `import floatbase as fb`. Physics and pictures load when they are first used.
+    import floatbase as fb
+
+    robot = fb.load("go2")                                     # fb.catalogue() lists what can be loaded
+    state = robot.standing()
+    contacts = fb.Contacts.points(robot, mu=0.7)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
+    command = controller(state.q, state.v)                     # .tau, .qdd, .forces, .active
+    run = fb.rollout(fb.Simulation(robot), controller, duration=2.0)
+
+Robots        catalogue, load, load_urdf, Robot, State
+Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accelerations_from_torques (14), feasible_space (13)
+Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask, TorqueTask, standing_tasks
+Control       WholeBodyController (26)(27), QP, solve
+Simulation    Simulation, Ground, Push, rollout, Rollout
+Pictures      Viewer
+Errors        FloatbaseError, InfeasibleError
+
+Symbols, frames, signs and units: help("floatbase.conventions"). All other names are imported from their rooms, such as
+`from floatbase.friction import FrictionPolyhedron`. Physics and pictures load when they are first used.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import floatbase
 PACKAGE = Path(floatbase.__file__).parent
 # from the ground up; rooms named on one line stand side by side on one floor and may see each other
 FLOORS = (
-    ("errors", "_arrays", "_assets", "affine", "linear_algebra"),
+    ("conventions", "errors", "_arrays", "_assets", "affine", "linear_algebra"),
     ("qp",),
     ("robots",),
     ("dynamics",),

@@ -18,7 +18,10 @@ from floatbase.robots import Robot, State
 
 @dataclass(frozen=True, eq=False)
 class AnalyticCommand:
-    """tau: (d,) N·m to apply; forces: (k,) N, world, and qdd: (nv,) planned with them. Read-only."""
+    """One answer of `AnalyticController`, read-only.
+
+    tau: (d,) N·m, joint torques to apply. forces: (k,) N, world, and qdd: (nv,), planned with them.
+    """
 
     tau: Array
     forces: Array
@@ -29,14 +32,26 @@ class AnalyticCommand:
 
 
 class AnalyticController:
-    """(22) + (23) + terms for posture and torque, minimised in closed form over β (17).
+    """(22) + (23) + terms for posture and torque, minimised in closed form over β (17) at every tick.
 
-    Wants the centre of mass at `com` and the base upright as in `state`: f̃_c = m (a - g) with a = -kp e - kd ė, and
-    τ̃_c from the base's rotation and the robot's inertia about its centre of mass. alpha, a: the bias of (23), a in N
-    (the weight's even share by default). posture, torque: weights of the joints' return to `state` [per (rad/s²)²] and
-    of ‖τ‖² [per (N·m)²]. They settle what (22)(23) leave open (d > k); where nothing is left open they compete with the
-    wanted wrench, a light robot feeling the posture's weight more. Nothing here keeps forces in their cones or torques
-    within limits. Source: the document, §3.1.
+    The desired wrench is f̃_c = m (a - g) with a = -kp e - kd ė, where e leads from `com` to the centre of mass; τ̃_c does the
+    same for the base's rotation, with the robot's inertia about its centre of mass. Nothing keeps
+    forces in their cones or torques within limits. Source: the document, §3.1.
+
+    robot: the robot to control.
+    contacts: its contacts with the ground.
+    state: the posture to return to, with its base orientation.
+    com: (3,) m, world, desired centre of mass; that of `state` by default.
+    alpha: ≥ 0, weight of the normal forces' distance from `a`, beside that of the tangential forces, in (23).
+    a: N, the normal force that (23) prefers at each point; the weight's even share by default.
+    kp: 1/s², stiffness.
+    kd: 1/s, damping.
+    bias_weight: weight of (23) beside (22).
+    posture: per (rad/s²)², weight of the joints' return to `state`.
+    torque: per (N·m)², weight of ‖τ‖².
+
+    `posture` and `torque` settle what (22)(23) leave open (d > k). Where nothing is left open they compete with the desired
+    wrench; a light robot feels the weight of the posture more. Raises `InputError` for values that do not fit.
     """
 
     def __init__(
@@ -63,7 +78,7 @@ class AnalyticController:
         if state.robot is not robot:
             raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
         equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
-        self.robot, self.contacts, self._held = robot, contacts, state
+        self.robot, self.contacts, self._desired = robot, contacts, state
         self.com = checked("com", state.com if com is None else com, (3,), "m")
         share = robot.weight / max(contacts.n_points, 1)
         self._bias = positive("bias_weight", bias_weight) * force_bias(contacts, alpha, share if a is None else a)
@@ -74,11 +89,11 @@ class AnalyticController:
         """The costs on q̈, τ and λ whose sum is minimised."""
         state = eom.state
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
-        R, R_wanted = state.frame_pose("base").rotation, self._held.frame_pose("base").rotation
-        turn = -self._kp * pin.log3(R @ R_wanted.T) - self._kd * state.frame_velocity("base")[3:]
+        R, R_desired = state.frame_pose("base").rotation, self._desired.frame_pose("base").rotation
+        turn = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
         wrench = wanted_wrench(state, a, rotational_inertia(state) @ turn)
         on_forces = wrench_objective(state, eom.contacts, *wrench) + self._bias
-        joints = -self._kp * state.difference(self._held.q)[-eom.d :] - self._kd * state.v[-eom.d :]
+        joints = -self._kp * state.difference(self._desired.q)[-eom.d :] - self._kd * state.v[-eom.d :]
         on_qdd = Quadratic.from_residual(eom.S.T, joints, self._posture)
         return on_qdd, Quadratic.from_residual(np.eye(eom.d), np.zeros(eom.d), self._torque), on_forces
 

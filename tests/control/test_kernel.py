@@ -41,7 +41,7 @@ def test_a_replaced_controller_compiles_nothing() -> None:
 def test_a_tick_reads_nothing_of_its_room_that_it_did_not_write(name: str) -> None:
     robot = judges.load(name)
     fast = compiled_one(robot)
-    room, whole = fast._program.arrays[-2:]  # type: ignore[union-attr]
+    room, whole = fast.compiled.arrays[-2:]  # type: ignore[union-attr]
     for seed in range(20):
         state = robot.random_state(seed, 0.3)
         answers = []
@@ -57,7 +57,7 @@ def test_a_tick_makes_no_array_and_says_when_its_room_is_too_small() -> None:
     from numba.core.runtime import rtsys
 
     robot = judges.load("go2")
-    program = compiled_one(robot)._program
+    program = compiled_one(robot).compiled
     assert program is not None
     state = robot.random_state(5, 0.3)
     q, v = np.array(state.q), np.array(state.v)

@@ -48,7 +48,7 @@ def cache_warning() -> str:
     """What to do where no folder can be written to for compiled code, or ""."""
     from floatbase.control.tick import jit
 
-    return "" if jit.cache_on_disk else "compiled code cannot be kept here: set NUMBA_CACHE_DIR to a folder that can be written to"
+    return "" if jit.cache_on_disk else "what is compiled cannot be kept here: set NUMBA_CACHE_DIR to a folder to write to"
 
 
 def obstacle(problem: Problem, solver: str) -> str:
@@ -57,7 +57,7 @@ def obstacle(problem: Problem, solver: str) -> str:
         return f"solver {solver!r} was asked for, and the compiled tick has its own"
     for contact in problem.contacts:
         if type(contact) not in CONTACT_KINDS:
-            return f"contact {contact.name!r} is a {type(contact).__name__}; the compiled tick takes point contacts and flat feet"
+            return f"contact {contact.name!r} is a {type(contact).__name__}; the compiled tick takes points and flat feet"
     for task in problem.tasks:
         if type(task) not in TASK_KINDS:
             return f"task {task.name!r} is a {type(task).__name__}; the compiled tick takes the tasks of the package"
@@ -90,11 +90,11 @@ def _robot_obstacle(robot: Robot) -> str:
 class Compiled:
     """The compiled tick of one problem, for which `obstacle` is "".
 
-    A call with q (nq,) and v (nv,), writable float64 arrays, and a time t in s returns None where the readable path must decide,
-    or an array of numbers, how many rows are active, and the targets at t. The numbers are q̈, τ, λ, then nv + k for the
-    multipliers of the active rows and nv + k for their numbers, of which the first ones count.
+    A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the readable path must decide, else
+    the array of numbers that `tick.tick` fills, how many rows are active, and the targets at t.
 
-    arguments: what `tick.tick` takes after q, v and the targets, but for the array of the answer and the parts to run.
+    qdd, tau, forces: where these are among the numbers.
+    arguments: what `tick.tick` takes after q, v and the targets, but for the answer and the parts to run.
     targets: those that stand still.
     workspace: real and whole numbers, memory of the tick.
     fits: False where a target has the wrong shape.
@@ -105,11 +105,11 @@ class Compiled:
     def __init__(self, problem: Problem):
         from floatbase.control.tick import tick
 
-        robot, k = problem.robot, problem.contacts.k
+        robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics, self._tables = problem, dynamics_of(robot), tables_of(problem)
         self.fits, self.targets = not self._tables.misfits, self._tables.targets
-        self._q_shape, self._v_shape = (robot.nq,), (robot.nv,)
-        self._n_answer, self._n_entries = robot.nv + robot.d + k, robot.nv + k
+        self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
+        self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
         tables = self._tables.sizes, self._tables.indices, self._tables.numbers
         n_motion_rows = sum(len(contact.row_names) for contact in problem.contacts)
         n_floats, n_ints = tick.workspace_sizes(tables[0], n_motion_rows)
@@ -144,7 +144,7 @@ class Compiled:
 
     def empty_answer(self) -> Array:
         """An array for the numbers of one tick."""
-        return np.empty(self._n_answer + 2 * self._n_entries)
+        return np.empty(self.forces.stop + 2 * self._n_multipliers)
 
     def tasks(self, targets: Array) -> tuple[Task, ...]:
         """The tasks with the targets of one tick, as a call returned them: functions may answer otherwise when asked again."""
@@ -153,19 +153,14 @@ class Compiled:
             values.setdefault(task, {})[name] = targets[first : first + prod(shape)].reshape(shape)
         return tuple(replace(cast(Any, task), **values.get(i, {})) for i, task in enumerate(self._problem.tasks))
 
-    def multipliers(self, numbers: Array, n_active: int, n_rows: int) -> Array:
-        """Multipliers of the inequality rows of the readable QP, shape (n_rows,), from what a call returned.
-
-        There only joints that are limited have torque rows.
-        """
-        limited = np.isfinite(self._problem.limits.torque_limits)
-        n_force_rows = n_rows - 2 * int(np.sum(limited))
-        readable_row = np.concatenate([np.arange(n_force_rows), np.full(2 * limited.size, -1)])
-        readable_row[n_force_rows:][np.tile(limited, 2)] = np.arange(n_force_rows, n_rows)
-        multipliers = np.zeros(n_rows)
-        mu, active = numbers[self._n_answer :][:n_active], numbers[self._n_answer + self._n_entries :][:n_active]
-        multipliers[readable_row[active.astype(np.int64)]] = np.maximum(mu, 0.0)
-        return multipliers
+    def multipliers(self, numbers: Array, n_active: int) -> Array:
+        """Multipliers of all inequality rows of the readable QP, from what a call returned."""
+        has_row = np.tile(np.isfinite(self._problem.limits.torque_limits), 2)  # the readable QP has rows for these limits only
+        n_force_rows = self._problem.contacts.n_points * (self._problem.limits.facets + 1)
+        mu, active = numbers[self.forces.stop :].reshape(2, -1)[:, :n_active]
+        multipliers = np.zeros(n_force_rows + has_row.size)
+        multipliers[active.astype(np.int64)] = np.maximum(mu, 0.0)
+        return multipliers[np.concatenate([np.full(n_force_rows, True), has_row])]
 
     def _targets_at(self, t: float) -> Array | None:
         """All targets at time t, in an array of their own, as other threads may run ticks too. None for a bad target."""

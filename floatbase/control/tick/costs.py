@@ -70,8 +70,8 @@ def motion_task(i, tasks, bodies, Ag, links, rows):
         if kind == ORIENTATION:
             angular_jacobian(bodies, joint, rows, 0)
             e_dot, drift = row_part(bodies.velocity, joint, 3), row_part(bodies.drift, joint, 3)
-            R_target = targets[first:after].reshape(3, 3)
-            e, valid = rotation_error(R, (column_part(R_target, 0, 0), column_part(R_target, 0, 1), column_part(R_target, 0, 2)))
+            columns = targets[first:after].reshape(3, 3)
+            e, valid = rotation_error(R, (column_part(columns, 0, 0), column_part(columns, 0, 1), column_part(columns, 0, 2)))
         else:
             point_jacobian(bodies, joint, p, rows, 0)
             e_dot, drift = point_velocity(bodies, joint, p)

@@ -86,7 +86,12 @@ def inverse(L, W):
 
 @jit
 def add_row(W, U, d, z, q):
-    """Mirror rows q: of W so that d (nb,) = W row ends at q, and make d column q of U; z: (nb,) = -Σ d_j W_j over those rows."""
+    """Mirror rows q: of W so that d (nb,) = W row is zero after q, and make d column q of U.
+
+    W, U: as in `ActiveSet`.
+    d, z: (nb,), as from `directions`.
+    q: number of active rows.
+    """
     n, length = d.size, 0.0
     for j in range(q, n):
         length += d[j] * d[j]
@@ -285,8 +290,8 @@ def dual_search(cost, limits, space, workspace, numbers, mu, beta):
     numbers, mu: (nb,) receive the numbers and multipliers of the active rows.
     beta: (nb,) receives the optimum.
 
-    The end of the search is refined by Newton's method. Where that shows that it was not the optimum, since a multiplier has the
-    wrong sign or a row is violated, the search goes on.
+    Newton's method refines the end of the search. Where that shows that it was not the optimum, as a multiplier has the wrong
+    sign or a row is violated, the search goes on.
     """
     nb, d, k = beta.size, space.T.shape[0], 3 * limits.cones.shape[0]
     H, slope, L = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb), take_matrix(workspace, nb, nb)

@@ -1,7 +1,7 @@
 """The equalities of (27) eliminated: q̈, λ and τ as functions of the free entries β, by Gauss-Jordan elimination (13)(16)(17).
 
-The readable path takes an SVD for the space of motions (13); here variables are eliminated one by one, and each β is an entry of
-(q̈, λ) that the elimination left free. Shapes: m motion rows, nv, d, k as everywhere, n = nv + k entries of (q̈, λ), nb of β.
+The readable path takes an SVD for the space of motions (13). Here variables are eliminated one by one, and each β is an entry
+of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv, d, k as everywhere, n = nv + k entries of (q̈, λ), nb of β.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from floatbase.control.problem import INCONSISTENT
 from floatbase.control.tick.jit import jit, jit_allocating
 from floatbase.control.tick.memory import clear, take_vector
 from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
@@ -17,7 +18,6 @@ from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
 DEPENDENT_ROW = 2e-2  # a motion row of which elimination leaves less may nearly depend on the others: an SVD must decide
 LOST_ROW = 1e-11  # less than this part of a row is rounding
 ZERO_PIVOT = 1e-14  # relative to the row: no variable is left to solve it for
-INCONSISTENT = 1e-6  # m/s²: by so much motion rows disagree through rounding of Jacobians and drifts
 
 
 class Space(NamedTuple):
@@ -127,7 +127,8 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
     and for λ where the contacts already hold it.
     """
     m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
-    motion_weights, base_weights, lengths = take_vector(workspace, nv), take_vector(workspace, n), take_vector(workspace, m + base)
+    lengths, motion_weights = take_vector(workspace, m + base), take_vector(workspace, nv)
+    base_weights = take_vector(workspace, n)
     for c in range(n):
         base_weights[c] = 1.0 if c < base else (0.1 if c < nv else 0.01)
     for c in range(nv):
@@ -193,7 +194,7 @@ def add_product(rows, V, beta_of, out, first):
 
 
 @jit
-def torque_map(V, beta_of, M, h, J, base, T):
+def torques(V, beta_of, M, h, J, base, T):
     """(16) T of `Space` from τ = M_j q̈ + h_j - J_jᵀ λ, the rows of (7) after the first `base`; V, beta_of: of `Space`."""
     nv, k, nb = M.shape[0], J.shape[0], V.shape[1] - 1
     clear(T)

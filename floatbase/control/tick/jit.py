@@ -15,24 +15,25 @@ from typing import Any
 
 import numba
 
+from floatbase.control.problem import INCONSISTENT
 from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
 # Without numba's run time, which counts references to every array that is made, sliced or passed on: that took a quarter of the
 # tick. What is compiled so can neither make an array nor return one.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "_nrt": False}
-_FILES = 8  # compiled ticks on disk: a few processors and versions of Python share a folder; each edit adds one (1 MB)
+_FILES = 16  # kept on disk: two for each processor and version of Python that share the folder, and each edit adds some (1 MB)
 
-jit = partial(numba.njit, **_OPTIONS)
-jit_inline = partial(numba.njit, inline="always", **_OPTIONS)  # becomes part of its caller, so it may return arrays
-jit_allocating = partial(numba.njit, **_OPTIONS | {"_nrt": True})
+jit: Callable[..., Any] = partial(numba.njit, **_OPTIONS)
+jit_inline: Callable[..., Any] = partial(numba.njit, inline="always", **_OPTIONS)  # part of its caller, so it may return arrays
+jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
 
 cache_on_disk = True  # False where numba finds no folder that it can write to
 
 
 def digest() -> int:
     """A number for the text of this folder and for the constants of other rooms that numba compiles in."""
-    text = repr((MOTION_TOLERANCE, MOTION_NOISE, FEASIBILITY_TOLERANCE)).encode()
+    text = repr((INCONSISTENT, MOTION_TOLERANCE, MOTION_NOISE, FEASIBILITY_TOLERANCE)).encode()
     for file in sorted(Path(__file__).parent.glob("*.py")):
         text += file.name.encode() + file.read_bytes()
     return int.from_bytes(sha256(text).digest()[:7], "big")
@@ -50,8 +51,8 @@ def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
 
 
 def remove_old_files(function: Any) -> None:
-    """Keep the newest files of compiled code beside those of a cached function, after it was compiled."""
+    """Remove all but the newest files in the folder of a cached function, if it was compiled anew."""
     if function.stats.cache_misses and function.stats.cache_path:
-        files = sorted(Path(function.stats.cache_path).glob("*.nbc"), key=lambda file: -file.stat().st_mtime)
+        files = sorted(Path(function.stats.cache_path).glob("*.nb?"), key=lambda file: -file.stat().st_mtime)
         for file in files[_FILES:]:
             file.unlink(missing_ok=True)

@@ -122,8 +122,10 @@ def tables_of(problem: Problem) -> Tables:
 def _contact_tables(problem: Problem) -> tuple[npt.NDArray[np.int64], Array, Array, Array]:
     """Contacts (C, 4), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P, F + 1, 3)."""
     limits = problem.limits
-    table, frames, points = [], [np.zeros((0, _POSE + 4))], [np.zeros((0, 3))]
-    cones, first = [np.zeros((0, limits.facets + 1, 3))], 0
+    table, first = [], 0
+    frames: list[Array] = [np.zeros((0, _POSE + 4))]
+    points: list[Array] = [np.zeros((0, 3))]
+    cones: list[Array] = [np.zeros((0, limits.facets + 1, 3))]
     for contact in problem.contacts:
         joint, frame, corners, rows = _contact_numbers(problem.robot, cast(Any, contact), limits.facets, limits.inside)
         table.append((joint, CONTACT_KINDS[type(contact)], first, len(corners)))
@@ -142,8 +144,7 @@ def _contact_numbers(
     joint, pose = _frame(robot, contact.frame)
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, facets, inside)
     rows = np.vstack([polyhedron.rows, -polyhedron.normal])
-    flat = isinstance(contact, FlatFootContact)
-    radius, points = (0.0, contact.corners) if flat else (contact.radius, contact.centre)
+    radius, points = (contact.radius, contact.centre) if isinstance(contact, PointContact) else (0.0, contact.corners)
     points = np.array(points).reshape(-1, 3)
     return joint, np.concatenate([pose, contact.normal, [radius]]), points, np.tile(rows, (len(points), 1, 1))
 

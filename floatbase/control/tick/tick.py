@@ -8,8 +8,8 @@ The same problem as `build_qp` makes, solved in another way that costs a fractio
     inequalities  rows that β violates                                                         (27)(28)
     dual_search   the optimum without inequalities, then one violated row after the other      App. C
 
-A tick without an answer says why: INVALID (a value is not finite, a quaternion or rotation is none), INACCURATE (its last digits
-are lost), INFEASIBLE. Then the readable path decides.
+A tick without an answer says why: INVALID (a value is not finite, a quaternion or rotation is none), INACCURATE (its last
+digits are lost), INFEASIBLE. Then the readable path decides.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from floatbase.control.tick.costs import Cost, TaskTable, task_costs
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
-from floatbase.control.tick.elimination import LOST_ROW, DEPENDENT_ROW, Space, eliminate, independent_rows, parametrise, torque_map
+from floatbase.control.tick.elimination import DEPENDENT_ROW, LOST_ROW, Space, eliminate, independent_rows, parametrise, torques
 from floatbase.control.tick.inequalities import Inequalities, affine_value
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, count_motion_rows, forward_velocities
@@ -141,7 +141,7 @@ def make_tick(digest):
         nb = n - m - base
         space = Space(take_matrix(floats, n, nb + 1), take_vector(ints, n), take_matrix(floats, d, nb + 1))
         parametrise(B, pivots, m, take_vector(ints, nb), space.V, space.beta_of)
-        torque_map(space.V, space.beta_of, M_rows, h, J_points, base, space.T)
+        torques(space.V, space.beta_of, M_rows, h, J_points, base, space.T)
         if parts == 2:
             return STOPPED
         R = take_matrix(floats, 3 * tasks.table.shape[0] + 2 * d + k + 3, nb + 1)

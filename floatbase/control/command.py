@@ -1,0 +1,56 @@
+"""`Command`: one answer of the controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from floatbase._arrays import Array
+from floatbase.dynamics import Contacts
+from floatbase.qp import Solution
+
+
+class Command:
+    """One answer of `WholeBodyController`.
+
+    tau: (d,) N·m, joint torques to apply.
+    qdd: (nv,), the acceleration planned with them: base linear m/s² and angular rad/s² in the base frame, then joints.
+    forces: (k,) N, world, the contact forces planned with them, stacked as in `contacts`.
+    contacts: the contacts that the forces act at.
+    path: which way answered, "compiled" or "readable".
+    solve: gives `solution`; called when that is first asked for.
+
+    The arrays are read-only.
+    """
+
+    def __init__(
+        self, tau: Array, qdd: Array, forces: Array, contacts: Contacts, path: str, solve: Callable[[], Solution]
+    ) -> None:
+        self.tau, self.qdd, self.forces, self.contacts, self.path, self._solve = tau, qdd, forces, contacts, path, solve
+
+    @cached_property
+    def solution(self) -> Solution:
+        """The QP of this tick with its optimum, multipliers and residuals."""
+        return self._solve()
+
+    def force(self, name: str) -> Array:
+        """The planned force of one contact, shape (3,), N, world: for a flat foot the sum over its corners."""
+        return self.contacts.force_of(self.forces, name)
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Names of the active inequality rows, such as "FL_foot facet 2" or "torque limit FL_calf_joint upper"."""
+        return self.solution.active
+
+    @property
+    def multipliers(self) -> dict[str, float]:
+        """Multiplier of each active row, by name."""
+        return self.solution.multipliers
+
+    def __repr__(self) -> str:
+        return (
+            f"Command(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N, "
+            f"{len(self.active)} rows active, {self.path})"
+        )

@@ -1,0 +1,205 @@
+"""(26)(27) as a value: robot, contacts, tasks and limits, and the QP that they make of a state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
+
+import numpy as np
+
+from floatbase._arrays import Array, positive
+from floatbase.affine import Affine
+from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
+from floatbase.errors import InfeasibleError, InputError
+from floatbase.friction import FrictionPolyhedron
+from floatbase.objectives import ForceTask, Task, TorqueTask
+from floatbase.qp import QP
+from floatbase.robots import Robot, State, torque_limits_of
+
+BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
+INCONSISTENT = 1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """The inequalities of (27).
+
+    torque_limits: shape (d,), N·m, +inf where there is none.
+    facets: number of facets of the friction polyhedron (28) of every contact point.
+    inside: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
+    min_normal_force: N, least normal · f at every contact point.
+
+    Raises `InputError` for values that do not fit.
+    """
+
+    torque_limits: Array
+    facets: int = 4
+    inside: bool = True
+    min_normal_force: float = 0.0
+
+    def __post_init__(self) -> None:
+        limits = np.ravel(self.torque_limits)
+        object.__setattr__(self, "torque_limits", torque_limits_of(limits.size, limits))
+        object.__setattr__(self, "min_normal_force", positive("min_normal_force", self.min_normal_force, "N", allow_zero=True))
+        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets)  # raises for a wrong number of facets
+        object.__setattr__(self, "facets", polyhedron.facets)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """(26)(27) without a state: what a controller is made of.
+
+    robot: the robot.
+    contacts: its contacts.
+    tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none of them acts on
+        forces or on torques, a `ForceTask()` or a `TorqueTask()` with its small default weight is added, so that the optimum
+        is unique.
+    limits: friction, normal forces and torque limits.
+
+    Raises `InputError` for values of a wrong kind; `check_shapes` looks at names and shapes too.
+    """
+
+    robot: Robot
+    contacts: Contacts
+    tasks: Sequence[Task]
+    limits: Limits
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.robot, Robot):
+            raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(self.robot).__name__}.")
+        if not isinstance(self.contacts, Contacts):
+            raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(self.contacts).__name__}.")
+        object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
+        torque_limits_of(self.robot.d, self.limits.torque_limits)
+
+    def check_shapes(self) -> None:
+        """Raise for frames that do not exist and for shapes that do not fit: now, and not in the loop."""
+        eom = equations_of_motion(self.robot.standing(), self.contacts)
+        for task in self.tasks:
+            _residual(task, eom, 0.0)
+
+    def qp(self, state: State, t: float = 0.0) -> QP:
+        """The QP at a state and a time t in s."""
+        return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t)
+
+
+def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
+    """(26)(27) as a QP in x = (q̈, τ, λ).
+
+    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: the
+    friction polyhedron (28) and the normal force of every contact point, and the torque limits. Source: the document, §4.1.
+
+    eom: the equations of motion (7) at a state.
+    tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is missing).
+    limits: friction, normal forces and torque limits.
+    t: s, the time that tasks with moving targets are evaluated at.
+
+    Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a measured velocity that the
+    contacts do not quite allow makes them inconsistent. The rows therefore count along the directions that A resolves well
+    (`floatbase.dynamics.resolved_motion`). Raises `InfeasibleError` where they are inconsistent beyond that.
+    """
+    nv, d, k = eom.nv, eom.d, eom.k
+    blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
+    n = nv + d + k
+    H, g = np.zeros((n, n)), np.zeros(n)
+    for task in tasks:
+        block, residual = blocks[task.block], _residual(task, eom, t)
+        H[block, block] += task.weight * residual.A.T @ residual.A
+        g[block] += task.weight * residual.A.T @ residual.b
+    motion, b = _motion_rows(eom)
+    A = np.block([[eom.M, -eom.S, -eom.J.T], [motion, np.zeros((len(motion), d + k))]])
+    G_force, h_force, force_names = _force_rows(eom.contacts, limits)
+    G_torque, h_torque, torque_names = _torque_rows(eom.robot, limits)
+    G = np.zeros((len(G_force) + len(G_torque), n))
+    G[: len(G_force), blocks["forces"]] = G_force
+    G[len(G_force) :, blocks["tau"]] = G_torque
+    return QP(
+        H=H,
+        g=g,
+        A=A,
+        b=np.concatenate([-eom.h, b]),
+        G=G,
+        h=np.concatenate([h_force, h_torque]),
+        equality_names=_equality_names(eom.robot, eom.contacts),
+        inequality_names=force_names + torque_names,
+        blocks=blocks,
+    )
+
+
+def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
+    """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or torques."""
+    if isinstance(tasks, Task) or not isinstance(tasks, Sequence):
+        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {type(tasks).__name__}.")
+    tasks = tuple(tasks)
+    for task in tasks:
+        if isinstance(task, type) or not isinstance(task, Task):
+            raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {task!r} is none.")
+        if task.block not in BLOCKS:
+            raise InputError(f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".')
+        positive(f"weight of {task.name}", task.weight, allow_zero=True)
+    missing = [kind() for kind in (ForceTask, TorqueTask) if not any(task.block == kind.block for task in tasks)]
+    return tasks + tuple(cast("list[Task]", missing))
+
+
+def _residual(task: Task, eom: EquationsOfMotion, t: float) -> Affine:
+    """The residual of a task, after checking that it takes its block of x."""
+    residual = task.residual(eom, t)
+    size = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[task.block]
+    if residual.n_in != size:
+        raise InputError(f"the residual of {task.name!r} takes {residual.n_in} numbers; its block {task.block!r} has {size}.")
+    return residual
+
+
+def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
+    """(5) A (m, nv) and b (m,) along the directions that A resolves.
+
+    Raises `InfeasibleError` with the rows where they are inconsistent by more than the contacts' own motion explains.
+    """
+    A, b = resolved_motion(eom)
+    gap = np.abs(eom.b - b)
+    motion = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
+    if np.max(gap, initial=0.0) > INCONSISTENT + MOTION_NOISE * motion:
+        names = _equality_names(eom.robot, eom.contacts)[eom.nv :]
+        rows = [names[i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
+        raise InfeasibleError(
+            f"these motions cannot be kept together: {', '.join(rows)}. At least one of their constraints has to go.", rows
+        )
+    return A, b
+
+
+# what does not depend on the state is built once for each contacts, robot and limits (all immutable)
+@lru_cache(maxsize=64)
+def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
+    """Friction facets and normal force of every point: G λ ≤ h, and the names of the rows."""
+    per_point = limits.facets + 1
+    G = np.zeros((per_point * contacts.n_points, contacts.k))
+    h = np.zeros(len(G))
+    names: list[str] = []
+    for i, point in enumerate(contacts.point_names):
+        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
+        rows = slice(per_point * i, per_point * (i + 1))
+        G[rows, contacts.point_entries[3 * i : 3 * i + 3]] = np.vstack([cone.rows, -cone.normal])
+        h[rows.stop - 1] = -limits.min_normal_force
+        names += [f"{point} {name}" for name in cone.names] + [f"{point} normal force"]
+    return G, h, tuple(names)
+
+
+@lru_cache(maxsize=64)
+def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[str, ...]]:
+    """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h, and the names of the rows."""
+    limited = np.flatnonzero(np.isfinite(limits.torque_limits))
+    rows = np.eye(robot.d)[limited]
+    bound = limits.torque_limits[limited]
+    names = tuple(f"torque limit {robot.joint_names[i]} {side}" for side in ("upper", "lower") for i in limited)
+    return np.vstack([rows, -rows]), np.concatenate([bound, bound]), names
+
+
+@lru_cache(maxsize=64)
+def _equality_names(robot: Robot, contacts: Contacts) -> tuple[str, ...]:
+    """Names of the rows of (7)."""
+    base = [f"dynamics base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
+    joints = [f"dynamics {joint}" for joint in robot.joint_names]
+    motion = [f"motion {contact.name} {row}" for contact in contacts for row in contact.row_names]
+    return tuple((base if robot.is_floating else []) + joints + motion)
