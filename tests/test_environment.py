@@ -17,7 +17,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 LOCK = (ROOT / "environment.txt").read_text(encoding="utf-8")
 PINS = [Requirement(line) for line in LOCK.splitlines() if line and not line.startswith("#")]
 ASKED = [Requirement(text) for texts in (PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()) for text in texts]
-HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib")
+HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba")
 IMPORT_LIMIT = 0.5  # s
 
 
@@ -76,7 +76,7 @@ def test_the_wheel_brings_the_meshes_and_their_licences(tmp_path: Path) -> None:
     assert {name.split("/")[0] for name in packed} == {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
 
 
-def test_importing_floatbase_loads_no_physics_no_pictures_and_no_modelling() -> None:
+def test_importing_floatbase_loads_no_physics_no_pictures_no_modelling_and_no_compiler() -> None:
     code = f"import sys, floatbase; print(*[name for name in {HEAVY} if name in sys.modules])"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.split() == []

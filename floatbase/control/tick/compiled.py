@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
-from importlib.util import find_spec
 from math import prod
 from pickle import UnpicklingError
 from threading import Timer
@@ -65,12 +64,10 @@ def obstacle(problem: Problem, solver: str) -> str:
 
 
 def _numba_obstacle() -> str:
-    if find_spec("numba") is None:
-        return "numba is not installed (pip install numba)"
     try:
         import floatbase.control.tick.tick  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
-        return f"numba is installed and cannot be loaded ({error})"
+        return f"numba cannot be loaded ({error}); pip install numba may mend it"
     return ""
 
 

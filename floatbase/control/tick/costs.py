@@ -6,9 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.tick.elimination import add_product
+from floatbase.control.tick.elimination import Space, add_product
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.kinematics import angular_jacobian, centre_of_mass, frame_pose, point_jacobian, point_velocity
+from floatbase.control.tick.kinematics import (
+    Bodies,
+    angular_jacobian,
+    centre_of_mass,
+    frame_pose,
+    point_jacobian,
+    point_velocity,
+)
 from floatbase.control.tick.memory import clear, take_matrix, take_vector
 from floatbase.control.tick.tables import COM, FORCE, FRAME, ORIENTATION, POSTURE, TORQUE
 from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
@@ -47,10 +54,9 @@ def rotation_error(R, target):
 
 
 @jit
-def motion_task(i, tasks, bodies, Ag, links, rows):
+def motion_task(i, tasks: TaskTable, bodies: Bodies, Ag, links, rows):
     """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for a bad target.
 
-    tasks, bodies: as in `TaskTable` and `Bodies`.
     Ag: (6, nv), centroidal momentum matrix: mass × the Jacobian of the CoM in its first three rows.
     links: (n, 4), mass of each link and its position in the joint.
     rows: (3, nv) receives the Jacobian.
@@ -98,11 +104,10 @@ def posture_error(tree, q, v, target, base, e, e_dot):
 
 
 @jit
-def task_costs(q, v, bodies, Ag, links, tasks, space, base, workspace, cost):
+def task_costs(q, v, bodies: Bodies, Ag, links, tasks: TaskTable, space: Space, base, workspace, cost: Cost):
     """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns the number of its rows in use, -1 for a bad target.
 
     q, v: (nq,), (nv,), the state.
-    bodies, tasks, space: as in `Bodies`, `TaskTable`, `Space`.
     Ag, links: as for `motion_task`.
     base: number of rows of (7) without a motor, 6 or 0.
     cost: receives the result; the last of the rows in use, of which there are a multiple of four, may be zero.
@@ -142,13 +147,13 @@ def task_costs(q, v, bodies, Ag, links, tasks, space, base, workspace, cost):
 
 
 @jit
-def single_entry_costs(used, weights, weighted, space, cost):
+def single_entry_costs(used, weights, weighted, space: Space, cost: Cost):
     """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ). Returns the number of rows of R in use.
 
     used: number of rows of R in use before.
     weights: (n + d,), of each entry.
     weighted: (n + d,), weight × desired.
-    space, cost: as in `Space` and `Cost`; entries that are a β change the diagonal only, the others take a row of R.
+    cost: updated; entries that are a β change the diagonal only, the others take a row of R.
     """
     V, beta_of, T = space
     R, diagonal, linear = cost
@@ -169,8 +174,8 @@ def single_entry_costs(used, weights, weighted, space, cost):
 
 
 @jit
-def hessian(cost, H, slope):
-    """Lower triangle of the Hessian in the first nb rows of H (nb + 1, nb + 1), and the slope (nb,) at β = 0, of a `Cost`."""
+def hessian(cost: Cost, H, slope):
+    """Lower triangle of the Hessian in the first nb rows of H (nb + 1, nb + 1), and the slope (nb,) at β = 0."""
     R, diagonal, linear = cost
     nb = diagonal.size
     clear(H)
@@ -185,8 +190,8 @@ def hessian(cost, H, slope):
 
 
 @jit
-def gradient(cost, beta, slope):
-    """The slope (nb,) of a `Cost` at β, residual by residual, which keeps the digits that the Hessian has lost."""
+def gradient(cost: Cost, beta, slope):
+    """The slope (nb,) at β, residual by residual, which keeps the digits that the Hessian has lost."""
     R, diagonal, linear = cost
     nb = beta.size
     for c in range(nb):

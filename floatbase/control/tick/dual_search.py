@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.tick.costs import gradient, hessian
-from floatbase.control.tick.inequalities import row_in_beta, violated_row
+from floatbase.control.tick.costs import Cost, gradient, hessian
+from floatbase.control.tick.elimination import Space
+from floatbase.control.tick.inequalities import Inequalities, row_in_beta, violated_row
 from floatbase.control.tick.jit import jit
 from floatbase.control.tick.memory import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
@@ -109,7 +110,7 @@ def add_row(W, U, d, z, q):
 
 
 @jit
-def drop_row(active, at, q):
+def drop_row(active: ActiveSet, at, q):
     """Take row `at` of the q active ones out of an `ActiveSet`, and turn W so that U stays upper triangular."""
     numbers, mu, bounds, rows, W, U = active
     for j in range(at, q - 1):
@@ -179,13 +180,13 @@ def directions(W, U, d, q, z, r):
 
 
 @jit
-def enforce(number, row, bound, q, d, z, r, active, beta):
+def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
     """Bring one violated row to its bound, dropping active rows whose multiplier would turn negative.
 
     number, row, bound: of the row, (nb,) and its bound in h.
     q: number of active rows.
     d, z, r: (nb,), memory for `directions`.
-    active, beta: the `ActiveSet` and β, which are updated.
+    active, beta: updated.
 
     Returns the new q, or why there is none.
     """
@@ -225,14 +226,14 @@ def enforce(number, row, bound, q, d, z, r, active, beta):
 
 
 @jit
-def newton_step(q, slope, L, step, move, y, active, beta):
+def newton_step(q, slope, L, step, move, y, active: ActiveSet, beta):
     """One step of Newton's method on the optimality conditions from (β, mu) that are right but for rounding.
 
     q: number of active rows.
     slope: (nb,), the cost's slope at β; overwritten.
     L: (nb, nb), Cholesky factor of the Hessian.
     step, move, y: (nb,), memory.
-    active, beta: the `ActiveSet`, whose multipliers are updated, and β, which is too.
+    active, beta: the multipliers and β are updated.
 
     Returns the largest change of an entry of β.
     """
@@ -283,17 +284,16 @@ def wrong_signed_row(mu, q):
 
 
 @jit
-def dual_search(cost, limits, space, workspace, numbers, mu, beta):
+def dual_search(cost: Cost, limits: Inequalities, space: Space, workspace, numbers, mu, beta):
     """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why there is no answer.
 
-    cost, limits, space: as in `Cost`, `Inequalities`, `Space`.
     numbers, mu: (nb,) receive the numbers and multipliers of the active rows.
     beta: (nb,) receives the optimum.
 
     Newton's method refines the end of the search. Where that shows that it was not the optimum, as a multiplier has the wrong
     sign or a row is violated, the search goes on.
     """
-    nb, d, k = beta.size, space.T.shape[0], 3 * limits.cones.shape[0]
+    nb, d, k = beta.size, limits.torque_limits.size, 3 * (limits.lengths.size // (limits.facets + 1))
     H, slope, L = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb), take_matrix(workspace, nb, nb)
     W, U, rows = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)

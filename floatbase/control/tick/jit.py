@@ -31,10 +31,10 @@ jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": T
 cache_on_disk = True  # False where numba finds no folder that it can write to
 
 
-def digest() -> int:
+def digest(folder: Path = Path(__file__).parent) -> int:
     """A number for the text of this folder and for the constants of other rooms that numba compiles in."""
     text = repr((INCONSISTENT, MOTION_TOLERANCE, MOTION_NOISE, FEASIBILITY_TOLERANCE)).encode()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    for file in sorted(folder.glob("*.py")):
         text += file.name.encode() + file.read_bytes()
     return int.from_bytes(sha256(text).digest()[:7], "big")
 

@@ -32,7 +32,7 @@ class ContactTable(NamedTuple):
 
 
 @jit
-def forward_velocities(bodies, v):
+def forward_velocities(bodies: Bodies, v):
     """Fill velocity and drift of `bodies` from the root to the leaves, for v (nv,).
 
     A joint's columns of J move with it, so its drift is that of its parent + velocity × (J v of the joint alone).
@@ -54,7 +54,7 @@ def forward_velocities(bodies, v):
 
 
 @jit
-def point_velocity(bodies, joint, p):
+def point_velocity(bodies: Bodies, joint, p):
     """Velocity and drift of the point p, world, of a joint's body."""
     angular = row_part(bodies.velocity, joint, 3)
     linear = plus(row_part(bodies.velocity, joint, 0), cross(angular, p))
@@ -63,7 +63,7 @@ def point_velocity(bodies, joint, p):
 
 
 @jit
-def frame_pose(bodies, joint, frames, i):
+def frame_pose(bodies: Bodies, joint, frames, i):
     """Rotation and position, world, of the frame whose pose in the joint is row i of `frames`."""
     R = rotation_in(bodies.poses, joint)
     x, y, z = rotation_in(frames, i)
@@ -71,7 +71,7 @@ def frame_pose(bodies, joint, frames, i):
 
 
 @jit
-def point_jacobian(bodies, joint, p, out, row):
+def point_jacobian(bodies: Bodies, joint, p, out, row):
     """Write the Jacobian of the point p, world, of a joint's body into rows row:row + 3 of out (·, nv), which hold zeros."""
     i = joint
     while i > 0:
@@ -82,7 +82,7 @@ def point_jacobian(bodies, joint, p, out, row):
 
 
 @jit
-def angular_jacobian(bodies, joint, out, row):
+def angular_jacobian(bodies: Bodies, joint, out, row):
     """Write the Jacobian of a body's angular velocity into rows row:row + 3 of out (·, nv), which hold zeros."""
     i = joint
     while i > 0:
@@ -92,7 +92,7 @@ def angular_jacobian(bodies, joint, out, row):
 
 
 @jit
-def centre_of_mass(bodies, links):
+def centre_of_mass(bodies: Bodies, links):
     """Position, velocity and drift of the centre of mass, and the mass. links: (n, 4), mass and its position in the joint."""
     com, com_velocity, com_drift, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
     for i in range(1, links.shape[0]):
@@ -105,7 +105,7 @@ def centre_of_mass(bodies, links):
 
 
 @jit
-def count_motion_rows(contacts):
+def count_motion_rows(contacts: ContactTable):
     """The number m of rows of A in (5): three for a point, six for a flat foot."""
     m = 0
     for i in range(contacts.table.shape[0]):
@@ -114,7 +114,7 @@ def count_motion_rows(contacts):
 
 
 @jit
-def contact_rows(bodies, contacts, A, b, J):
+def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
     """(4)(5) A (m, nv) and b (m,) of all contacts, and the Jacobian J (k, nv) of their points.
 
     A and J may be one array where all contacts are points.

@@ -106,8 +106,8 @@ def tables_of(problem: Problem) -> Tables:
     contacts, frames, points, cones = _contact_tables(problem)
     tasks, gains, poses, targets, moving, misfits = _task_tables(problem)
     dynamics, limits = dynamics_of(problem.robot), problem.limits
-    sizes = (len(dynamics.tree), len(contacts), len(points), cones.shape[1], len(tasks), len(limits.torque_limits))
-    lengths, bounds = np.linalg.norm(cones, axis=2), (limits.torque_limits, limits.min_normal_force)
+    sizes = (len(dynamics.tree), len(contacts), len(points), limits.facets + 1, len(tasks), len(limits.torque_limits))
+    lengths, bounds = np.linalg.norm(cones, axis=1), (limits.torque_limits, limits.min_normal_force)
     real = (0.0, dynamics.links, frames, points, gains, poses, cones, lengths, *bounds)  # a workspace counts in its first entry
     return Tables(
         sizes=np.array(sizes, np.int64),
@@ -119,34 +119,30 @@ def tables_of(problem: Problem) -> Tables:
     )
 
 
-def _contact_tables(problem: Problem) -> tuple[npt.NDArray[np.int64], Array, Array, Array]:
-    """Contacts (C, 4), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P, F + 1, 3)."""
+def _contact_tables(problem: Problem) -> tuple[Any, ...]:
+    """Contacts (C, 4), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P (F + 1), 3)."""
     limits = problem.limits
-    table, first = [], 0
-    frames: list[Array] = [np.zeros((0, _POSE + 4))]
-    points: list[Array] = [np.zeros((0, 3))]
-    cones: list[Array] = [np.zeros((0, limits.facets + 1, 3))]
-    for contact in problem.contacts:
-        joint, frame, corners, rows = _contact_numbers(problem.robot, cast(Any, contact), limits.facets, limits.inside)
-        table.append((joint, CONTACT_KINDS[type(contact)], first, len(corners)))
-        frames.append(frame)
-        points.append(corners)
-        cones.append(rows)
-        first += len(corners)
-    return np.array(table, np.int64).reshape(-1, 4), np.vstack(frames), np.vstack(points), np.concatenate(cones)
+    found = [_contact_numbers(problem.robot, cast(Any, contact), limits.facets, limits.inside) for contact in problem.contacts]
+    table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
+    tables = np.array(table, np.int64).reshape(-1, 4)
+    tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
+    return tables, *(
+        np.concatenate([np.zeros((0, width)), *parts]) for width, parts in ((_POSE + 4, frames), (3, points), (3, cones))
+    )
 
 
 @lru_cache(maxsize=256)
 def _contact_numbers(
     robot: Robot, contact: PointContact | FlatFootContact, facets: int, inside: bool
-) -> tuple[int, Array, Array, Array]:
-    """Joint of one contact, its frame (16,), points (p, 3) and cones (p, F + 1, 3)."""
+) -> tuple[tuple[int, ...], Array, Array, Array]:
+    """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 3)."""
     joint, pose = _frame(robot, contact.frame)
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, facets, inside)
     rows = np.vstack([polyhedron.rows, -polyhedron.normal])
     radius, points = (contact.radius, contact.centre) if isinstance(contact, PointContact) else (0.0, contact.corners)
     points = np.array(points).reshape(-1, 3)
-    return joint, np.concatenate([pose, contact.normal, [radius]]), points, np.tile(rows, (len(points), 1, 1))
+    row = (joint, CONTACT_KINDS[type(contact)], 0, len(points))
+    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, np.tile(rows, (len(points), 1))
 
 
 def _task_tables(problem: Problem) -> tuple[Any, ...]:

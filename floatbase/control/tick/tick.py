@@ -44,9 +44,9 @@ def unpack(sizes, indices, numbers, targets):
     contacts = ContactTable(contact_table, take_matrix(numbers, n_contacts, 16), take_matrix(numbers, n_points, 3))
     task_table, gains = take_matrix(indices, n_tasks, 3), take_matrix(numbers, n_tasks, 3)
     tasks = TaskTable(task_table, gains, take_matrix(numbers, n_tasks, 12), targets)
-    cones = take_vector(numbers, n_points * n_rows * 3).reshape(n_points, n_rows, 3)
-    lengths, torque_limits = take_matrix(numbers, n_points, n_rows), take_vector(numbers, d)
-    return tree, links, contacts, tasks, Inequalities(cones, lengths, torque_limits, take_vector(numbers, 1)[0])
+    cones, lengths = take_matrix(numbers, n_points * n_rows, 3), take_vector(numbers, n_points * n_rows)
+    torque_limits, least_normal = take_vector(numbers, d), take_vector(numbers, 1)[0]
+    return tree, links, contacts, tasks, Inequalities(cones, lengths, n_rows - 1, torque_limits, least_normal)
 
 
 def workspace_sizes(sizes, m):
@@ -79,12 +79,11 @@ def inputs_valid(q, v, targets, tree):
 
 
 @jit
-def write_answer(space, beta, active, n_active, nv, answer):
-    """Write (q̈, τ, λ) at β and the numbers of the active rows into `answer`. Returns False where an entry has lost its digits.
+def write_answer(space: Space, beta, active, n_active, nv, answer):
+    """Write (q̈, τ, λ) at β (nb,) and the numbers of the active rows into `answer`. Returns False where one has no digits.
 
-    space: as in `Space`.
-    beta: (nb,).
     active: (n_active or more,), numbers of the active rows.
+    nv: length of q̈.
     answer: as for `tick`; the multipliers are there already.
     """
     n, d = space.V.shape[0], space.T.shape[0]

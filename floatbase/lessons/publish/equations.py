@@ -134,9 +134,9 @@ def _public() -> Iterator[tuple[str, str, list[str]]]:
 def _counts(module: str) -> bool:
     """Whether a module can hold equations: pictures, lessons and what starts with an underscore do not.
 
-    Nor do the controller's fast paths, which are held to the readable one as a whole.
+    Nor does the compiled tick, which is held to the readable path as a whole.
     """
-    return not re.search(r"\._|\.viewer|\.lessons|\.kernel|\.reduced", module)
+    return not re.search(r"\._|\.viewer|\.lessons|\.tick", module)
 
 
 def _is_own(module: ModuleType, name: str) -> bool:
