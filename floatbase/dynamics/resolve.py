@@ -16,7 +16,7 @@ from floatbase.linear_algebra import RANK_TOLERANCE
 MOTION_TOLERANCE = 1e-4
 # 1/s: rows of (5) may be inconsistent by this much, m/s², for each m/s that the contacts move: 1 m/s² for 1 cm/s of slip.
 MOTION_NOISE = 100.0
-# A and J come from the same kinematics. Where they fit, rounding leaves 1e-12 of J; where they do not, parts as large as J.
+# A and J come from the same kinematics. Where they fit, rounding leaves 1e-14 of J; where not, parts like J itself.
 _FIT_TOLERANCE = 1e-6
 
 
