@@ -13,7 +13,7 @@ from floatbase.linear_algebra import RANK_TOLERANCE
 
 MOTION_TOLERANCE = 1e-4  # part of A's largest singular value below which a motion counts as not held: angles err by 1e-4 rad
 MOTION_NOISE = 100.0  # 1/s: rows of (5) may disagree by this for each m/s that contacts move: 1 m/s² for 1 cm/s of slip
-_FIT_TOLERANCE = 1e-6  # part of J that may lie beside A's rows: rounding leaves 1e-12, contacts that do not fit leave all
+_FIT_TOLERANCE = 1e-6  # part of J that may lie beside A's rows: rounding leaves 1e-14, contacts that do not fit leave all
 
 
 @dataclass(frozen=True, eq=False)
