@@ -91,15 +91,15 @@ def parts(n: int) -> Iterator[str]:
     yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
-        whole = controller(robot)
-        compiled, numbers = whole.compiled, whole.compiled.empty_answer()
+        command = controller(robot)
+        compiled, numbers = command.compiled, command.compiled.empty_answer()
         for label, spread in SPREADS.items():
             spent = []
             for q, v in states(robot, n, spread):
                 update = clock(compiled.dynamics.update, [(q, v)] * 5)
                 given = (q, v, compiled.targets, *compiled.arguments, numbers)
                 ticks = [clock(tick.tick, [(*given, last)] * 5) for last in range(1, tick.PARTS + 1)]
-                ends = [np.min(times) for times in (update, *ticks, clock(whole, [(q, v)] * 5))]
+                ends = [np.min(times) for times in (update, *ticks, clock(command, [(q, v)] * 5))]
                 spent.append([ends[0], *np.diff([0.0, *ends[1:-1]]), ends[-1] - ends[0] - ends[-2]])
             yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0)) + " |"
 
@@ -167,8 +167,8 @@ def closed_loop(seconds: float = 4.0) -> Iterator[str]:
             bare = ticks * sim.timestep / (time.perf_counter() - start)
             start = time.perf_counter()
             record = fb.rollout(fb.Simulation(robot), command, duration=ticks * sim.timestep)
-            kept = ticks * sim.timestep / (time.perf_counter() - start)
-            yield f"| {name} | {path} | {1 / sim.timestep:.0f} Hz | {bare:.1f} × | {kept:.1f} × | {record.outcome} |"
+            recorded = ticks * sim.timestep / (time.perf_counter() - start)
+            yield f"| {name} | {path} | {1 / sim.timestep:.0f} Hz | {bare:.1f} × | {recorded:.1f} × | {record.outcome} |"
 
 
 def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:

@@ -106,25 +106,30 @@ def resolution(robot: Robot, contacts: fb.Contacts, q: np.ndarray) -> float:
 
 
 def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
-    """A state between the robot's standing, where A loses rank, and `state`, in which `resolution` is `value`."""
+    """The state in which `resolution` is `value`, on the way from standing, where A loses rank, through `state`."""
     robot, low, high = state.robot, 0.0, 1.0
     away = pin.difference(robot.model, robot.standing().q, state.q)
+
+    def at(step: float) -> np.ndarray:
+        return pin.integrate(robot.model, robot.standing().q, step * away)
+
+    while resolution(robot, contacts, at(high)) < value:
+        high *= 2.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        q = pin.integrate(robot.model, robot.standing().q, middle * away)
-        low, high = (middle, high) if resolution(robot, contacts, q) < value else (low, middle)
-    assert resolution(robot, contacts, q) == pytest.approx(value, rel=1e-6)
-    return State(robot, q, state.v)
+        low, high = (middle, high) if resolution(robot, contacts, at(middle)) < value else (low, middle)
+    assert resolution(robot, contacts, at(high)) == pytest.approx(value, rel=1e-6)
+    return State(robot, at(high), state.v)
 
 
-@pytest.mark.parametrize("share", [0.03, 0.3, 0.99, 1.01, 3.0, 30.0])
+@pytest.mark.parametrize("share", [0.03, 0.3, 0.99, 1.01, 3.0])
 def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(share: float) -> None:
     """solo8 on three feet, with the least singular value of A on either side of MOTION_TOLERANCE."""
     robot = judges.load("solo8")
     contacts = fb.Contacts.points(robot).without(robot.feet[3].frame)
     both = pair(robot, contacts)
-    for seed in range(3):
-        state = with_resolution(robot.random_state(seed, 0.1), contacts, share * MOTION_TOLERANCE)
+    for moved in judges.states("solo8", 3, 0.1):
+        state = with_resolution(moved, contacts, share * MOTION_TOLERANCE)
         assert difference(both, state) < 1e-6
         prove_optimal(both[0](state.q, state.v).solution)
 
@@ -210,8 +215,8 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
     urdf = tmp_path / "arm.urdf"
     urdf.write_text(f'<robot name="arm">{links}{joints}</robot>')
     robot = fb.load_urdf(urdf, floating=False)
-    goal = [np.cos(2.9), np.sin(2.9), 0.1]
-    tasks = [fb.PostureTask(goal), fb.FrameTask("l2", [0.1, 0.0, 0.4]), fb.CoMTask([0.0, 0.0, 0.3])]
+    target = [np.cos(2.9), np.sin(2.9), 0.1]
+    tasks = [fb.PostureTask(target), fb.FrameTask("l2", [0.1, 0.0, 0.4]), fb.CoMTask([0.0, 0.0, 0.3])]
     both = pair(robot, fb.Contacts.none(), tasks)
     for seed in range(5):
         assert difference(both, robot.random_state(seed, 0.8)) < TORQUE
@@ -347,10 +352,10 @@ def test_the_path_is_visible_and_can_be_chosen() -> None:
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
     state = robot.standing()
-    for asked in ("compiled", "readable"):
-        controller = fb.WholeBodyController(robot, contacts, tasks, path=asked)
-        assert controller.path == controller(state.q, state.v).path == asked
-        assert asked in repr(controller)
+    for path in ("compiled", "readable"):
+        controller = fb.WholeBodyController(robot, contacts, tasks, path=path)
+        assert controller.path == controller(state.q, state.v).path == path
+        assert path in repr(controller)
         assert controller.path_reason
     with pytest.raises(UnknownNameError, match="unknown path 'quick'"):
         fb.WholeBodyController(robot, contacts, tasks, path="quick")
@@ -479,8 +484,8 @@ def test_a_whole_number_of_facets_may_be_written_with_a_point() -> None:
 
 def test_new_and_replaced_controllers_have_run_a_tick_before_the_loop_does(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = judges.load("go2")
-    warmed = []
-    monkeypatch.setattr(Compiled, "warm_up", warmed.append)
+    warmed: list[Compiled] = []
+    monkeypatch.setattr(Compiled, "warm_up", lambda self: warmed.append(self))
     readable = fb.WholeBodyController(robot, judges.stance(robot), [OwnTask()])
     assert readable.path == "readable" and not warmed
     replaced = readable.replace(tasks=fb.standing_tasks(robot.standing()))

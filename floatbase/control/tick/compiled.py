@@ -53,7 +53,7 @@ def cache_warning() -> str:
 def obstacle(problem: Problem, solver: str) -> str:
     """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP back end."""
     if solver != "daqp":
-        return f"solver {solver!r} was asked for, and the compiled tick has its own"
+        return f"solver {solver!r} was requested, and the compiled tick has its own"
     for contact in problem.contacts:
         if type(contact) not in CONTACT_KINDS:
             return f"contact {contact.name!r} is a {type(contact).__name__}; the compiled tick takes points and flat feet"
@@ -144,7 +144,7 @@ class Compiled:
         return np.empty(self.forces.stop + 2 * self._n_multipliers)
 
     def tasks(self, targets: Array) -> tuple[Task, ...]:
-        """The tasks with the targets of one tick, as a call returned them: functions may answer otherwise when asked again."""
+        """The tasks with the targets of one tick, as a call returned them: functions may return others when called again."""
         values: dict[int, dict[str, Any]] = {}
         for task, first, shape, name, _ in self._tables.moving:
             values.setdefault(task, {})[name] = targets[first : first + prod(shape)].reshape(shape)

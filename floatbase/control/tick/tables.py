@@ -1,6 +1,6 @@
 """A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays that it overwrites in place.
 
-What belongs to one robot or one contact is made once and kept, so that a controller with other contacts is cheap.
+What belongs to one robot or one contact is made once, so that a controller with other contacts is cheap.
 """
 
 from __future__ import annotations
