@@ -4,7 +4,7 @@
 #   PYTHON=…       the Python to use, such as python3.12 or a path; without it the first of python3, python3.13, … that fits
 #   LAB_ARGS=…     more options for JupyterLab, such as --no-browser or --port=9000
 #   PAGES_ARGS=…   options for the pages, such as "--to DIR" or "notebooks/01_floating_base.ipynb"
-#   PYTEST_ARGS=…  more options for pytest, such as "-k friction" or tests/control
+#   PYTEST_ARGS=…  more options for pytest, such as "-k friction", tests/control, "--seed 1" or "-n 4"
 #   LOCK_ARGS=…    more options for `uv pip compile`, such as --upgrade
 
 .DEFAULT_GOAL := help
@@ -30,6 +30,9 @@ FIRST := /lab/tree/my/00_start_here.ipynb
 # which tabs were open is kept with this copy of the course, so that tabs of another copy do not open here
 TABS := $(CURDIR)/$(VENV)/workspaces
 
+# two processes share the files of tests; the slowest files come first (tests/conftest.py)
+WORKERS := -n 2 --dist loadfile --no-loadscope-reorder
+
 # how often JupyterLab saves, s; its own is every two minutes
 SAVING := {"@jupyterlab/docmanager-extension:plugin": {"autosaveInterval": 30}}
 SETTINGS := $(VENV)/share/jupyter/lab/settings
@@ -45,7 +48,7 @@ help:
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
 
 lab: setup
-	@$(BIN)/python -m floatbase.lessons.publish.workspace
+	@$(BIN)/python -m floatbase.lessons.publish workspace
 	@mkdir -p $(SETTINGS) && echo '$(SAVING)' > $(SETTINGS)/overrides.json
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
 		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
@@ -53,10 +56,10 @@ lab: setup
 test: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python -m pytest $(WORKERS) --durations=30 $(PYTEST_ARGS)
 
 pages: setup
-	$(BIN)/python -m floatbase.lessons.publish.pages $(PAGES_ARGS)
+	$(BIN)/python -m floatbase.lessons.publish pages $(PAGES_ARGS)
 
 setup: $(VENV)/ready-$(KEY)
 

@@ -1,12 +1,12 @@
 """Build the light meshes of the catalogue's robots: `python assets/build_meshes.py [robot …]`.
 
-Needs the packages trimesh, pycollada and fast-simplification; reading the result needs numpy alone.
+Needs the packages trimesh, pycollada and fast-simplification. Reading the result needs only numpy.
 
-The visuals that example-robot-data names in a robot's URDF are loaded material by material, welded, decimated to a common
-budget, split at creases so that edges stay sharp, and merged into one vertex-coloured mesh for each joint. A robot's file
-`assets/meshes/<robot>.npz` holds, for part i: `joints[i]`, its joint's name; rows `vertex_start[i]:vertex_start[i + 1]` of
-`vertices` (int16, times `steps[i]` metres, in the joint's frame) and of `colours` (index into `palette`, 0-255); rows
-`face_start[i]:face_start[i + 1]` of `faces` (index into the part's own vertices).
+It loads the visuals of a robot's URDF material by material, welds them, decimates them to a number of faces for the whole
+robot, splits them at creases so that edges look sharp, and merges them into one mesh with coloured vertices for each joint.
+The file `assets/meshes/<robot>.npz` contains, for part i: `joints[i]`, its joint's name; rows
+`vertex_start[i]:vertex_start[i + 1]` of `vertices` (int16, times `steps[i]` metres, in the joint's frame) and of `colours`
+(index of `palette`, 0-255); rows `face_start[i]:face_start[i + 1]` of `faces` (indices of the part's own vertices).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from floatbase.robots import Robot, catalogue, load
 from floatbase.viewer import Piece, urdf_visuals
 
 OUT = Path(__file__).parent / "meshes"
-FACES = 36_000  # wanted for a robot, fewer where the file would be larger than SIZE
+FACES = 36_000  # of a robot; fewer if the file would be larger than SIZE
 SIZE = 380_000  # bytes
-CREASE = np.radians(35.0)
-# robots whose files in example-robot-data have no colours: a word of the file's name -> colour
+CREASE = np.radians(35.0)  # angle between two faces above which their edge is sharp
+# colours of robots whose files in example-robot-data have none: word in the file's name -> colour
 SOLO = {"": (0.24, 0.25, 0.27), "foot": (0.08, 0.08, 0.08), "lower_leg": (0.87, 0.87, 0.85)}
 PAINT = {"solo12": SOLO, "solo8": SOLO}
 
@@ -33,13 +33,13 @@ Light = tuple[np.ndarray, trimesh.Trimesh]  # colour and mesh
 
 
 def paint(robot: str, piece: Piece) -> np.ndarray:
-    """The piece's colour: our own paint where there is one."""
+    """The piece's colour: of PAINT if the robot is there, else its own."""
     words = [word for word in PAINT.get(robot, {}) if word in piece.source]
     return np.array(PAINT[robot][max(words, key=len)]) if words else piece.colour
 
 
 def budget(pieces: list[Piece], total: float) -> list[int]:
-    """How many faces each piece keeps: in proportion to its size, `total` in all."""
+    """How many faces each piece may have: in proportion to its size, `total` together."""
     have = np.array([len(piece.mesh.faces) for piece in pieces])
     size = np.array([np.sqrt(piece.mesh.area) for piece in pieces])
     low, high = 0.0, 1e6
@@ -50,19 +50,19 @@ def budget(pieces: list[Piece], total: float) -> list[int]:
 
 
 def lighten(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """Weld, decimate, drop slivers, and split vertices at creases."""
+    """Weld a mesh, decimate it to a number of faces, drop degenerate faces, and split vertices at creases."""
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     if faces < len(mesh.faces):
         points, triangles = fast_simplification.simplify(
             mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32), target_count=faces, agg=7
         )
-        mesh = trimesh.Trimesh(np.clip(points, *mesh.bounds), triangles)  # no spike leaves the original's box
+        mesh = trimesh.Trimesh(np.clip(points, *mesh.bounds), triangles)  # back into the original's box
     mesh.update_faces(mesh.nondegenerate_faces())
     return trimesh.graph.smooth_shade(mesh, angle=CREASE) if len(mesh.faces) else mesh
 
 
 def merge(pieces: list[Light], palette: list[bytes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices (m), faces and palette indices of the pieces of one joint."""
+    """Vertices, m, faces and palette indices of the pieces of one joint. Adds new colours to the palette."""
     vertices, faces, colours, start = [], [], [], 0
     for colour, mesh in pieces:
         code = np.clip(np.round(255 * colour), 0, 255).astype(np.uint8).tobytes()
@@ -86,7 +86,7 @@ def build(name: str) -> None:
 
 
 def write(robot: Robot, pieces: list[Piece], total: float) -> Path:
-    """Write the light meshes with so many faces, and say what came out."""
+    """Write the light meshes with `total` faces, print their numbers, and return the file."""
     light: dict[int, list[Light]] = {}
     for piece, faces in zip(pieces, budget(pieces, total), strict=True):
         light.setdefault(piece.joint, []).append((paint(robot.name, piece), lighten(piece.mesh.copy(), faces)))

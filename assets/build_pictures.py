@@ -1,7 +1,7 @@
 """Make the pictures of `assets/pictures/`: `python assets/build_pictures.py [name …]`. Needs playwright and a Chromium.
 
-The document's figures, every robot of the catalogue with its forces and friction cones, go2 on four-sided cones, and
-the feet of talos.
+They show the document's figures, every robot of the catalogue with its forces and friction cones, go2 with four-sided
+cones, and the feet of talos.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SIZE = {"width": 1000, "height": 640}
 
 
 def standing(name: str, facets: int | None = None) -> Viewer:
-    """A robot that stands, with the forces that carry its weight; the two at the front lean, one of them to its cone."""
+    """A standing robot with forces that carry its weight. The first two forces lean, the second up to its cone."""
     robot = fb.load(name)
     state = robot.standing()
     view = Viewer(robot, background="white", facets=facets)
@@ -47,7 +47,7 @@ SCENES: dict[str, Callable[[], Viewer]] = {
 
 
 def main(names: list[str]) -> None:
-    """Draw each scene, photograph its page, keep it with 255 colours."""
+    """Draw each scene, take a screenshot of its page, and save it with 255 colours."""
     OUT.mkdir(exist_ok=True)
     browser_path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     with sync_playwright() as playwright:

@@ -68,11 +68,11 @@ def _prepared(urdf: str, contacts: list[dict]) -> str:
 
 
 def _add_tasks(solver: placo.DynamicsSolver, description: dict) -> None:
-    wanted = {kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")}
-    com = solver.add_com_task(wanted["com"])
-    base = solver.add_orientation_task(description["base"], wanted["orientation"])
+    desired = {kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")}
+    com = solver.add_com_task(desired["com"])
+    base = solver.add_orientation_task(description["base"], desired["orientation"])
     posture = solver.add_joints_task()
-    posture.set_joints(dict(zip(description["joints"], wanted["posture"], strict=True)))
+    posture.set_joints(dict(zip(description["joints"], desired["posture"], strict=True)))
     for task, kind in ((com, "com"), (base, "orientation"), (posture, "posture")):
         task.configure(kind, "soft", description[kind]["weight"])
         task.kp, task.kd = description[kind]["kp"], description[kind]["kd"]

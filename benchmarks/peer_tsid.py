@@ -63,13 +63,13 @@ def _add_tasks(formulation, robot, description: dict) -> list:
     base = tsid.TaskSE3Equality("orientation", robot, description["base"])
     base.setMask(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]))
     posture = tsid.TaskJointPosture("posture", robot)
-    wanted = {kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")}
-    wanted["orientation"] = np.concatenate([np.zeros(3), wanted["orientation"].ravel(order="F")])  # place, then columns
+    desired = {kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")}
+    desired["orientation"] = np.concatenate([np.zeros(3), desired["orientation"].ravel(order="F")])  # position, then columns
     for task, kind, size in ((com, "com", 3), (base, "orientation", 6), (posture, "posture", robot.na)):
         task.setKp(description[kind]["kp"] * np.ones(size))
         task.setKd(description[kind]["kd"] * np.ones(size))
-        sample = tsid.TrajectorySample(wanted[kind].size, size)
-        sample.value(wanted[kind])
+        sample = tsid.TrajectorySample(desired[kind].size, size)
+        sample.value(desired[kind])
         task.setReference(sample)
         formulation.addMotionTask(task, description[kind]["weight"], SOFT, 0.0)
     limits = np.array(description["torque_limits"])

@@ -15,7 +15,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import peer_problems
@@ -23,8 +22,6 @@ from peer_environments import MissingError, python_of, versions
 from peer_problems import ROBOTS, SPREADS
 from peer_wire import Process
 from tick import machine
-
-from floatbase.control import controller
 
 HERE = Path(__file__).parent
 TOLERANCE = 1e-6  # of the strongest motor's limit, by which torques may differ for the optimum to count as one
@@ -135,15 +132,12 @@ def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
             process.close()
 
 
-def without_numba(python: Path, n: int) -> Iterator[tuple[str, Row]]:
-    """The paths that need no compiler, on go2 against TSID."""
-    for path in get_args(controller.Path):
-        if path not in ("auto", "compiled"):
-            pair = [ours(path), Process(python, HERE / SIDES["tsid"])]
-            for row in compare(pair, "go2", "tsid", n, 20):
-                yield path, row
-            for process in pair:
-                process.close()
+def readable_rows(python: Path, n: int) -> Iterator[Row]:
+    """The readable path, which needs no compiler, on go2 against TSID."""
+    pair = [ours("readable"), Process(python, HERE / SIDES["tsid"])]
+    yield from compare(pair, "go2", "tsid", n, 20)
+    for process in pair:
+        process.close()
 
 
 # results -------------------------------------------------------------------------------------------------------------------
@@ -204,7 +198,7 @@ Ratios are to be trusted, microseconds to be taken with salt: a ratio is the med
 answer all states, one side after the other. Every tick goes from q and v to torques, in Python, through each library's own
 binding: `computeProblemData`, `solve` and `getActuatorForces` for TSID, `update_kinematics` and `solve` for placo,
 `controller(q, v)` for floatbase. The peers are the packages of PyPI, compiled for any processor of their kind; numba compiles
-floatbase's kernel for this one."""
+floatbase's tick for this one."""
 
 SAMENESS = """\
 Torques are compared before times are: they count as the same up to a millionth of the strongest motor's limit. What is left is
@@ -212,7 +206,7 @@ rounding in the peers' solver, as floatbase's compiled and readable paths, which
 fifth state)."""
 
 
-def report(rows: list[Row], plain: list[tuple[str, Row]], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
+def report(rows: list[Row], readable: list[Row], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
     """The text of peers.md."""
     equal = [row for row in rows if row.peer != PLANAR]
     same, other = [row for row in equal if row.is_same], [row for row in equal if not row.is_same]
@@ -223,9 +217,9 @@ def report(rows: list[Row], plain: list[tuple[str, Row]], used: dict[str, dict[s
     lines += ["## The same optimum", "", (peer_problems.__doc__ or "").strip(), "", SAMENESS, "", *torque_table(equal), ""]
     lines += [f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}.\n" for row in other]
     lines += ["## Times", "", *time_table(same), ""]
-    for path in dict.fromkeys(path for path, _ in plain):
-        chosen = [row for which, row in plain if which == path and row.is_same]
-        lines += [f"Without numba, `path={path!r}`:", "", *time_table(chosen, path), ""]
+    if readable:
+        same_readable = [row for row in readable if row.is_same]
+        lines += ['The readable path, `path="readable"`:', "", *time_table(same_readable, "readable"), ""]
     lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(same), ""]
     planar = [row for row in rows if row.peer == PLANAR]
     if planar:
@@ -255,7 +249,7 @@ def main() -> None:
     ask.add_argument("--rounds", type=int, default=100, help="turns that each side takes")
     options = ask.parse_args()
     rows: list[Row] = []
-    plain: list[tuple[str, Row]] = []
+    readable: list[Row] = []
     used: dict[str, dict[str, str]] = {}
     lacking: list[str] = []
     for peer in options.peers:
@@ -265,11 +259,11 @@ def main() -> None:
             for row in measure(peer, python, options.states, options.rounds):
                 print(f"{row.robot} {row.peer} {row.label}: {row.difference:.1e} N·m, {row.ratio:.2f} ×", flush=True)
                 rows.append(row)
-            plain += without_numba(python, options.states // 6) if peer == "tsid" else []
+            readable += readable_rows(python, options.states // 6) if peer == "tsid" else []
         except (MissingError, RuntimeError) as error:
             lacking.append(f"{peer}. {error}")
             print(f"No {peer}: {error}", flush=True)
-    text = report(rows, plain, used, lacking)
+    text = report(rows, readable, used, lacking)
     (HERE / "peers.md").write_text(text, encoding="utf-8")
     if rows:
         plot([row for row in rows if row.is_same])

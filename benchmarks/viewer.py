@@ -1,10 +1,10 @@
 """How long the viewer keeps its caller waiting: `python benchmarks/viewer.py`.
 
-`set_transform`, through meshcat's own `Visualizer` and as `Viewer` sends it, and a full `show` of go2 with a new state, new
-measured and planned forces and four cones every time. Once with no page, and once with one page of a real browser that
-draws all the while on the same machine (left out without Chromium and playwright). The loop does not pause between calls,
-so window and page are as busy as they can be; the last row draws 30 times a second, as a course does. "work" is the median
-of the processor time that the caller's thread itself used: what is left of it when the machine is busy with other things.
+It measures `set_transform`, through meshcat's `Visualizer` and as `Viewer` sends it, and a full `show` of go2 with a new
+state, new measured and planned forces and four cones each time. First without a page, then with one page of a real browser on
+the same machine, which draws all the time (left out without Chromium and playwright). The loop does not pause between calls,
+so window and page are as busy as they can be; only the last row draws 30 times a second, as a lesson does. "work" is the
+median processor time of the caller's own thread, which other programs on the machine hardly change.
 """
 
 from __future__ import annotations
@@ -30,11 +30,14 @@ TARGETS = {"set_transform": 25.0, "show": 1500.0}  # µs, median
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
 
 
-Row = tuple[str, str, np.ndarray]  # what was called, how, and of every call the time and the caller's own work, µs
+Row = tuple[str, str, np.ndarray]  # what was called; how; (2, calls), µs: time and work of each call
 
 
 def timed(call: Callable[[int], object], calls: int, pause: float = 0.0) -> np.ndarray:
-    """Time of every call and the work of this thread in it, (2, calls), µs; `call` gets its number. pause: s between calls."""
+    """Time of each call and the work of this thread in it, (2, calls), µs.
+
+    call: called with the number of the call. calls: how many calls. pause: s before each call.
+    """
     times = np.empty((2, calls))
     for i in range(calls):
         time.sleep(pause)
@@ -59,7 +62,7 @@ def transforms(window: Window, calls: int) -> Iterator[Row]:
 
 
 def shows(view: fb.Viewer, calls: int, pause: float = 0.0) -> Iterator[Row]:
-    """A full picture, everything in it new. States are made beforehand, but know nothing yet: their kinematics count."""
+    """A full picture in which everything is new. The states' kinematics are computed in the call, so they count."""
     robot, random = view.robot, np.random.default_rng(0)
     contacts = fb.Contacts.points(robot, 0.6)
     home = robot.standing().q
@@ -78,7 +81,7 @@ def shows(view: fb.Viewer, calls: int, pause: float = 0.0) -> Iterator[Row]:
 
 @contextmanager
 def a_page(url: str) -> Iterator[bool]:
-    """A page of a real browser, if there is one."""
+    """Open a page in a real browser; gives whether there is one."""
     found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     try:
         from playwright.sync_api import sync_playwright
@@ -95,7 +98,7 @@ def a_page(url: str) -> Iterator[bool]:
 
 
 def machine() -> str:
-    """Processor, Python and packages."""
+    """Names and versions of the processor, Python and the packages."""
     cpu = platform.processor() or platform.machine()
     if Path("/proc/cpuinfo").exists():
         names = [line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
@@ -105,11 +108,11 @@ def machine() -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print the table; 1 when a median misses its target."""
+    """Print the table. Returns 1 if a median misses its target, else 0."""
     parser = argparse.ArgumentParser(description="Times of the viewer on the Python side.")
     parser.add_argument("--calls", type=int, default=20_000, help="of set_transform; a tenth of it of show (20000)")
     parser.add_argument("--no-page", action="store_true", help="leave the browser out")
-    asked = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     print(machine())
     print(f"{'':9}{'call':14}{'':43}{'median':>10}{'p99':>10}{'work':>10}{'target':>10}   (µs)")
     missed = False
@@ -125,19 +128,19 @@ def main(arguments: list[str] | None = None) -> int:
             )
 
     def both(page: str) -> None:
-        report(page, transforms(view.window, asked.calls))
-        report(page, shows(view, max(asked.calls // 10, 1)))
+        report(page, transforms(view.window, options.calls))
+        report(page, shows(view, max(options.calls // 10, 1)))
 
     view = fb.Viewer(fb.load("go2"))
     view.show(view.robot.standing())
     try:
         both("no page")
-        with nullcontext(False) if asked.no_page else a_page(view.url) as there:
+        with nullcontext(False) if options.no_page else a_page(view.url) as there:
             if there:
                 view.window.wait()
                 both("one page")
-                report("one page", shows(view, max(asked.calls // 100, 1), 1 / 30))
-            elif not asked.no_page:
+                report("one page", shows(view, max(options.calls // 100, 1), 1 / 30))
+            elif not options.no_page:
                 print("one page: left out, no Chromium or no playwright here")
     finally:
         view.close()

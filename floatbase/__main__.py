@@ -1,191 +1,14 @@
-"""`python -m floatbase view go2`: a robot on the physics under the controller, live in a browser, without a notebook."""
+"""The command line: `python -m floatbase robots`, `view` and `compile`."""
 
 from __future__ import annotations
 
 import argparse
-import math
 import signal
 import sys
 import threading
-import time
-from collections import deque
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 
 import floatbase as fb
-from floatbase.errors import ViewerError
-from floatbase.objectives import Task
-from floatbase.robots import Robot
-from floatbase.simulation import SEEN, Live, advice
-from floatbase.viewer import push_at
-
-PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller; all of them stand and are pushed
-
-
-class Playground:
-    """A robot that stands on the physics, and the controls in the page that change what its controller wants.
-
-    friction: of the ground; the controller's own belief about it is a control.
-    """
-
-    def __init__(self, robot: Robot, *, friction: float = 0.7, background: str = "light", port: int = 0):
-        self.robot = robot
-        self.sim = fb.Simulation(robot, friction)
-        self.view = fb.Viewer(robot, background=background, port=port, facets=4 if robot.feet else None)
-        self.mu, self.facets = friction, 4
-        self.stance = {foot.frame: True for foot in robot.feet}
-        self.shift = [0.0, 0.0, 0.0]  # m, of the centre of mass
-        self.force = 0.1 * robot.weight  # N, of a push
-        self.towards = 0.0  # degrees, of a push: 0 forwards, 90 to the left
-        self.pushed = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
-        self.note = self.outcome = ""
-        self.last: fb.Rollout | None = None
-        self._drawing = threading.Lock()  # the run draws, and so does who pauses it
-        controller = self._controller()
-        self.period = control_period(self.sim, controller)
-        self.run = Live(self.sim, controller, self._show, control_period=self.period)
-        self.run.on_status(self._say)
-        self.pace = Pace()
-        self._add_controls()
-
-    def start(self) -> None:
-        """Show the robot and let it run."""
-        self.view.show(self.robot.standing())
-        self.run.start()
-
-    def close(self) -> None:
-        """End the run and close the window."""
-        self.run.close()
-        self.view.close()
-
-    def _add_controls(self) -> None:
-        view, weight = self.view, self.robot.weight
-        view.button("run", self.run.start)
-        view.button("pause", self._pause)
-        view.button("reset", self.run.reset)
-        view.slider("speed", self.run.slow_motion, 1.0, 0.05, 1.0, 0.05)
-        view.slider("push [N]", self._set_force, self.force, 0.0, 0.5 * weight, 1.0)
-        view.slider("push towards [°]", self._turn, self.towards, -180.0, 180.0, 5.0)
-        view.button("push", self._push)
-        if not self.robot.is_floating:
-            return
-        for axis, name in enumerate("xyz"):
-            view.slider(f"CoM {name} [m]", lambda x, axis=axis: self._move(axis, x), 0.0, -0.08, 0.08, 0.005)  # type: ignore[misc]
-        view.slider("friction believed", self._believe, self.mu, 0.1, 1.5, 0.05)
-        view.slider("facets", self._cut, self.facets, 3, 16, 1)
-        for foot in self.stance:
-            view.checkbox(f"on {foot}", lambda on, foot=foot: self._stand(foot, on), True)  # type: ignore[misc]
-
-    def _controller(self) -> fb.WholeBodyController:
-        """The controller for what the controls ask for."""
-        standing = self.robot.standing()
-        tasks: tuple[Task, ...] = (fb.PostureTask(standing.q),)
-        if self.robot.is_floating:
-            rotation = standing.frame_pose("base").rotation
-            tasks = (fb.CoMTask(standing.com + self.shift), fb.OrientationTask("base", rotation), *tasks)
-        return fb.WholeBodyController(self.robot, self._contacts(), tasks, facets=self.facets)
-
-    def _contacts(self) -> fb.Contacts:
-        lifted = [frame for frame, stands in self.stance.items() if not stands]
-        return fb.Contacts.feet(self.robot, self.mu).without(*lifted)
-
-    def _change(self) -> None:
-        """Hand a new controller to the run, or say why there is none."""
-        try:
-            self.run.use(self._controller())
-            self.note = ""
-        except fb.FloatbaseError as error:
-            self.note = str(error)
-
-    def _set_force(self, force: float) -> None:
-        self.force = force
-
-    def _turn(self, towards: float) -> None:
-        self.towards = towards
-
-    def _push(self) -> None:
-        angle = math.radians(self.towards)
-        self.run.push([self.force * math.cos(angle), self.force * math.sin(angle), 0.0], frame=self.pushed)
-
-    def _pause(self) -> None:
-        self.run.pause()
-
-    def _move(self, axis: int, distance: float) -> None:
-        self.shift[axis] = distance
-        self._change()
-
-    def _believe(self, mu: float) -> None:
-        self.mu = mu
-        self._change()
-
-    def _cut(self, facets: float) -> None:
-        self.facets = round(facets)
-        self.view.painter = self.view.painter.replace(self.facets)
-        self._change()
-
-    def _stand(self, foot: str, on: bool) -> None:
-        self.stance[foot] = on
-        self._change()
-
-    def _show(self, record: fb.Rollout) -> None:
-        """Draw the last row of a slice."""
-        self.last = record
-        self._draw()
-
-    def _say(self, status: str) -> None:
-        """Tell what stopped the run, if anything did, over the last picture."""
-        self.outcome = "" if status == "running" else advice(status)
-        with suppress(ViewerError):  # a window that is closed tells nobody anything
-            self._draw()
-
-    def _draw(self) -> None:
-        record = self.last
-        if record is None:
-            return
-        with self._drawing:
-            self.view.show(
-                record.final, record.contacts, record.measured[-1], record.planned[-1], push=push_at(record, -1, SEEN),
-                support=True, title="\n".join(filter(None, [self._headline(float(record.time[-1])), self.outcome, self.note])),
-            )  # fmt: skip
-
-    def _headline(self, now: float) -> str:
-        """Who, when, and how fast: the part of real time that this machine reaches, and how often the controller is asked."""
-        speed = self.pace.at(now)
-        told = "" if speed is None else f", {speed:.0%} of real time"
-        return f"{self.robot.name}, {now:.1f} s{told}, control every {1e3 * self.period:g} ms"
-
-
-class Pace:
-    """How fast a simulation runs, as a part of real time, over the last seconds. clock: s."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic, over: float = 2.0):
-        self._clock, self._over = clock, over
-        self._seen: deque[tuple[float, float]] = deque()  # clock and simulated time, s
-
-    def at(self, simulated: float) -> float | None:
-        """The pace now that the simulation has come to `simulated` s; None for half a second after a start or a pause."""
-        now = self._clock()
-        if self._seen and (simulated < self._seen[-1][1] or now - self._seen[-1][0] > self._over):
-            self._seen.clear()
-        self._seen.append((now, simulated))
-        while now - self._seen[0][0] > self._over:
-            self._seen.popleft()
-        since, start = self._seen[0]
-        return (simulated - start) / (now - since) if now - since > 0.5 else None
-
-
-def control_period(sim: fb.Simulation, controller: fb.WholeBodyController, share: float = 0.5) -> float:
-    """The shortest of `PERIODS`, s, of which physics and controller together need at most `share` on this machine, so that
-    pictures find time too; the longest when none is enough. Puts the robot back where it stood."""
-    shortest, ticks = PERIODS[0], 10
-    tries = []
-    for _ in range(4):  # the first one warms up, and the best of the others is this machine when it is not interrupted
-        start = time.perf_counter()
-        fb.rollout(sim, controller, ticks * shortest, control_period=shortest)
-        tries.append((time.perf_counter() - start) / ticks)
-    sim.reset()
-    tick = min(tries[1:])
-    return next((period for period in PERIODS if tick <= share * period), PERIODS[-1])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -200,32 +23,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     view.add_argument("--port", type=int, default=0, help="port of the page (a free one)")
     view.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
     commands.add_parser("compile", help="compile the controller's tick, so that the first controller need not")
-    asked = parser.parse_args(arguments)
-    if asked.command == "robots":
+    options = parser.parse_args(arguments)
+    if options.command == "robots":
         print("\n".join(f"{name:14} {text}" for name, text in fb.catalogue().items()))
         return 0
-    if asked.command == "compile":
+    if options.command == "compile":
         go2 = fb.load("go2")
         controller = fb.WholeBodyController(go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing()))
         print(f"The controller takes its {controller.path} path: {controller.path_reason}.")
         return 0
     try:
-        return _view(asked)
+        return _view(options)
     except fb.FloatbaseError as error:
         print(f"floatbase: {error}", file=sys.stderr)
         return 2
 
 
-def _view(asked: argparse.Namespace) -> int:
-    """Run until Ctrl-C or a polite kill."""
+def _view(options: argparse.Namespace) -> int:
+    """Show a robot until Ctrl-C or SIGTERM."""
+    from floatbase.playground import Playground  # loads MuJoCo and the viewer, which the other commands do without
+
     ended = threading.Event()
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        playground = Playground(fb.load(asked.robot), friction=asked.friction, background=asked.background, port=asked.port)
+        robot = fb.load(options.robot)
+        playground = Playground(robot, friction=options.friction, background=options.background, port=options.port)
         try:
             playground.start()
-            print(f"{asked.robot} at {playground.view.url} (end with Ctrl-C)", flush=True)
-            if not asked.no_browser:
+            print(f"{options.robot} at {playground.view.url} (end with Ctrl-C)", flush=True)
+            if not options.no_browser:
                 playground.view.window.open()
             ended.wait()
         finally:

@@ -23,9 +23,9 @@ Symbols
 Frames and order
 ----------------
 The world's z axis points up. Twists and wrenches have the linear part first, then the angular part. Contact Jacobians, forces
-and drifts are in world axes at the contact point. Velocities of frames (`State.frame_velocity`) are in world axes at its
-origin. The base velocity inside v is the exception: it is in the base frame, as in Pinocchio. Quaternions are x y z w. Rotation
-matrices take vectors of the frame to the world. A frame that could be doubted stands in the name: `p_world`, `J_foot_world`.
+and drifts are in world axes at the contact point. `State.frame_velocity` is in world axes at the frame's origin. The base
+velocity inside v is the exception: it is in the base frame, as in Pinocchio. Quaternions are x y z w. Rotation matrices take
+vectors of the frame to the world. A frame that could be doubted stands in the name: `p_world`, `J_foot_world`.
 
 Signs
 -----

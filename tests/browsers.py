@@ -24,12 +24,15 @@ FLAGS = [
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: nothing was looked at in a browser")
 
 
-def launched() -> Iterator[Any]:
-    """A headless Chromium, ended when the caller has done with it: playwright keeps an event loop running in this thread."""
+def launched(*flags: str) -> Iterator[Any]:
+    """A headless Chromium, closed when the caller has finished. Playwright keeps an event loop running in this thread.
+
+    flags: more flags for Chromium.
+    """
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     if CHROMIUM is None:
         pytest.skip("no Chromium found on the path")
     with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        chromium = started.chromium.launch(executable_path=CHROMIUM, args=[*FLAGS, *flags])
         yield chromium
         chromium.close()

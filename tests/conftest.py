@@ -1,15 +1,61 @@
-"""What all tests share."""
+"""What all tests share: a home of their own, one BLAS thread, random numbers that can be drawn anew, the slow files first."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
+from collections.abc import Callable
+from typing import Any
 
-from hypothesis import settings
+import hypothesis
+import numpy as np
+import pytest
+
+# started first, so that no worker is left alone with one of them at the end
+SLOWEST = ("test_lab", "test_notebooks", "test_browser", "test_displays", "test_main")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-os.environ["FLOATBASE_HOME"] = tempfile.mkdtemp(prefix="floatbase-")  # a learner's progress is not the tests' to write
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices of 30 rows: more threads only wait for one another
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
-settings.load_profile("repeatable")
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="draw all random numbers of the tests from other streams, one for each N; 0, the default, leaves them as they are",
+    )
+
+
+@pytest.hookimpl(tryfirst=True)  # hypothesis reads its seed when it is configured
+def pytest_configure(config: pytest.Config) -> None:
+    home = tempfile.mkdtemp(prefix="floatbase-")
+    config.add_cleanup(lambda: shutil.rmtree(home, ignore_errors=True))
+    os.environ["FLOATBASE_HOME"] = home  # a learner's progress is not the tests' to write
+    shift_seeds(config, config.getoption("--seed"))
+
+
+def shift_seeds(config: pytest.Config, n: int) -> None:
+    """Draw the numbers of every integer seed, and the examples of hypothesis, from the n-th stream."""
+    hypothesis.settings.register_profile("repeatable", derandomize=n == 0, deadline=None, database=None)
+    hypothesis.settings.load_profile("repeatable")
+    if n:
+        config.option.hypothesis_seed = n
+        np.random.default_rng = shifted(np.random.default_rng, n)
+
+
+def shifted(default_rng: Callable[[Any], np.random.Generator], n: int) -> Callable[[Any], np.random.Generator]:
+    def other_rng(seed: Any = None) -> np.random.Generator:
+        return default_rng([seed, n] if isinstance(seed, int | np.integer) else seed)
+
+    return other_rng
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    return f"random numbers: --seed {config.getoption('--seed')}"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.path.stem not in SLOWEST)

@@ -98,7 +98,8 @@ class Mujoco:
         self.data.qpos[:], self.data.qvel[:] = self.convert.to_mujoco(state.q, state.v)
         mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_fwdVelocity(self.model, self.data)
-        self.state, self.T = state, self.convert.velocity_map(self.data.qpos)
+        self.state = state
+        self.T = np.column_stack([self.convert.to_mujoco(state.q, e)[1] for e in np.eye(self.model.nv)])
         return self
 
     @property

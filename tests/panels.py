@@ -1,23 +1,49 @@
-"""What every slider panel of a lesson must do."""
+"""What every panel of sliders must do, asked of the panels of a lesson without a browser."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+import re
+from pathlib import Path
 from typing import Any
 
-import floatbase as fb
-from floatbase.robots import Robot
+from nbformat.v4 import new_code_cell
+
+from floatbase.lessons import SliderPanel
+
+_MADE = re.compile(r"\b(?!push_)\w+_panel\(")
 
 
-def assert_a_slider_redraws(robot: Robot, panel: Callable[[fb.Viewer], Any]) -> None:
-    """Moving the first slider of a panel changes its line and its picture."""
-    view = fb.Viewer(robot)
-    try:
-        made = panel(view)
-        note, slider = made.children[1], made.children[2]
-        before = (note.value, view.static_html())
-        slider.value = slider.max
-        assert note.value != before[0]
-        assert view.static_html() != before[1]
-    finally:
-        view.close()
+def assert_every_slider_answers(panel: SliderPanel) -> None:
+    """Moved to its ends and its middle, each slider changes the picture or the note; one of them changes the picture."""
+    moves = []
+    for name, slider in panel.sliders.items():
+        first, seen = slider.value, []
+        for value in (slider.min, (slider.min + slider.max) / 2, slider.max):
+            slider.value = value
+            seen.append((_drawn(panel), panel.note.value))
+        slider.value = first
+        assert any(other != seen[0] for other in seen), f"the slider {name} changes nothing"
+        moves += [any(picture != seen[0][0] for picture, _ in seen)]
+    assert any(moves), f"none of the sliders {list(panel.sliders)} changes the picture"
+
+
+def with_every_slider_moved(notebook: Any) -> Any:
+    """The notebook with a last cell that asks this of all its panels and raises where one does not. Changes it in place."""
+    code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    count = sum(len(_MADE.findall(source)) for source in code)
+    lines = (f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})", "import panels", f"panels.judge_all({count})")
+    notebook.cells.append(new_code_cell("\n".join(lines)))
+    return notebook
+
+
+def judge_all(count: int) -> None:
+    """Ask it of all panels of this process, which must be so many."""
+    found = [thing for thing in gc.get_objects() if type(thing) is SliderPanel]
+    assert len(found) == count, f"{len(found)} panels of sliders, not {count}"
+    for panel in found:
+        assert_every_slider_answers(panel)
+
+
+def _drawn(panel: SliderPanel) -> Any:
+    return {path: (item.matrix.tolist(), item.colour) for path, item in panel.view.canvas.picture.items()}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tomllib
 import zipfile
 from pathlib import Path
 
-import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -17,8 +17,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 LOCK = (ROOT / "environment.txt").read_text(encoding="utf-8")
 PINS = [Requirement(line) for line in LOCK.splitlines() if line and not line.startswith("#")]
 ASKED = [Requirement(text) for texts in (PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()) for text in texts]
-HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib")
-IMPORT_LIMIT = 0.5  # s
+HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba", "scipy.optimize", "scipy.spatial")
+IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
 
 def test_every_package_is_pinned_once_to_one_version() -> None:
@@ -29,14 +29,18 @@ def test_every_package_is_pinned_once_to_one_version() -> None:
         assert pin.url is None, f"{pin} names a place instead of a version"
 
 
-@pytest.mark.parametrize("asked", ASKED, ids=str)
-def test_every_dependency_is_pinned_within_its_range(asked: Requirement) -> None:
+def test_every_dependency_is_pinned_within_its_range() -> None:
     pins = {canonicalize_name(pin.name): pin for pin in PINS}
-    pin = pins.get(canonicalize_name(asked.name))
-    assert pin is not None, f"{asked.name} is not in environment.txt: make lock"
-    version = next(iter(pin.specifier)).version
-    assert asked.specifier.contains(version, prereleases=True), f"{pin} is not within {asked}: make lock"
-    assert pin.marker is None, f"{pin} would not be installed everywhere"
+    wrong = []
+    for asked in ASKED:
+        pin = pins.get(canonicalize_name(asked.name))
+        if pin is None:
+            wrong.append(f"{asked.name} is not in environment.txt")
+        elif not asked.specifier.contains(next(iter(pin.specifier)).version, prereleases=True):
+            wrong.append(f"{pin} is not within {asked}")
+        elif pin.marker is not None:
+            wrong.append(f"{pin} would not be installed everywhere")
+    assert not wrong, "\n".join([*wrong, "make lock"])
 
 
 def test_markers_speak_of_platform_and_python_only() -> None:
@@ -76,14 +80,10 @@ def test_the_wheel_brings_the_meshes_and_their_licences(tmp_path: Path) -> None:
     assert {name.split("/")[0] for name in packed} == {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
 
 
-def test_importing_floatbase_loads_no_physics_no_pictures_and_no_modelling() -> None:
-    code = f"import sys, floatbase; print(*[name for name in {HEAVY} if name in sys.modules])"
+def test_importing_floatbase_is_light_and_quick() -> None:
+    code = "import json, sys, time; start = time.process_time(); import floatbase; took = time.process_time() - start; "
+    code += "print(json.dumps([took, list(sys.modules)]))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert answer.stdout.split() == []
-
-
-def test_importing_floatbase_takes_under_half_a_second() -> None:
-    code = "import time; start = time.perf_counter(); import floatbase; print(time.perf_counter() - start)"
-    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(3)]
-    took = min(float(run.stdout) for run in runs)
+    took, loaded = json.loads(answer.stdout)
+    assert not set(HEAVY) & set(loaded)
     assert took < IMPORT_LIMIT, f"{took:.2f} s"

@@ -1,17 +1,21 @@
-"""The house stands: floors import downwards, the front door stays small, every name is explained."""
+"""The house stands: floors import downwards, rooms are entered by their fronts, files are small, every name is explained."""
 
 from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Iterator
+import json
+from functools import cache
+from importlib import import_module
 from pathlib import Path
+from typing import NamedTuple, get_origin
 
 import pytest
 
 import floatbase
 
 PACKAGE = Path(floatbase.__file__).parent
+ROOT = PACKAGE.parent
 # from the ground up; rooms named on one line stand side by side on one floor and may see each other
 FLOORS = (
     ("conventions", "errors", "_arrays", "_assets", "affine", "linear_algebra"),
@@ -23,88 +27,165 @@ FLOORS = (
     ("control",),
     ("actuators",),
     ("simulation",),
+    ("behaviours",),
     ("viewer",),
     ("lessons",),
+    ("playground",),
     ("__main__",),
 )
 HEIGHT = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
-MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "_assets" not in path.parts)
+MOST_LINES = 450  # of a file: more is two ideas
+CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}  # what robot.standing() and state.robot cost
+MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "_assets" not in path.relative_to(PACKAGE).parts[:-1])
 # the front door sees every floor; what it may load at once is the business of test_environment
 INDOORS = [path for path in MODULES if path != PACKAGE / "__init__.py"]
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
+OUTDOORS = [*TESTS, *sorted((ROOT / "benchmarks").rglob("*.py")), *sorted((ROOT / "notebooks").glob("*.ipynb"))]
+ROOMS = [".".join(path.parent.relative_to(ROOT).parts) for path in INDOORS if path.name == "__init__.py"]
 
 
-def module_id(path: Path) -> str:
-    return path.relative_to(PACKAGE).as_posix()
+class Import(NamedTuple):
+    """One name that is imported; `import module` names none."""
+
+    line: int
+    module: str
+    name: str | None
 
 
-def room(path: Path) -> str:
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+def said(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
 
 
-def imports(path: Path) -> Iterator[tuple[int, str]]:
-    """Line and floatbase module of every import that happens when the program runs."""
-    yield from _imports(ast.parse(path.read_text(encoding="utf-8")), ("floatbase", *path.relative_to(PACKAGE).parts[:-1]))
+def floor(path: Path) -> int:
+    return HEIGHT[path.relative_to(PACKAGE).parts[0].removesuffix(".py")]
 
 
-def _imports(node: ast.AST, package: tuple[str, ...]) -> Iterator[tuple[int, str]]:
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
-            for other in child.orelse:
-                yield from _imports(other, package)
-        elif isinstance(child, ast.Import):
-            yield from ((child.lineno, alias.name) for alias in child.names)
-        elif isinstance(child, ast.ImportFrom):
-            base = package[: len(package) - child.level + 1] if child.level else ()
-            module = ".".join([*base, *([child.module] if child.module else [])])
-            # `from floatbase import viewer` names the room after the word import
-            yield from ((child.lineno, f"{module}.{alias.name}" if module == "floatbase" else module) for alias in child.names)
-        else:
-            yield from _imports(child, package)
+def file_of(module: str) -> Path | None:
+    """Where a module of the package stands."""
+    folder = ROOT.joinpath(*module.split("."))
+    return next((path for path in (folder / "__init__.py", folder.with_suffix(".py")) if path in MODULES), None)
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    source = path.read_text(encoding="utf-8")
+    if path.suffix == ".ipynb":
+        source = "\n".join("".join(cell["source"]) for cell in json.loads(source)["cells"] if cell["cell_type"] == "code")
+    return ast.parse(source)
+
+
+@cache
+def imports(path: Path) -> list[Import]:
+    """All imports from the package that happen when the program runs, inside functions too."""
+    blocks = [node for node in ast.walk(parsed(path)) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)]
+    for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
+    found = []
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Import) and node not in for_types:
+            found += [Import(node.lineno, alias.name, None) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node not in for_types:
+            assert not node.level or path not in MODULES, f"{said(path)}:{node.lineno} imports by dots, not by name"
+            for name in [alias.name for alias in node.names]:
+                # `from floatbase import viewer` is the module behind the word import, `from floatbase import Viewer` is a name
+                inner, outer = f"{node.module}.{name}", str(node.module)
+                found.append(Import(node.lineno, inner, None) if file_of(inner) else Import(node.lineno, outer, name))
+    return [one for one in found if one.module.split(".")[0] == "floatbase"]
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """Sets of files that reach one another."""
+    reach = {node: set(targets) for node, targets in graph.items()}
+    for middle in graph:  # Warshall: whoever reaches the middle reaches what the middle reaches
+        for found in reach.values():
+            if middle in found:
+                found |= reach[middle]
+    rings = {frozenset(other for other in reach[node] if node in reach[other]) for node in graph}
+    return [set(ring) for ring in rings if ring]
 
 
 def test_every_room_has_a_floor() -> None:
-    assert {room(path) for path in INDOORS} <= set(HEIGHT)
+    assert {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in INDOORS} <= set(HEIGHT)
 
 
-@pytest.mark.parametrize("path", INDOORS, ids=module_id)
-def test_every_floor_imports_only_the_floors_below(path: Path) -> None:
-    own = HEIGHT[room(path)]
+def test_every_floor_imports_only_the_floors_below() -> None:
     wrong = []
-    for line, module in imports(path):
-        package, *rest = module.split(".")
-        if package != "floatbase" or not rest:
-            continue  # `import floatbase as fb`: the front door, for the uppermost floors; checked below
-        if HEIGHT.get(rest[0], -1) > own:
-            wrong.append(f"{module_id(path)}:{line} imports {module}, a floor above its own")
+    for path in INDOORS:
+        for found in imports(path):
+            if found.module == "floatbase":
+                if floor(path) < HEIGHT["lessons"]:
+                    wrong.append(f"{said(path)}:{found.line} imports floatbase itself, which is for the floors from lessons up")
+            elif HEIGHT[found.module.split(".")[1]] > floor(path):
+                wrong.append(f"{said(path)}:{found.line} imports {found.module}, a floor above its own")
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("path", INDOORS, ids=module_id)
-def test_only_lessons_and_the_command_line_use_the_front_door(path: Path) -> None:
-    used = [line for line, module in imports(path) if module == "floatbase"]
-    assert not used or HEIGHT[room(path)] >= HEIGHT["lessons"], f"{module_id(path)}:{used} imports floatbase itself"
+def test_rooms_are_entered_by_their_fronts() -> None:
+    wrong = []
+    for path in [*INDOORS, *OUTDOORS]:
+        for found in imports(path):
+            front, _, inner = found.module.rpartition(".")
+            room = file_of(front) if front and front != "floatbase" else None
+            if room and room.parent in path.parents:
+                continue  # at home in the room
+            if found.module in ROOMS:
+                if found.name and found.name not in import_module(found.module).__all__:
+                    wrong.append(f"{said(path)}:{found.line} imports {found.name}, which {found.module} does not export")
+            elif room and inner not in import_module(front).__all__:
+                wrong.append(f"{said(path)}:{found.line} imports from {found.module}, a file inside {front}")
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("path", MODULES, ids=module_id)
-def test_every_module_says_what_it_is_and_leaves_nothing_open(path: Path) -> None:
-    source = path.read_text(encoding="utf-8")
-    assert path.parent.name == "_assets" or ast.get_docstring(ast.parse(source)), f"{module_id(path)} has no docstring"
-    assert not any(word in source for word in ("TODO", "FIXME", "XXX"))
+def test_nothing_imports_in_a_circle_but_robot_state_and_standing() -> None:
+    names = {path: path.relative_to(PACKAGE).as_posix() for path in INDOORS}
+    graph = {names[path]: {names[to] for found in imports(path) if (to := file_of(found.module)) in names} for path in INDOORS}
+    others = [" - ".join(sorted(circle)) for circle in circles(graph) if circle != CIRCLE]
+    assert not others, "\n".join(others)
 
 
-def test_the_front_door_has_at_most_30_names() -> None:
+def test_every_module_is_short_says_what_it_is_and_leaves_nothing_open() -> None:
+    wrong = []
+    for path in MODULES:
+        source = path.read_text(encoding="utf-8")
+        if len(source.splitlines()) > MOST_LINES:
+            wrong.append(f"{said(path)} has {len(source.splitlines())} lines")
+        if not ast.get_docstring(parsed(path)):
+            wrong.append(f"{said(path)} has no docstring")
+        wrong += [f"{said(path)} holds a {word}" for word in ("TODO", "FIXME", "XXX") if word in source]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_exported_name_resolves_and_has_a_docstring() -> None:
+    wrong = []
+    for room in ["floatbase", *ROOMS]:
+        module = import_module(room)
+        for name in getattr(module, "__all__", []):
+            value = getattr(module, name)
+            doc = inspect.getdoc(value) or ""
+            explains_itself = inspect.ismodule(value) or (callable(value) and not get_origin(value))
+            if explains_itself and (not doc or doc.startswith(f"{name}(")):  # dataclass writes one that starts so
+                wrong.append(f"{room}.{name} has no docstring of its own")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_front_door_has_at_most_30_names_and_lists_them() -> None:
     assert len(set(floatbase.__all__)) == len(floatbase.__all__) <= 30
-
-
-@pytest.mark.parametrize("name", floatbase.__all__)
-def test_every_name_resolves_and_has_a_docstring(name: str) -> None:
-    value = getattr(floatbase, name)
-    doc = inspect.getdoc(value)
-    assert doc, f"floatbase.{name} has no docstring"
-    assert not doc.startswith(f"{name}("), f"floatbase.{name} has only the docstring that dataclass writes"
-
-
-def test_the_front_door_lists_what_it_has() -> None:
     assert set(floatbase.__all__) <= set(dir(floatbase))
     with pytest.raises(AttributeError, match="no attribute 'Robit'"):
         _ = floatbase.Robit
+
+
+def test_tests_use_public_names() -> None:
+    wrong = []
+    for path in TESTS:
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.Attribute) and private(node.attr) and ast.unparse(node.value) not in ("self", "cls"):
+                wrong.append(f"{said(path)}:{node.lineno} uses {ast.unparse(node)}")
+        for found in imports(path):
+            if any(private(part) for part in [*found.module.split("."), found.name or ""]):
+                wrong.append(f"{said(path)}:{found.line} imports {found.name or found.module}")
+    assert not wrong, "\n".join(wrong)
+
+
+def private(name: str) -> bool:
+    """Whether a name is one's own business; `_repr_html_` and `__main__` are agreed with others."""
+    return name.startswith("_") and not name.endswith("_")

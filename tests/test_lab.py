@@ -1,4 +1,7 @@
-"""JupyterLab in a real browser: every lesson runs without an error, and each of its pictures answers to its sliders."""
+"""JupyterLab in a real browser: two lessons run without an error, and each of their pictures answers to its sliders.
+
+What the lessons compute is test_notebooks' business, what all other sliders do is tests/lessons': both need no browser.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +21,11 @@ from browsers import SCREENSHOTS, launched, needs_chromium
 
 from floatbase.lessons.publish import FOLDER, read, without_outputs
 
-LESSONS = [path.stem for path in sorted(FOLDER.glob("*.ipynb"))]
+LESSONS = ("00_start_here", "02_equations_of_motion")  # a robot that is simulated under the page; panels of many sliders
 IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push
+LONG = 90.0  # s that a busy machine may take for anything; nothing is taken for absent earlier
 
-pytestmark = [needs_chromium, pytest.mark.timeout(300)]
+pytestmark = [needs_chromium, pytest.mark.timeout(600)]
 
 NOTEBOOK = "jupyterapp.shell.currentWidget"
 KERNEL_CONNECTED = f"() => {NOTEBOOK}?.sessionContext?.session?.kernel?.connectionStatus === 'connected'"
@@ -56,7 +60,7 @@ SCENE = """() => {
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of one JupyterLab for a copy of all lessons, without outputs, so that what is seen was made here."""
+    """The address of a JupyterLab for copies of the lessons, without outputs, so that what is seen was made here."""
     lessons = tmp_path_factory.mktemp("lessons")
     for name in LESSONS:
         nbformat.write(without_outputs(read(FOLDER / f"{name}.ipynb")), lessons / f"{name}.ipynb")
@@ -90,17 +94,18 @@ def browser() -> Iterator[Any]:
 @pytest.mark.parametrize("name", LESSONS)
 def test_a_lesson_runs_and_its_pictures_answer_to_their_sliders(lab: str, browser: Any, name: str) -> None:
     page = browser.new_page(viewport={"width": 1100, "height": 800})
+    page.set_default_timeout(1000 * LONG)
     try:
         page.goto(f"{lab}/lab/workspaces/{name}/tree/{name}.ipynb?token=a-test")
-        page.wait_for_selector(".jp-Notebook .jp-CodeCell", timeout=90_000)
-        page.wait_for_function(f"() => window.jupyterapp?.shell && {NOTEBOOK}?.content", timeout=30_000)
-        page.wait_for_function(KERNEL_CONNECTED, timeout=90_000)
+        page.wait_for_selector(".jp-Notebook .jp-CodeCell")
+        page.wait_for_function(f"() => window.jupyterapp?.shell && {NOTEBOOK}?.content")
+        page.wait_for_function(KERNEL_CONNECTED)
         _run_all(page)
-        page.wait_for_function(ALL_RAN, timeout=120_000)
+        page.wait_for_function(ALL_RAN)
         assert page.evaluate(ERRORS) == []
         panels = page.evaluate(SLIDERS)
         idle = {slider for cell, sliders in panels.items() for slider in _idle_sliders(page, name, cell, sliders)}
-        assert idle <= IDLE, f"{name}: these sliders change nothing: {sorted(idle - IDLE)}"
+        assert not idle, f"{name}: these sliders change nothing: {sorted(idle)}"
         assert panels
     finally:
         _picture(page, name, "end")
@@ -114,13 +119,14 @@ def _idle_sliders(page: Any, name: str, number: str, sliders: list[str]) -> list
     page.evaluate(f"(number) => {NOTEBOOK}.content.scrollToItem(number, 'smart')", int(number))
     cell.locator("iframe").first.scroll_into_view_if_needed()
     frame = cell.locator("iframe").first.element_handle().content_frame()
-    frame.wait_for_function("() => window.viewer?.num_messages_received > 0", timeout=30_000)
+    frame.wait_for_function("() => window.viewer?.num_messages_received > 0", timeout=1000 * LONG)
     idle, moved = [], False
     for i, slider in enumerate(sliders):
-        handle = page.locator(f'[data-slider="{number}-{i}"]')
-        handle.scroll_into_view_if_needed()
+        if slider in IDLE:
+            continue
         before = frame.evaluate(SCENE), cell.evaluate(SAID)
-        after = _after_moving(page, handle, lambda: (frame.evaluate(SCENE), cell.evaluate(SAID)))
+        _move(page, page.locator(f'[data-slider="{number}-{i}"]'))
+        after = _once_new(lambda: (frame.evaluate(SCENE), cell.evaluate(SAID)), before)
         idle += [slider] if after == before else []
         moved |= after[0] != before[0]
     _picture(page, name, f"panel_{number}")
@@ -128,18 +134,21 @@ def _idle_sliders(page: Any, name: str, number: str, sliders: list[str]) -> list
     return idle
 
 
-def _after_moving(page: Any, handle: Any, look: Any) -> Any:
-    """What is seen once a slider was moved by its keys: what is new, or the same as ever after some seconds."""
-    before = look()
-    for key in ("ArrowRight", "ArrowLeft"):  # a slider at its end goes one way only
-        handle.focus()
-        for _ in range(4):
-            page.keyboard.press(key)
-        for _ in range(30):
-            time.sleep(0.1)
-            if look() != before:
-                return look()
-    return before
+def _move(page: Any, handle: Any) -> None:
+    """Move a slider by its keys, the way that is open."""
+    handle.scroll_into_view_if_needed()
+    now, most = (float(handle.get_attribute(f"aria-value{name}")) for name in ("now", "max"))
+    handle.focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowRight" if now < most else "ArrowLeft")
+
+
+def _once_new(look: Callable[[], Any], before: Any) -> Any:
+    """What is seen once it differs from `before`; the same as ever when it never does."""
+    until = time.monotonic() + LONG
+    while (seen := look()) == before and time.monotonic() < until:
+        time.sleep(0.1)
+    return seen
 
 
 def _run_all(page: Any) -> None:

@@ -40,6 +40,6 @@ def test_the_two_commands_exist() -> None:
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), f"the README names make {target}"
 
 
-@pytest.mark.parametrize("link", LINKS)
-def test_links_lead_somewhere(link: str) -> None:
-    assert (ROOT / link).exists(), f"the README links to {link}, which is not there"
+def test_links_lead_somewhere() -> None:
+    assert LINKS
+    assert [link for link in LINKS if not (ROOT / link).exists()] == []

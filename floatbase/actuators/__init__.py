@@ -1,13 +1,6 @@
-"""Hydraulic actuators between a torque that is asked for and one that comes (App. B of the document)."""
+"""Hydraulic actuators between the torque that a controller desires and the one that a joint gets (App. B of the document)."""
 
-from floatbase.actuators.hydraulics import VACUUM, Cylinders, HydraulicActuators, Hydraulics, OilState, Pose, Power
+from floatbase.actuators.hydraulics import Cylinders, Hydraulics, Pose, Power
+from floatbase.actuators.loop import VACUUM, HydraulicActuators, OilState
 
-__all__ = [
-    "VACUUM",
-    "Cylinders",
-    "HydraulicActuators",
-    "Hydraulics",
-    "OilState",
-    "Pose",
-    "Power",
-]
+__all__ = ["VACUUM", "Cylinders", "HydraulicActuators", "Hydraulics", "OilState", "Pose", "Power"]

@@ -1,9 +1,4 @@
-"""What makes a torque (App. B): a hydraulic cylinder with its valve, the lever to the joint, and the loop that drives it.
-
-The commands of a whole-body controller are torques; a piston has only oil that flows in and out. A lower loop measures the
-force and opens the valve a little more or less, so that one layer up the torque can be taken for granted, as long as it
-changes more slowly than the loop's bandwidth and stays within what the supply pressure gives.
-"""
+"""App. B: a hydraulic cylinder with its valve, its oil, and the lever to the joint, as equations without memory."""
 
 from __future__ import annotations
 
@@ -14,23 +9,24 @@ import numpy.typing as npt
 
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.errors import InputError
-from floatbase.robots import Robot
 
-LONGEST_STEP = 2e-4  # s, of the oil's integration; see `HydraulicActuators.step`
-VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
 _LAMINAR = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
-_INTEGRAL_PART = 0.05  # the integral's corner frequency as part of the loop's bandwidth
+_LEAST_GAIN = 1e-9  # N/s: least change of force by an open valve. Chambers at line pressure have none; they get the valve's all
 _SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
 
 
 @dataclass(frozen=True)
 class Hydraulics:
-    """One joint of HyQ, the hydraulic quadruped: cylinder, lever, oil, valve and force loop. SI units, pressures over air.
+    """One joint of HyQ, the hydraulic quadruped: cylinder, lever, oil, valve and force loop.
 
-    bore, rod: diameters, m. crank: m, from the joint's axis to the rod's end. base: m, from the joint's axis to the
-    cylinder's foot. dead_volume: m³, oil in the hose to each chamber. supply_pressure, tank_pressure: Pa.
-    bulk_modulus: β_e, Pa. leakage: m³/(s Pa), past the piston. rated_flow: m³/s through the valve, all open, when both of
-    its edges together take rated_drop, Pa. valve_bandwidth: Hz, where the spool's amplitude has fallen by 3 dB.
+    bore, rod: m, diameters.
+    crank, base: m, from the joint's axis to the rod's end and to the cylinder's foot.
+    dead_volume: m³, oil in the hose to each chamber.
+    supply_pressure, tank_pressure: Pa over the air outside.
+    bulk_modulus: Pa, β_e.
+    leakage: m³/(s Pa), past the piston.
+    rated_flow, rated_drop: m³/s through the valve, all open, when its two edges together take that drop, Pa.
+    valve_bandwidth: Hz, where the spool's amplitude has fallen by 3 dB.
     loop_bandwidth: Hz, of the force loop: turn it down to make the actuator slow.
 
     Sources: bore 16 mm, rod 10 mm, 160 bar, 145 N·m and the Moog E024 valve of 250 Hz: Semini et al., Design of HyQ, a
@@ -87,28 +83,14 @@ class Hydraulics:
 
 
 @dataclass(frozen=True, eq=False)
-class OilState:
-    """What a cylinder remembers. opening: (d,) of the valve, -1 to 1. pressures: (2, d) Pa over air, chambers A and B.
-
-    integral: (d,) N·s, the force loop's sum of errors.
-    """
-
-    opening: Array
-    pressures: Array
-    integral: Array
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
-
-
-@dataclass(frozen=True, eq=False)
 class Pose:
     """Where d cylinders stand at given joint angles.
 
-    length: (d,) m, ℓ, from foot to rod end. lever: (d,) m, L = dℓ/dq. volumes: (2, d) m³, V of the chambers A and B.
-    compliance: (2, d) m³/Pa, V / β_e. stiffness: (d,) N/m, k = β_e (A_A²/V_A + A_B²/V_B), the spring that closed
-    chambers make.
+    length: (d,) m, ℓ, from foot to rod end.
+    lever: (d,) m, L = dℓ/dq.
+    volumes: (2, d) m³, V of the chambers A and B.
+    compliance: (2, d) m³/Pa, V / β_e.
+    stiffness: (d,) N/m, k = β_e (A_A²/V_A + A_B²/V_B), the spring that closed chambers make.
     """
 
     length: Array
@@ -122,8 +104,10 @@ class Pose:
 class Power:
     """Where the power goes, each of shape (d,), W: pump = joint + valve + leakage + stored.
 
-    pump: from supply line less what the tank line takes. joint: torque times velocity. valve, leakage: heat, never
-    negative. stored: into the compression of the oil, V p ṗ / β_e of both chambers.
+    pump: what the supply line gives less what the tank line takes.
+    joint: torque times velocity.
+    valve, leakage: heat, never negative.
+    stored: in the compression of the oil, V p ṗ / β_e of both chambers.
     """
 
     pump: Array
@@ -148,10 +132,14 @@ class Cylinders:
     x > 0 joins A to the supply and B to the tank, x < 0 the other way. Where Δp turns round, flow turns round.
     Source: Merritt, Hydraulic Control Systems, 1967; the triangle is HyQ's.
 
-    size: (d,), each cylinder's torque in terms of the one in `hydraulics`. All its lengths are those times size^(1/3),
-    hence volumes, flow, leakage and torque times size, so that all joints behave alike in units of their strength.
-    centre: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and cylinder stand square. L is a
-    cosine near it, and is zero, and no torque to be had, where they line up. The stroke 2 b lets a joint turn full circle.
+    hydraulics: the cylinder of size 1.
+    size: (d,), each cylinder's torque as a multiple of that one's. Lengths are multiplied by size^(1/3), hence volumes, flow,
+        leakage and torque by size, so that all joints behave alike in units of their strength.
+    centre: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and cylinder stand square. L is a cosine
+        near it, and zero, without any torque, where they line up. The stroke 2 b lets a joint turn full circle.
+
+    In the methods x is the valves' opening, shape (d,), -1 to 1; pressures those of the chambers A and B, shape (2, d), Pa;
+    pose from `pose(q)`; v the joints' velocities, shape (d,), rad/s.
     """
 
     def __init__(self, hydraulics: Hydraulics, size: npt.ArrayLike, centre: npt.ArrayLike):
@@ -173,8 +161,8 @@ class Cylinders:
         """Number of cylinders."""
         return int(self.crank.size)
 
-    def at(self, q: npt.ArrayLike) -> Pose:
-        """The cylinders at joint angles q, shape (d,), rad."""
+    def pose(self, q: npt.ArrayLike) -> Pose:
+        """Lengths, levers and chambers at joint angles q, shape (d,), rad."""
         gamma = self._best + checked("q", q, (self.d,), "rad") - self.centre
         length = np.sqrt(self.base**2 + self.crank**2 - 2.0 * self.base * self.crank * np.cos(gamma))
         out = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
@@ -206,7 +194,7 @@ class Cylinders:
         return self._flow * drop / np.sqrt(np.hypot(drop, _LAMINAR))
 
     def flows(self, x: Array, pressures: Array) -> Array:
-        """Q into the chambers A and B, shape (2, d), m³/s, at opening x, shape (d,)."""
+        """Q into the chambers A and B, shape (2, d), m³/s."""
         return np.abs(x) * self.edge_flow(self.line(x) - pressures)
 
     def leak(self, pressures: Array) -> Array:
@@ -214,7 +202,7 @@ class Cylinders:
         return self._leakage * (pressures - pressures[::-1])
 
     def pressure_rates(self, x: Array, pressures: Array, pose: Pose, v: Array) -> Array:
-        """ṗ of the chambers A and B, shape (2, d), Pa/s, at opening x and joint velocities v, each of shape (d,)."""
+        """ṗ of the chambers A and B, shape (2, d), Pa/s."""
         into = self.flows(x, pressures) - self.leak(pressures) - _SIGN * self.areas * (pose.lever * v)
         return into / pose.compliance
 
@@ -226,18 +214,18 @@ class Cylinders:
         return (np.abs(x) * slope + self._leakage) / pose.compliance
 
     def opening_for(self, force_rate: Array, pressures: Array, pose: Pose, v: Array) -> Array:
-        """The opening, shape (d,), that makes the force change by force_rate, N/s, while the joints move with v, rad/s.
+        """The opening, shape (d,), that makes the force change by force_rate, (d,) N/s, while the joints move with v.
 
-        Ḟ = x g - k ℓ̇ with k the oil's stiffness, so the piston's velocity is fed forward and the curved valve is
-        divided out: x = (Ḟ + k ℓ̇) / g. Leakage is left to the loop's integral. A valve has only -1 to 1 to give.
+        Ḟ = x g - k ℓ̇ with k the oil's stiffness and g the change of force at the valve all open. So x = (Ḟ + k ℓ̇) / g feeds
+        the piston's velocity forward and divides the valve's curve out; leakage is left to the loop's integral. The opening
+        may be beyond -1 to 1, which a valve cannot give.
         """
-        wanted = force_rate + pose.stiffness * pose.lever * v
-        full = self.edge_flow(self.line(wanted) - pressures) / pose.compliance
-        # chambers at line pressure let the force grow no more; the tiny bound then asks for all the valve has
-        return wanted / np.maximum(np.sign(wanted) * self.force(full), 1e-9)
+        by_valve = force_rate + pose.stiffness * pose.lever * v
+        full = self.edge_flow(self.line(by_valve) - pressures) / pose.compliance
+        return by_valve / np.maximum(np.sign(by_valve) * self.force(full), _LEAST_GAIN)
 
     def power(self, x: Array, pressures: Array, pose: Pose, v: Array) -> Power:
-        """Where the power goes at an instant, at opening x and joint velocities v: see `Power`."""
+        """Where the power goes at an instant: see `Power`."""
         flows, line = self.flows(x, pressures), self.line(x)
         rates = self.pressure_rates(x, pressures, pose, v)
         stored = pose.compliance * pressures * rates
@@ -248,110 +236,3 @@ class Cylinders:
             leakage=read_only(np.sum(pressures * self.leak(pressures), axis=0)),
             stored=read_only(np.sum(stored, axis=0)),
         )
-
-
-class HydraulicActuators:
-    """App. B: a hydraulic cylinder on every joint of a robot, each with a loop that makes the torque asked for.
-
-    Usable as `actuators` in `rollout`. The loop asks for Ḟ = ω (e + ω_i ∫e dt) with e = F_desired - F, ω = 2π times the
-    loop's bandwidth and ω_i a twentieth of it, and tells the valve the opening for it (`Cylinders.opening_for`); the
-    integral rests while the valve is all open. The torque's amplitude follows to at least the stated bandwidth, as long as
-    that lies below the valve's.
-
-    Sizes: each cylinder is HyQ's, scaled until the supply pressure gives the robot's torque limit at the lever's best angle
-    and in the weaker direction, rod going in. Going out it gives 1.7 times as much. centre: (d,) rad, those best
-    angles, by default the joints of `robot.standing()`. Friction of the pistons is left out, as joint friction is in
-    (1)-(7). A load that pulls the rod out fast starves chamber A, as the valve's edges are alike and the areas are not:
-    its oil boils, and torque is missing until the chamber is full again.
-    Source of the loop: Boaventura et al., Model-based hydraulic impedance control for dynamic robots, IEEE T-RO 31, 2015.
-    Raises `InputError` for a joint without a torque limit and for joints that slide.
-    """
-
-    def __init__(self, robot: Robot, hydraulics: Hydraulics | None = None, centre: npt.ArrayLike | None = None):
-        hydraulics = Hydraulics() if hydraulics is None else hydraulics
-        if not isinstance(hydraulics, Hydraulics):
-            raise InputError(f"hydraulics must be a Hydraulics, as Hydraulics(loop_bandwidth=20.0), not {hydraulics!r}.")
-        _check_joints(robot)
-        if centre is None:  # the way from the neutral configuration holds the joints' angles
-            centre = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
-        self.cylinders = Cylinders(hydraulics, robot.torque_limits / hydraulics.weakest_torque, centre)
-        self.reset()
-
-    def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
-        """Close the valves with the oil pressed so that the joints have torques tau, as far as the supply goes.
-
-        tau: (d,) N·m, zero by default. q_joints: (d,) rad, the centre by default. Construction does this; a rollout
-        never does, so that it can go on where another ended: a robot that is to stand from the start needs the torques
-        it stands with.
-        """
-        cylinders = self.cylinders
-        tau = checked("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
-        force = self._force_for(tau, cylinders.at(cylinders.centre if q_joints is None else q_joints))
-        # a valve with equal edges holds a force with as much pressure missing at A as there is too much at B
-        lines = cylinders.hydraulics.supply_pressure + cylinders.hydraulics.tank_pressure
-        a = (force + cylinders.areas[1] * lines) / cylinders.areas.sum(axis=0)
-        self.state = OilState(np.zeros(cylinders.d), np.array([a, lines - a]), np.zeros(cylinders.d))
-
-    def torques(self, q_joints: npt.ArrayLike) -> Array:
-        """The torques the oil makes at joint angles, shape (d,) rad: L F, shape (d,), N·m."""
-        return self.cylinders.at(q_joints).lever * self.cylinders.force(self.state.pressures)
-
-    def torque_limits(self, q_joints: npt.ArrayLike) -> Array:
-        """The least and the largest torque that the supply pressure gives at joint angles, (d,) rad: shape (2, d), N·m."""
-        return read_only(np.sort(self.cylinders.at(q_joints).lever * self.cylinders.force_limits(), axis=0))
-
-    def step(self, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike, dt: float) -> Array:
-        """Let dt s pass with these torques asked for; the torques of the joints at its end, shape (d,), N·m.
-
-        tau_desired: (d,) N·m. q_joints, v_joints: (d,) rad and rad/s, taken as they are at the start: the oil's
-        spring then answers to a velocity and pushes on the next, which neither adds energy to it nor takes any
-        (symplectic Euler), as long as it turns less than 2 rad in dt: √(L² k / inertia) dt < 2. At 1 ms that is at most
-        1.7 in the catalogue, at the last wrist of anymal_kinova.
-        The oil is integrated in equal steps of `LONGEST_STEP` at most: the spool as its equation says, the pressures by a
-        linearly implicit Euler step, stable however small the chambers and the drops of pressure are. Torques come out
-        within 1 % of the torque limit, where they change fastest.
-        """
-        cylinders = self.cylinders
-        tau = checked("tau_desired", tau_desired, (cylinders.d,), "N·m")
-        v = checked("v_joints", v_joints, (cylinders.d,), "rad/s")
-        pose = cylinders.at(q_joints)
-        steps = max(1, int(np.ceil(positive("dt", dt, "s") / LONGEST_STEP - 1e-9)))
-        force = self._force_for(tau, pose)
-        for _ in range(steps):
-            self.state = self._advance(force, pose, v, dt / steps)
-        return pose.lever * cylinders.force(self.state.pressures)
-
-    def _force_for(self, tau: Array, pose: Pose) -> Array:
-        """The piston forces for joint torques, shape (d,), N, within what supply and tank allow."""
-        dead = np.abs(pose.lever) < 1e-9 * self.cylinders.crank
-        least, largest = self.cylinders.force_limits()
-        return np.clip(tau / np.where(dead, 1e-9 * self.cylinders.crank, pose.lever), least, largest)
-
-    def _advance(self, force: Array, pose: Pose, v: Array, step: float) -> OilState:
-        """The state `step` s later while the loop wants `force`, N."""
-        cylinders, hydraulics, now = self.cylinders, self.cylinders.hydraulics, self.state
-        rate = 2.0 * np.pi * hydraulics.loop_bandwidth
-        error = force - cylinders.force(now.pressures)
-        asked = rate * (error + _INTEGRAL_PART * rate * now.integral)
-        u = cylinders.opening_for(asked, now.pressures, pose, v)
-        integral = now.integral + step * np.where(np.abs(u) < 1.0, error, 0.0)
-        u = np.clip(u, -1.0, 1.0)
-        opening = u + (now.opening - u) * np.exp(-2.0 * np.pi * hydraulics.valve_bandwidth * step)
-        halfway = 0.5 * (now.opening + opening)
-        change = step * cylinders.pressure_rates(halfway, now.pressures, pose, v)
-        change /= 1.0 + step * cylinders.pressure_decay(halfway, now.pressures, pose)
-        return OilState(opening, np.maximum(now.pressures + change, VACUUM), integral)
-
-
-def _check_joints(robot: Robot) -> None:
-    """Cranks are for joints that turn, and a cylinder needs to know how strong it is to be."""
-    for joint in robot.joint_names:
-        kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
-        if not kind.startswith("JointModelR"):
-            raise InputError(f"{joint} of {robot.name} slides ({kind}); hydraulic actuators here turn joints by a crank.")
-    for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
-        if not np.isfinite(limit):
-            raise InputError(
-                f"{joint} of {robot.name} has no torque limit, so its cylinder has no size: "
-                f'load the robot with one, fb.load("{robot.name}", torque_limits=…).'
-            )

@@ -12,7 +12,7 @@ from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, equations_of_motion, feasible_space
 from floatbase.errors import InputError
-from floatbase.objectives import cost_on_space, force_bias, rotational_inertia, wanted_wrench, wrench_objective
+from floatbase.objectives import cost_on_space, desired_wrench, force_bias, rotational_inertia, wrench_objective
 from floatbase.robots import Robot, State
 
 
@@ -91,7 +91,7 @@ class AnalyticController:
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
         R, R_desired = state.frame_pose("base").rotation, self._desired.frame_pose("base").rotation
         turn = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
-        wrench = wanted_wrench(state, a, rotational_inertia(state) @ turn)
+        wrench = desired_wrench(state, a, rotational_inertia(state) @ turn)
         on_forces = wrench_objective(state, eom.contacts, *wrench) + self._bias
         joints = -self._kp * state.difference(self._desired.q)[-eom.d :] - self._kd * state.v[-eom.d :]
         on_qdd = Quadratic.from_residual(eom.S.T, joints, self._posture)

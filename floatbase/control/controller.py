@@ -13,8 +13,7 @@ import numpy.typing as npt
 from floatbase._arrays import Array, read_only
 from floatbase.control.command import Command
 from floatbase.control.problem import Limits, Problem, build_qp
-from floatbase.control.tick.compiled import Compiled, kernel_obstacle, told_when_slow, unkept
-from floatbase.control.tick.tables import obstacle
+from floatbase.control.tick import Compiled, announce_if_slow, cache_warning, obstacle
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives import Task
@@ -76,9 +75,9 @@ class WholeBodyController:
         self.compiled, self.path_reason = _compiled_tick(problem, solver, path)
         self.path: Literal["compiled", "readable"] = "readable" if self.compiled is None else "compiled"
         if self.compiled is not None:
-            often = unkept()
-            with told_when_slow(
-                f"floatbase compiles its controller{'; ' + often if often else ', once: about half a minute'}."
+            warning = cache_warning()
+            with announce_if_slow(
+                f"floatbase compiles its controller{'; ' + warning if warning else ', once: about half a minute'}."
             ):
                 self.compiled.warm_up()
 
@@ -126,9 +125,8 @@ class WholeBodyController:
             return None
         numbers = answer[0]
         numbers.setflags(write=False)
-        nv, tail, end = tick.nv, tick.nv + tick.d, tick.size
         solve = partial(self._solution_of, q, v, t, *answer)
-        return Command(numbers[nv:tail], numbers[:nv], numbers[tail:end], self.contacts, "compiled", solve)
+        return Command(numbers[tick.tau], numbers[tick.qdd], numbers[tick.forces], self.contacts, "compiled", solve)
 
     def _solution_of(self, q: Array, v: Array, t: float, numbers: Array, n_active: int, targets: Array) -> Solution:
         """The readable problem of a compiled tick, with the tick's answer as its solution.
@@ -140,8 +138,8 @@ class WholeBodyController:
         assert tick is not None  # it answered
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         qp = build_qp(eom, tick.tasks(targets), self.limits, t)
-        mu = tick.multipliers(numbers, n_active, len(qp.G))
-        return with_equality_multipliers(qp, numbers[: tick.size], mu, "compiled", n_active)
+        x, mu = numbers[: tick.forces.stop], tick.multipliers(numbers, n_active)
+        return with_equality_multipliers(qp, x, mu, "compiled", n_active)
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""
@@ -171,15 +169,15 @@ def _compiled_tick(problem: Problem, solver: str, path: Path) -> tuple[Compiled 
     """The compiled tick of a problem, or None, and the reason for either. Raises where it was requested and cannot be had."""
     if path == "readable":
         return None, "it was requested"
-    reason = kernel_obstacle() or obstacle(problem.robot, problem.contacts, problem.tasks, solver)
+    reason = obstacle(problem, solver)
     if reason and path == "compiled":
         raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
     if reason:
         return None, reason
-    tick = Compiled(problem.robot, problem.contacts, problem.tasks, problem.limits)
+    tick = Compiled(problem)
     if not tick.fits:
         return None, "a target has the wrong shape"
-    return tick, "; ".join(filter(None, ("the tasks and contacts are the package's own", unkept())))
+    return tick, "; ".join(filter(None, ("the tasks and contacts are the package's own", cache_warning())))
 
 
 def _itself(solution: Solution) -> Solution:

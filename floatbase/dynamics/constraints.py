@@ -4,48 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
-from floatbase.dynamics.contacts import UP, point_jacobian
+from floatbase.dynamics.contact import DEFAULT_MU, UP, point_jacobian
 from floatbase.errors import InputError
 from floatbase.robots import State
 
 Rows = Callable[[State, float], tuple[Array, Array]]
+_FLAT_WHEEL = 1e-6  # sine of the angle between axle and normal; below it rounding alone chooses the lowest point
 
 
 @dataclass(frozen=True, eq=False)
 class LinearConstraint:
     """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the document).
 
-    rows: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,). The constraint's force is Aᵀ λ
-    with one multiplier λ for each row, in the row's own unit; it has no friction cone. Holonomic constraints φ(q, t) =
-    0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6).
+    Holonomic constraints φ(q, t) = 0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6). The
+    constraint's force is Aᵀ λ with one multiplier λ for each row, in the row's own unit; it has no point and no friction cone.
+
+    name: in messages and as the contact's name.
+    m: number of rows.
+    rows: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,).
     """
 
     name: str
     m: int
     rows: Rows
+    mu: ClassVar[float] = np.inf  # there is no friction to run out of
+    normal: ClassVar[Array] = UP  # plays no part
+    point_names: ClassVar[tuple[str, ...]] = ()
+    J_is_A: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if int(self.m) != self.m or self.m < 1:
             raise InputError(f"constraint {self.name!r} has m = {self.m} rows; it must have at least 1.")
-
-    @property
-    def mu(self) -> float:
-        """+inf: there is no friction to run out of."""
-        return np.inf
-
-    @property
-    def normal(self) -> Array:
-        """Straight up; it plays no part."""
-        return UP
-
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """None: its forces have no point and no cone."""
-        return ()
 
     @property
     def k(self) -> int:
@@ -83,16 +77,23 @@ class RollingWheel:
     position constraint, the height of the centre. In the ground it is not: where the wheel can go is not limited, only how.
     Differentiated once, A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
 
-    frame: the wheel's;
-    its origin is the centre. axis: (3,), the axle in that frame. radius: m. normal: (3,), world, out of the ground. mu:
-    coefficient of friction. Raises `InputError` for a wheel that lies flat: it has no lowest point.
+    frame: name of the wheel's frame; its origin is the centre.
+    axis: the axle, shape (3,), in the frame; it is scaled to unit length.
+    radius: m.
+    normal: shape (3,), world, out of the ground; it is scaled to unit length.
+    mu: coefficient of friction.
+
+    `positions` and `constraint` raise `InputError` for a wheel that lies flat: it has no lowest point.
     """
 
     frame: str
     axis: Array
     radius: float
     normal: Array = field(default_factory=lambda: UP)
-    mu: float = 0.7
+    mu: float = DEFAULT_MU
+    k: ClassVar[int] = 3
+    row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
+    J_is_A: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(f"axis of {self.frame}", self.axis))
@@ -109,16 +110,6 @@ class RollingWheel:
     def point_names(self) -> tuple[str, ...]:
         """The frame's name: one point."""
         return (self.frame,)
-
-    @property
-    def k(self) -> int:
-        """3."""
-        return 3
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """x, y, z: world-aligned."""
-        return ("x", "y", "z")
 
     def positions(self, state: State) -> Array:
         """World position of the contact point, shape (1, 3), m."""
@@ -138,7 +129,7 @@ class RollingWheel:
         omega = state.frame_velocity(self.frame)[3:]
         u, u_dot = self._up(state)
         b = -(drift[:3] + cross(drift[3:], -self.radius * u) + cross(omega, -self.radius * u_dot))
-        return self.jacobian(state), read_only(b)
+        return read_only(point_jacobian(state, self.frame, -self.radius * u)), read_only(b)
 
     def _arm(self, state: State) -> Array:
         """From the centre to the contact point, shape (3,), m, world."""
@@ -150,7 +141,7 @@ class RollingWheel:
         axle_dot = cross(state.frame_velocity(self.frame)[3:], axle)
         w = n - (n @ axle) * axle
         length = float(np.linalg.norm(w))
-        if length < 1e-6:
+        if length < _FLAT_WHEEL:
             raise InputError(f"wheel {self.frame} lies flat on its side; it has no single lowest point to roll on.")
         w_dot = -(n @ axle_dot) * axle - (n @ axle) * axle_dot
         u = w / length

@@ -20,10 +20,14 @@ Block: TypeAlias = Literal["qdd", "tau", "forces"]  # the three unknowns of (7):
 class EquationsOfMotion:
     """(1)(4)(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
 
-    M: (nv, nv) inertia. h: (nv,) Coriolis, centrifugal and gravity forces. S: (nv, d) actuation (3). J: (k, nv)
-    Jacobian of the points where λ acts, world-aligned. A: (m, nv), b: (m,) the rows of (5), in m/s²; for point contacts
-    A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed base (1).
-    Source: the document, §1-§2.1.
+    For point contacts A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed
+    base (1). Source: the document, §1-§2.1.
+
+    M: (nv, nv), inertia.
+    h: (nv,), Coriolis, centrifugal and gravity forces, N and N·m.
+    S: (nv, d), actuation (3).
+    J: (k, nv), Jacobian of the points where λ acts, world-aligned.
+    A, b: (m, nv) and (m,), the rows of (5), in m/s² (rad/s² where they are angular).
     """
 
     state: State
@@ -56,7 +60,7 @@ class EquationsOfMotion:
         return int(self.J.shape[0])
 
     def acceleration(self, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
-        """q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,): (4) solved for given torques and thruster-like forces."""
+        """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,), for torques (d,), N·m, and forces (k,), N, whatever A q̈ = b asks for."""
         tau = checked("tau", tau, (self.d,), "N·m")
         forces = checked("forces", np.ravel(forces), (self.k,), "N")
         return np.linalg.solve(self.M, self.S @ tau + self.J.T @ forces - self.h)
@@ -78,5 +82,5 @@ def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> Equ
         raise InputError(f"equations_of_motion needs a State first, not {type(state).__name__}.")
     if not isinstance(contacts, Contacts):
         raise InputError(f"equations_of_motion needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
-    A, b = contacts.constraint(state, t)
-    return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, contacts.jacobian(state, t), A, b)
+    J, A, b = contacts.rows(state, t)
+    return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)

@@ -16,16 +16,20 @@ from floatbase.errors import InputError
 from floatbase.robots import State
 
 Turning: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
-_LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up
+_LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up: 1e-10 rad off after a turn
+_STEP = 1e-5  # m and rad to each side for central differences: curvature and rounding both leave about 1e-10 of M
 
 
 @dataclass(frozen=True, eq=False)
 class BiasForces:
     """h = gravity + centrifugal + coriolis, each of shape (nv,), in the units of h: N and N·m.
 
-    gravity: g(q). centrifugal: the terms in v_i². coriolis: the terms in v_i v_j, i ≠ j. Which is which depends on the
-    coordinates: v holds the base's velocity in the base frame, so ω × v of the base counts as Coriolis.
-    Source: the document, Appendix A.
+    Which is which depends on the coordinates: v holds the base's velocity in the base frame, so ω × v of the base counts as
+    Coriolis. Source: the document, Appendix A.
+
+    gravity: g(q).
+    centrifugal: the terms in v_i².
+    coriolis: the terms in v_i v_j, i ≠ j.
     """
 
     gravity: Array
@@ -46,8 +50,8 @@ class BiasForces:
 def bias_forces(state: State) -> BiasForces:
     """App. A: h(q, v) taken apart.
 
-    The velocity part is a quadratic form, Σ_ij Γ_ij v_i v_j. Moving one coordinate alone gives Γ_ii; what is left of h
-    when gravity and all Γ_ii v_i² are taken off are the products of two different velocities.
+    The velocity part is a quadratic form, Σ_ij Γ_ij v_i v_j. Moving one coordinate alone gives Γ_ii; the rest of
+    h, without gravity and all Γ_ii v_i², are the products of two different velocities.
     """
     model = state.robot.model
     data = model.createData()
@@ -72,13 +76,18 @@ def inertia_rate(state: State) -> Array:
     return read_only(C + C.T)
 
 
-def power_identity(state: State) -> float:
+def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
     """App. A: vᵀ (Ṁ - 2 C) v, W, which is zero: fictitious forces do no net work.
 
-    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f is left.
-    The matrix C is multiplied out here, so that rounding, and nothing else, keeps the answer from zero.
+    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f remains. Ṁ
+    comes from central differences of M along the motion, which know nothing of C; their error is about 1e-10 of the two terms.
+
+    C: shape (nv, nv), the matrix to try, `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
     """
-    return float(state.v @ (inertia_rate(state) - 2.0 * coriolis_matrix(state)) @ state.v)
+    C = coriolis_matrix(state) if C is None else checked("C", C, (state.robot.nv, state.robot.nv))
+    dt = _STEP / max(1.0, float(np.max(np.abs(state.v), initial=0.0)))
+    after, before = (state.replace(q=state.integrate(t * state.v)).M for t in (dt, -dt))
+    return float(state.v @ ((after - before) / (2.0 * dt) - 2.0 * C) @ state.v)
 
 
 def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
@@ -96,9 +105,12 @@ def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
 class TurningView:
     """A free particle as one who rides on a turning frame sees it; a row for each time.
 
-    time: (n,) s. rotation: (n, 3, 3) R_world_frame. All else is in the turning frame's coordinates, shape (n, 3):
-    position [m] and velocity [m/s] of the particle, and the accelerations [m/s²] that explain its curved path:
-    centrifugal -ω × (ω × p), coriolis -2 ω × ṗ and euler -ω̇ × p. Source: the document, Appendix A.
+    All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: the document, Appendix A.
+
+    time: (n,) s.
+    rotation: (n, 3, 3), R_world_frame.
+    position, velocity: of the particle, m and m/s.
+    centrifugal, coriolis, euler: -ω × (ω × p), -2 ω × ṗ and -ω̇ × p, m/s²: the accelerations that explain the curved path.
     """
 
     time: Array
@@ -126,8 +138,10 @@ def seen_from_turning_frame(
 
     time: (n,) s, rising; the frame's axes are the world's at time[0], its origin stays at the world's.
     omega: (3,) rad/s, world, angular velocity of the frame: a constant, or a function of the time in s.
-    omega_rate: (3,) rad/s², world, its derivative; zero for a constant ω, and needed for a function.
-    position [m], velocity [m/s]: (3,), world, of the particle at time[0].
+    position: (3,) m, world, of the particle at time[0].
+    velocity: (3,) m/s, world, of the particle.
+    omega_rate: (3,) rad/s², world, derivative of omega; zero for a constant, and needed for a function.
+
     Raises `InputError` for times that do not rise, wrong shapes and an ω(t) without its rate.
     """
     time = checked("time", time, (None,), "s")
@@ -139,12 +153,14 @@ def seen_from_turning_frame(
     turn = _as_function("omega", omega)
     R = _rotations(time, turn)
     start, v = checked("position", position, (3,), "m"), checked("velocity", velocity, (3,), "m/s")
-    # the same three vectors, read off in the frame's axes: Rᵀ x for each row
-    into = np.transpose(R, (0, 2, 1))
-    p = np.einsum("nij,nj->ni", into, start + np.outer(time - time[0], v))
-    w = np.einsum("nij,nj->ni", into, np.array([turn(t) for t in time]))
-    w_rate = np.einsum("nij,nj->ni", into, np.array([rate(t) for t in time]))
-    p_rate = into @ v - np.cross(w, p)
+
+    def seen(vectors: Array) -> Array:
+        """Vectors of the world, shape (n, 3), in the frame's axes: Rᵀ x for each row."""
+        return np.einsum("nji,nj->ni", R, vectors)
+
+    p = seen(start + np.outer(time - time[0], v))
+    w, w_rate = seen(np.array([turn(t) for t in time])), seen(np.array([rate(t) for t in time]))
+    p_rate = seen(np.tile(v, (time.size, 1))) - np.cross(w, p)
     return TurningView(
         time=time,
         rotation=read_only(R),
@@ -165,24 +181,19 @@ def _as_function(name: str, value: Turning) -> Callable[[float], Array]:
 
 
 def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
-    """R(t) with Ṙ = [ω] R and R = 1 at time[0], shape (n, 3, 3), in small turns of fourth order."""
+    """R(t) with Ṙ = [ω] R and R = 1 at time[0], shape (n, 3, 3), in small turns by ω at two Gauss points (Magnus series).
+
+    Of fourth order. Source: Iserles et al., Lie-group methods, Acta Numerica, 2000.
+    """
     R = np.empty((time.size, 3, 3))
     R[0] = np.eye(3)
-    for i, (t, end) in enumerate(pairwise(time)):
-        fastest = max(float(np.linalg.norm(omega(t + part * (end - t)))) for part in (0.0, 0.5, 1.0))
-        steps = int(np.ceil(fastest * (end - t) / _LARGEST_TURN)) + 1
+    for i, (begin, end) in enumerate(pairwise(time)):
+        fastest = max(float(np.linalg.norm(omega(t))) for t in np.linspace(begin, end, 3))
+        steps = int(np.ceil(fastest * (end - begin) / _LARGEST_TURN)) + 1
+        dt = (end - begin) / steps
         R[i + 1] = R[i]
-        for start in np.linspace(t, end, steps + 1)[:-1]:
-            R[i + 1] = _small_turn(omega, float(start), (end - t) / steps) @ R[i + 1]
+        for t in begin + dt * np.arange(steps):
+            first, second = (omega(float(t + (0.5 + side * np.sqrt(3.0) / 6.0) * dt)) for side in (-1.0, 1.0))
+            bend = np.sqrt(3.0) / 12.0 * dt**2 * np.cross(second, first)
+            R[i + 1] = pin.exp3(0.5 * dt * (first + second) + bend) @ R[i + 1]
     return R
-
-
-def _small_turn(omega: Callable[[float], Array], t: float, step: float) -> Array:
-    """The rotation from t to t + step by ω at the two Gauss points (Magnus series).
-
-    Source: Iserles et al., Lie-group methods, Acta Numerica, 2000.
-    """
-    spread = np.sqrt(3.0) / 6.0 * step
-    first, second = omega(t + 0.5 * step - spread), omega(t + 0.5 * step + spread)
-    bend = np.sqrt(3.0) / 12.0 * step**2 * np.cross(second, first)
-    return np.asarray(pin.exp3(0.5 * step * (first + second) + bend))

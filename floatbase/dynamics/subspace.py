@@ -11,64 +11,8 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.errors import InputError
-from floatbase.linear_algebra import RANK_TOLERANCE, null_space, rank
-
-MOTION_TOLERANCE = 1e-4  # directions of motion that A holds by less than this part of the largest count as not held
-MOTION_NOISE = 100.0  # 1/s: how much rows of (5) may contradict each other, m/s², for each m/s that contacts move
-
-
-@dataclass(frozen=True, eq=False)
-class ContactSpace:
-    """The contacts of (7) along the directions that they resolve: r independent motions and the forces that hold them.
-
-    The rank r is decided here, once, for everything that follows (`contact_space`).
-    rows: (r, nv), orthonormal, and b: (r,): rows q̈ = b stands for A q̈ = b, in the least-squares sense where rows contradict
-    each other. lift: (k, r): the smallest λ that gives q̈ a part along the rows, rows M⁻¹ Jᵀ lift = 1. free: (k, k - r),
-    orthonormal: forces that the resolved motions do not feel; null(Jᵀ), but for directions that A resolves badly.
-    """
-
-    rows: Array
-    b: Array
-    lift: Array
-    free: Array
-
-    @property
-    def r(self) -> int:
-        """rank J, as far as the contacts resolve it."""
-        return int(self.rows.shape[0])
-
-
-def contact_space(eom: EquationsOfMotion) -> ContactSpace:
-    """The resolved part of the contacts of (7), by singular values of A (tolerance `MOTION_TOLERANCE`).
-
-    Where J loses rank (solo8 on four feet), nearby states have a singular value σ that is small and of no use: measured
-    angles and velocities are not good enough to tell it from 0, and ζ would multiply their noise in b by 1/σ². So such a
-    direction is left out altogether: no row holds it, no force is spent on it. The answer is exact for a robot whose A differs
-    by less than that part; Newton's law holds exactly for this one, and A q̈ - b is off by at most σ |q̈| beside the part of b
-    that A cannot meet. A stance well away from such places has no such direction, and nothing is left out.
-    Raises `InputError` when forces and rows of a contact do not fit each other.
-    """
-    U, s, Vt = _resolved(eom)
-    rows = Vt
-    W = rows @ _inverse_inertia(eom, eom.J.T)
-    P, w, Qt = np.linalg.svd(W)
-    _check_fit(eom, w)
-    return ContactSpace(
-        rows=read_only(rows),
-        b=read_only((U.T @ eom.b) / s),
-        lift=read_only((Qt[: w.size].T / w) @ P.T),
-        free=read_only(Qt[w.size :].T),
-    )
-
-
-def resolved_motion(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(5) A, shape (m, nv), and b, shape (m,), m/s², without the directions that A resolves badly (see `contact_space`).
-
-    Both are as they were at a stance well away from a loss of rank, but for parts of b that A cannot meet.
-    """
-    U, s, Vt = _resolved(eom)
-    return read_only(U * s @ Vt), read_only(U @ (U.T @ eom.b))
+from floatbase.dynamics.resolve import ContactSpace, contact_space
+from floatbase.linear_algebra import null_space, rank
 
 
 def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
@@ -76,7 +20,7 @@ def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
 
     For points J M⁻¹ Jᵀ, known as the Delassus matrix; its inverse, where there is one, is the inertia that contacts feel.
     """
-    return read_only(eom.A @ _inverse_inertia(eom, eom.J.T))
+    return read_only(eom.A @ np.linalg.solve(eom.M, eom.J.T))
 
 
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
@@ -87,7 +31,7 @@ def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     than `MOTION_TOLERANCE` count as not held, see `contact_space`. Source: the document, §2.2.1.
     """
     space = contact_space(eom)
-    return Affine.linear(space.lift) @ _wanted_push(eom, space)
+    return Affine.linear(space.lift) @ _acceleration_from_forces(eom, space)
 
 
 def forces_are_unique(eom: EquationsOfMotion) -> bool:
@@ -105,14 +49,13 @@ def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
 
 def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """(10) C, shape (m, d + k), and its right-hand side b + A M⁻¹ h, shape (m,): C (τ, λ) = b + A M⁻¹ h."""
-    C = np.hstack([eom.A @ _inverse_inertia(eom, eom.S), contact_inertia_inverse(eom)])
-    return read_only(C), read_only(eom.b + eom.A @ _inverse_inertia(eom, eom.h))
+    C = np.hstack([eom.A @ np.linalg.solve(eom.M, eom.S), contact_inertia_inverse(eom)])
+    return read_only(C), read_only(eom.b + eom.A @ np.linalg.solve(eom.M, eom.h))
 
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
     """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
-    pairs = _pairs(eom, contact_space(eom))
-    return _orthonormal(Affine.stack(tau=pairs["tau"], forces=pairs["forces"]))
+    return _orthonormal(_pairs(eom, contact_space(eom)))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -125,7 +68,7 @@ def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 class FeasibleSpace:
     """(13)(16)(17) All (q̈, τ, λ) that satisfy (7), as the map β -> v + V⊥ β with orthonormal V⊥.
 
-    map: `Affine` with blocks "qdd", "tau", "forces". Source: the document, §2.2.2.
+    eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: the document, §2.2.2.
     """
 
     eom: EquationsOfMotion
@@ -166,7 +109,7 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     """(13) The space of all motions that the robot and its contacts allow at this state: v + V⊥ β.
 
     The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the resolved part
-    of the contacts (`contact_space`), which gives the same space as the SVD of B, and a sane one where J nearly loses rank.
+    of the contacts (`contact_space`): the same space as by the SVD of B, and one of bounded numbers where J nearly loses rank.
     """
     pairs = _pairs(eom, contact_space(eom))
     qdd = _motion_of(eom, pairs["tau"], pairs["forces"])
@@ -194,9 +137,12 @@ def undetermined_forces(eom: EquationsOfMotion) -> Array:
 class Dimensions:
     """Sizes, ranks and dimensions of (7) at one state, by singular values.
 
-    d, k, nv: lengths of τ, λ, q̈. rank_J, rank_J_base: of J and of its base columns. null_B, null_C: dimensions of the null
-    spaces of (12) and (10), both d + k - rank J. internal: of null(J_bᵀ), of which torques choose internal - undetermined.
-    undetermined: of null(Jᵀ). rank_V_qdd: how many of the directions of β move the robot at all: d - rank J + rank J_b.
+    nv, d, k: lengths of q̈, τ, λ.
+    rank_J, rank_J_base: ranks of J and of its base columns J_b.
+    null_B, null_C: dimensions of the null spaces of (12) and (10), both d + k - rank J.
+    internal: dimension of null(J_bᵀ), of which torques choose internal - undetermined.
+    undetermined: dimension of null(Jᵀ).
+    rank_V_qdd: how many of the directions of β move the robot at all: d - rank J + rank J_b.
     """
 
     nv: int
@@ -215,12 +161,12 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Counts every dimension of §2.2 at this state.
 
     The rank of J is decided once (`contact_space`). B and C are then counted, each by its own singular values, with the
-    resolved rows and forces in place of A and J, whose r numbers say the same; null(Jᵀ) comes on top.
+    resolved rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
     space = contact_space(eom)
-    push = np.linalg.qr(eom.J.T @ space.lift)[0]
-    B = np.block([[eom.M, -eom.S, -push], [space.rows, np.zeros((space.r, eom.d + space.r))]])
-    C = space.rows @ _inverse_inertia(eom, np.hstack([eom.S, push]))
+    reactions = np.linalg.qr(eom.J.T @ space.lift)[0]
+    B = np.block([[eom.M, -eom.S, -reactions], [space.rows, np.zeros((space.r, eom.d + space.r))]])
+    C = space.rows @ np.linalg.solve(eom.M, np.hstack([eom.S, reactions]))
     free = eom.k - space.r
     return Dimensions(
         nv=eom.nv,
@@ -236,40 +182,23 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     )
 
 
-def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
-    """U, s, Vt of A's singular value decomposition, without the directions that A resolves badly."""
-    U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
-    r = int(np.sum(s > MOTION_TOLERANCE * s.max(initial=0.0)))
-    return U[:, :r], s[:r], Vt[:r]
-
-
-def _check_fit(eom: EquationsOfMotion, w: Array) -> None:
-    """Forces must be able to hold every resolved row, w being how they do it, and must push along rows of A only."""
-    if np.any(w <= RANK_TOLERANCE * w.max(initial=0.0)):
-        reached = int(np.sum(w > RANK_TOLERANCE * w[0]))
-        raise InputError(f"the contacts keep {w.size} directions of motion, but forces reach {reached}: A and J do not fit.")
-    beside = eom.J - eom.J @ np.linalg.pinv(eom.A, rcond=RANK_TOLERANCE) @ eom.A
-    if np.max(np.abs(beside), initial=0.0) > 1e-6 * np.max(np.abs(eom.J), initial=0.0):
-        raise InputError("forces push along motions that the contacts do not keep: A and J do not fit.")
-
-
-def _wanted_push(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
-    """τ -> the part of q̈ along the resolved rows that forces must add to that of S τ - h, shape (r,)."""
-    return Affine(-space.rows @ _inverse_inertia(eom, eom.S), space.b + space.rows @ _inverse_inertia(eom, eom.h))
+def _acceleration_from_forces(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
+    """τ -> what forces must add to q̈ along the resolved rows, shape (r,): b - rows M⁻¹ (S τ - h)."""
+    return Affine(-space.rows @ np.linalg.solve(eom.M, eom.S), space.b + space.rows @ np.linalg.solve(eom.M, eom.h))
 
 
 def _pairs(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
     """(τ, z) -> (τ, λ): the smallest λ for τ, and any of the free ones with it."""
     d, free = eom.d, space.free.shape[1]
-    smallest = Affine.linear(space.lift) @ _wanted_push(eom, space)
+    smallest = Affine.linear(space.lift) @ _acceleration_from_forces(eom, space)
     tau = Affine.linear(np.hstack([np.eye(d), np.zeros((d, free))]))
     return Affine.stack(tau=tau, forces=Affine(np.hstack([smallest.A, space.free]), smallest.b))
 
 
 def _motion_of(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Affine:
     """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h) of τ and λ that depend on something."""
-    A = _inverse_inertia(eom, eom.S @ tau.A + eom.J.T @ forces.A)
-    return Affine(A, _inverse_inertia(eom, eom.S @ tau.b + eom.J.T @ forces.b - eom.h))
+    A = np.linalg.solve(eom.M, eom.S @ tau.A + eom.J.T @ forces.A)
+    return Affine(A, np.linalg.solve(eom.M, eom.S @ tau.b + eom.J.T @ forces.b - eom.h))
 
 
 def _orthonormal(f: Affine) -> Affine:
@@ -281,8 +210,3 @@ def _orthonormal(f: Affine) -> Affine:
 def _base_columns(eom: EquationsOfMotion) -> Array:
     """J_b: the columns of J that belong to the base, shape (k, 6) or (k, 0)."""
     return eom.J[:, : eom.nv - eom.d]
-
-
-def _inverse_inertia(eom: EquationsOfMotion, right: Array) -> Array:
-    """M⁻¹ right."""
-    return np.linalg.solve(eom.M, right)

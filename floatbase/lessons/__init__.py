@@ -1,20 +1,24 @@
-"""What the lessons share: panels that do not block the kernel, and exercises that check themselves."""
+"""What the lessons share: panels that do not block the kernel, simple controllers, exercises that check themselves."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from floatbase.lessons import progress
+from floatbase.lessons.controllers import ConstantTorques, Torques, joint_servo
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, all_exercises, check, numbers, reveal, show_progress
-from floatbase.lessons.panels import slider_panel
-from floatbase.lessons.sliders import live, push_panel
+
+if TYPE_CHECKING:
+    from floatbase.lessons.panels import SliderPanel, live, push_panel, slider_panel
+
+_PANELS = ("SliderPanel", "live", "push_panel", "slider_panel")  # imported at first use: they load physics and pictures
 
 __all__ = [
-    "Exercise",
-    "Numeric",
-    "Shaped",
-    "Verdict",
-    "all_exercises",
-    "check",
-    "live",
-    "numbers",
-    "push_panel",
-    "reveal",
-    "show_progress",
-    "slider_panel",
-]
+    "ConstantTorques", "Exercise", "Numeric", "Shaped", "SliderPanel", "Torques", "Verdict", "all_exercises", "check",
+    "joint_servo", "live", "numbers", "progress", "push_panel", "reveal", "show_progress", "slider_panel",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PANELS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module("floatbase.lessons.panels"), name)

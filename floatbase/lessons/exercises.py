@@ -1,7 +1,7 @@
 """Exercises that check themselves: `check` says right, or what kind of mistake it looks like, without giving the answer.
 
-An exercise stands once, in the module of its lesson: statement, stub, solution, judge. The judge computes the right
-value by other expressions than the one asked for.
+An exercise stands once, in the file `exercises` of its lesson: statement, stub, solution, judge. The judge computes the
+right value by other expressions than the solution does.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from floatbase._arrays import Array
 from floatbase.affine import Quadratic
 from floatbase.errors import unknown_name
 from floatbase.lessons import progress
 
-TRIES = 2  # before `reveal` shows a solution
+TRIES = 2  # so many before `reveal` shows a solution
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,10 @@ class Verdict:
 
 
 def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
-    """The answer as an array of one of these shapes, finite; or what is wrong with it, whatever it is."""
+    """The answer as an array of finite numbers in one of `shapes`, or a `Verdict` that says what is wrong with it.
+
+    answer: whatever a learner may give. shapes: those allowed; a message names the first.
+    """
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
     try:
@@ -52,21 +56,32 @@ def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
     return given
 
 
-def _wrong_shape(given: tuple[int, ...], wanted: tuple[int, ...]) -> str:
-    if not wanted:
+def _wrong_shape(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
+    if not expected:
         return f"One number is asked for; this has shape {given}."
     if not given:
-        return f"This is a single number; the answer should have shape {wanted}."
-    flat = sorted(given) == sorted((1, *wanted))
+        return f"This is a single number; the answer should have shape {expected}."
+    flat = sorted(given) == sorted((1, *expected))
     column = " This is a matrix with one row or column: `.ravel()` makes it flat." if flat else ""
-    return f"The answer has shape {given}; it should have shape {wanted}.{column}"
+    return f"The answer has shape {given}; it should have shape {expected}.{column}"
+
+
+def vector_text(vector: npt.ArrayLike, digits: int = 0) -> str:
+    """A vector as text, such as "(1, 0, -2)", with so many decimals and no minus before a zero."""
+    return "(" + ", ".join(f"{x + 0.0:.{digits}f}" for x in np.round(np.asarray(vector, dtype=np.float64), digits)) + ")"
 
 
 @dataclass(frozen=True, eq=False)
 class Exercise:
-    """One exercise. stub: the code a learner starts from, which runs. solution: the code that replaces it.
+    """One exercise of a lesson.
 
-    names: what the stub uses of the lesson's own, by name; numpy it has.
+    name: number of the lesson and its own, "01.2".
+    statement: what is to be found, with shape, unit and frame.
+    stub: the code that a learner starts from; it runs.
+    solution: the code that replaces the stub.
+    judge: answer -> `Verdict`.
+    explanation: why the solution is right, shown with it.
+    names: gives what the stub uses of the lesson, name -> value; numpy it has.
     """
 
     name: str
@@ -88,8 +103,11 @@ class Exercise:
 class Numeric:
     """A judge of numbers and arrays.
 
-    right: computes the right value. mistakes: for each kind of mistake, the value it leads to and the hint that fits.
-    Values within `tolerance`, relative to the right value's size, count as equal. count: asked is how many.
+    right: computes the right value.
+    praise: what a right answer is told.
+    mistakes: hint -> computes the value that this kind of mistake leads to.
+    tolerance: values whose difference is less than this part of the right value's largest number count as equal.
+    count: the answer is a number of things, without sign or unit.
     """
 
     right: Callable[[], Any]
@@ -125,7 +143,7 @@ class Numeric:
 
 @dataclass(frozen=True, eq=False)
 class Shaped:
-    """A judge that knows what a wrong shape means before it asks another one. shapes: for each, the hint."""
+    """A judge that knows what a wrong shape means, and leaves other shapes to `judge`. shapes: shape -> hint."""
 
     judge: Callable[[Any], Verdict]
     shapes: Mapping[tuple[int, ...], str]
@@ -140,17 +158,17 @@ class Shaped:
 
 
 def all_exercises() -> dict[str, Exercise]:
-    """All exercises by name, such as "00.1"."""
+    """All exercises of all lessons: name, such as "00.1", -> `Exercise`."""
     found: dict[str, Exercise] = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
         if module.name.startswith("lesson"):
-            for exercise in import_module(f"floatbase.lessons.{module.name}").EXERCISES:
+            for exercise in import_module(f"floatbase.lessons.{module.name}.exercises").EXERCISES:
                 found[exercise.name] = exercise
     return dict(sorted(found.items()))
 
 
 def check(name: str, answer: Any) -> Verdict:
-    """Check an answer to the exercise of that name and count the try; an unchanged placeholder is none.
+    """Judge an answer to the exercise of that name, such as "00.1", and count the try; an unchanged stub is none.
 
     Raises `UnknownNameError` for a name that does not exist.
     """
@@ -163,10 +181,10 @@ def check(name: str, answer: Any) -> Verdict:
 
 def reveal(name: str) -> None:
     """Print the solution of an exercise and why, once it has been tried twice or solved."""
-    exercise, kept = _exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
-    if kept["tries"] < TRIES and not kept["right"]:
-        left = TRIES - kept["tries"]
-        print(f'Try {"once" if left == 1 else "twice"} more first: run check("{name}", …) on an answer of your own.')
+    exercise, tried = _exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
+    if tried["tries"] < TRIES and not tried["right"]:
+        remaining = TRIES - tried["tries"]
+        print(f'Try {"once" if remaining == 1 else "twice"} more first: run check("{name}", …) on an answer of your own.')
         return
     print(exercise.solution)
     if exercise.explanation:
@@ -175,8 +193,8 @@ def reveal(name: str) -> None:
 
 def show_progress() -> None:
     """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried."""
-    kept, known = progress.load(), all_exercises()
-    marks = {name: _mark(kept.get(name)) for name in known}
+    tried, known = progress.load(), all_exercises()
+    marks = {name: _mark(tried.get(name)) for name in known}
     for lesson in sorted({name.split(".")[0] for name in known}):
         here = [name for name in known if name.startswith(f"{lesson}.")]
         print(f"lesson {lesson}  " + "  ".join(f"{name} {marks[name]}" for name in here))
@@ -192,8 +210,8 @@ def _same(answer: Any, placeholder: Any) -> bool:
     return not isinstance(given, Verdict) and np.allclose(given, placeholder, rtol=1e-6, atol=1e-6)
 
 
-def _mark(kept: dict[str, int] | None) -> str:
-    return "·" if kept is None else "✓" if kept["right"] else "✗"
+def _mark(tried: dict[str, int] | None) -> str:
+    return "·" if tried is None else "✓" if tried["right"] else "✗"
 
 
 def _exercise(name: str) -> Exercise:

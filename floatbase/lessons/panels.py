@@ -1,15 +1,41 @@
-"""A panel of sliders under a live picture. A slider calls a quick function; nothing waits, so the kernel stays free."""
+"""Panels under a live picture: sliders that redraw it, and a handle that pushes the robot of a run in the background.
+
+Nothing here waits: a slider calls a quick function, a run has a thread of its own, and so the kernel stays free.
+"""
 
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from typing import Any
 
 import ipywidgets as widgets
 
 from floatbase.errors import FloatbaseError
-from floatbase.viewer import Viewer
+from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
+from floatbase.viewer import Viewer, push_at
+
+# sliders ----------------------------------------------------------------------------------------------------------------
+
+
+class SliderPanel(widgets.VBox):
+    """A live picture with sliders, as `slider_panel` makes it.
+
+    view: the `Viewer` of the picture. sliders: the slider of each name. note: the HTML that tells what a position means.
+    """
+
+    def __init__(self, view: Viewer, sliders: dict[str, widgets.FloatSlider], beside: bool):
+        self._picture = widgets.HTML(layout=widgets.Layout(width="62%" if beside else "auto"))
+        note = widgets.HTML()
+        top = [widgets.HBox([self._picture, note])] if beside else [self._picture, note]
+        super().__init__([*top, *sliders.values()])
+        self.view, self.sliders, self.note = view, sliders, note
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        """The picture is put in only here: by now the camera has been placed, and a still picture keeps that view."""
+        self._picture.value = self.view._repr_html_()
+        return super()._repr_mimebundle_(**kwargs)
 
 
 def slider_panel(
@@ -18,61 +44,56 @@ def slider_panel(
     wait: bool = False,
     beside: bool = False,
     **ranges: tuple[float, float, float] | tuple[float, float, float, str],
-) -> widgets.VBox:
-    """The live picture with a slider for each of `ranges`: name=(lowest, first, highest) or (lowest, first, highest, unit).
+) -> SliderPanel:
+    """The live picture of `view` with one slider for each of `ranges`, in the order in which they are given.
 
-    A slider goes in round steps that meet all three. "_" in a name shows as a blank. draw: called at once and at every move as
-    draw(name=value, …) with the values as shown, in the kernel's thread, so it should take a few milliseconds. What it returns,
-    HTML or plain text, stands between the picture and the sliders, or to the right of the picture with `beside`. wait: call it
-    only when a slider is let go, for functions that take a little longer. Should it raise an error of the package, that stands
-    there instead.
+    draw: called once at first and at every move as draw(name=value, …), with the values as they are shown, in the kernel's
+        thread; it draws on `view` and should take a few milliseconds. It may return a note, HTML or plain text.
+    wait: call `draw` only when a slider is let go, for a function that takes longer.
+    beside: the note stands to the right of the picture; otherwise between the picture and the sliders.
+    ranges: name=(lowest, first, highest) or name=(lowest, first, highest, unit). "_" in a name shows as a blank. The step of
+        a slider is round and meets all three.
+
+    Where `draw` raises an error of the package, its text is the note.
     """
-    note = widgets.HTML()
-    sliders = {name: _slider(name, *bounds, wait=wait) for name, bounds in ranges.items()}
+    sliders = {name: _range_slider(name, *bounds, wait=wait) for name, bounds in ranges.items()}
+    panel = SliderPanel(view, sliders, beside)
 
-    def moved(_: Any = None) -> None:
+    def redraw(_: Any = None) -> None:
         try:
-            note.value = draw(**{name: _shown(slider) for name, slider in sliders.items()}) or ""
+            panel.note.value = draw(**{name: _shown(slider) for name, slider in sliders.items()}) or ""
         except FloatbaseError as error:
-            note.value = str(error)
+            panel.note.value = str(error)
 
     for slider in sliders.values():
-        slider.observe(moved, names="value")
-    moved()
-    picture = widgets.HTML(layout=widgets.Layout(width="62%" if beside else "auto"))
-    top = [widgets.HBox([picture, note])] if beside else [picture, note]
-    return _Panel(view, picture, [*top, *sliders.values()])
+        slider.observe(redraw, names="value")
+    redraw()
+    return panel
 
 
-class _Panel(widgets.VBox):
-    """A panel whose picture is put in when it is displayed: by then the camera has been placed, which a still picture keeps."""
-
-    def __init__(self, view: Viewer, picture: widgets.HTML, children: list[widgets.Widget]):
-        super().__init__(children)
-        self._view, self._picture = view, picture
-
-    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        self._picture.value = self._view._repr_html_()
-        return super()._repr_mimebundle_(**kwargs)
+def _range_slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:
+    text = name.replace("_", " ") + (f" [{unit}]" if unit else "")
+    made = _slider(text, low, first, high, _round_step(low, first, high), wait)
+    made.style.description_width, made.layout.width = "12em", "80%"
+    return made
 
 
-def _slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:
-    step = _round_step(low, first, high)
+def _slider(text: str, low: float, first: float, high: float, step: float, wait: bool) -> widgets.FloatSlider:
+    """A slider that shows as many digits as its step has. wait: it tells its value only when it is let go."""
     return widgets.FloatSlider(
         value=first,
         min=low,
         max=high,
         step=step,
-        description=name.replace("_", " ") + (f" [{unit}]" if unit else ""),
+        description=text,
         readout_format=f".{max(0, -math.floor(math.log10(step)))}f",
         continuous_update=not wait,
-        style={"description_width": "12em"},
-        layout=widgets.Layout(width="80%"),
+        layout=widgets.Layout(width="60%"),
     )
 
 
 def _round_step(*bounds: float) -> float:
-    """The largest of 1, 2 or 5 times a power of ten that goes into all bounds, and 50 times or more from lowest to highest.
+    """The largest of 1, 2 or 5 times a power of ten that divides all bounds, with at least 50 steps from lowest to highest.
 
     Where none does, because a bound is not round itself, one that is too fine for that to be seen.
     """
@@ -86,3 +107,96 @@ def _round_step(*bounds: float) -> float:
 def _shown(slider: widgets.FloatSlider) -> float:
     """The value as the slider shows it: a browser's sum of steps may be off in the last digits."""
     return float(format(slider.value, slider.readout_format)) + 0.0  # without a minus before a zero
+
+
+# pushes -----------------------------------------------------------------------------------------------------------------
+
+
+def live(sim: Simulation, controller: Controller, view: Viewer, **options: Any) -> Live:
+    """A run in the background that draws itself into `view`; a push stays as an arrow for half a second.
+
+    options: as for `Live`. Nothing moves before `start`.
+    """
+
+    def show(record: Rollout) -> None:
+        view.show(record.final, contacts=record.contacts, forces=record.measured[-1], push=push_at(record, -1, SEEN))
+
+    return Live(sim, controller, show, **options)
+
+
+def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
+    """The live picture with a handle to push the robot in any horizontal direction, for 0.1 s at a time.
+
+    run: as `live` returns it, paused at first. view: what it draws itself into; give it a `Viewer` of its own, since the
+    picture stops when `view` is displayed again below. most: the hardest push, N.
+
+    The first slider says how hard, N, and pushes when it is let go; the second says where to, in degrees: 0 forwards, 90 to
+    the robot's left (+y, where it begins), 180 backwards; the button *push* pushes once more. A push starts the run, as
+    *run* does, and either puts a fallen robot back on its feet first. *pause* stops it, *reset* begins anew with both
+    sliders where they began. A line says what happens, and what stopped the run.
+    """
+    force = _slider("push [N]", -most, 0.0, most, 5.0, wait=True)
+    towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0, wait=True)
+    line = _Line(run)
+
+    def push(_: Any = None) -> None:
+        if not force.value:
+            line.value = "a push of 0 N: set how hard first"
+            return
+        run.push(_horizontal(force.value, towards.value))
+        line.tell(f"pushed with {abs(force.value):.0f} N {_direction(force.value, towards.value)} for 0.1 s")
+
+    def let_go(change: dict[str, Any]) -> None:
+        if change["new"]:
+            push()
+
+    def reset() -> None:
+        force.value, towards.value = 0.0, 90.0
+        run.reset()
+
+    def button(text: str, does: Callable[[], None]) -> widgets.Button:
+        def pressed(_: Any) -> None:
+            does()
+            line.tell("")
+
+        return _button(text, pressed)
+
+    run.on_status(lambda _: line.tell())
+    force.observe(let_go, names="value")
+    buttons = [button("run", run.start), button("pause", run.pause), button("reset", reset)]
+    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="auto"))
+    return widgets.VBox([picture, force, widgets.HBox([towards, _button("push", push)]), widgets.HBox([*buttons, line])])
+
+
+class _Line(widgets.Label):
+    """What a run does: its status, or what was last done to it while it runs. Told from the kernel's thread and the run's."""
+
+    def __init__(self, run: Live):
+        super().__init__(value=run.status)
+        self._run, self._news, self._telling = run, "", threading.Lock()
+
+    def tell(self, news: str | None = None) -> None:
+        """Show the present status; `news` stands in its place while the run goes on, "" for none, None for the last."""
+        with self._telling:  # the status is read in here, so that the last line is never about an earlier one
+            self._news = self._news if news is None else news
+            status = self._run.status
+            self.value = self._news if status == "running" and self._news else advice(status)
+
+
+def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:
+    made = widgets.Button(description=text, layout=widgets.Layout(width="6em"))
+    made.on_click(pressed)
+    return made
+
+
+def _horizontal(force: float, towards: float) -> list[float]:
+    """A force of `force` N towards so many degrees, shape (3,), world."""
+    angle = math.radians(towards)
+    return [force * math.cos(angle), force * math.sin(angle), 0.0]
+
+
+def _direction(force: float, towards: float) -> str:
+    """Where a push goes, in words where there is a word."""
+    angle = round(towards + (180.0 if force < 0 else 0.0)) % 360
+    words = {0: "forwards", 90: "to the left", 180: "backwards", 270: "to the right"}
+    return words.get(angle, f"towards {angle if angle <= 180 else angle - 360}°")

@@ -1,4 +1,4 @@
-"""Which exercises a learner has tried and solved, kept in a file of the learner's own."""
+"""Which exercises a learner has tried and solved, stored in a file of the learner's own."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def path() -> Path:
-    """Where it is kept: progress.json in the folder that FLOATBASE_HOME names, ~/.floatbase by default."""
+    """Where it is stored: progress.json in the folder that FLOATBASE_HOME names, ~/.floatbase by default."""
     return Path(os.environ.get("FLOATBASE_HOME", Path.home() / ".floatbase")) / "progress.json"
 
 
@@ -21,15 +21,15 @@ def load() -> dict[str, dict[str, int]]:
 
 
 def record(name: str, right: bool) -> None:
-    """Count a try. A disk that cannot be written to costs the memory, not the lesson."""
-    kept = load()
-    entry = kept.setdefault(name, {"tries": 0, "right": 0})
+    """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten, without an error."""
+    tried = load()
+    entry = tried.setdefault(name, {"tries": 0, "right": 0})
     entry["tries"] += 1
     entry["right"] += int(right)
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
         part = path().with_suffix(".part")
-        part.write_text(json.dumps(kept, indent=1), encoding="utf-8")
+        part.write_text(json.dumps(tried, indent=1), encoding="utf-8")
         part.replace(path())
     except OSError:
         pass

@@ -1,4 +1,4 @@
-"""The centre of mass steered by forces: G_f, G_τ, wrenches, force bias, torque redundancy (20)-(25)."""
+"""The centre of mass steered by forces: momentum, G_f, G_τ, wrenches, force bias, torque redundancy (20)-(25)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,31 @@ from floatbase.dynamics import Contacts, EquationsOfMotion, resolved_motion, tor
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space, rank
 from floatbase.robots import State
+
+
+def momentum(state: State) -> Array:
+    """Momentum of the whole robot, shape (6,), world: linear, kg·m/s, then angular about the centre of mass, kg·m²/s.
+
+    Linear m ẋ_c, angular Σ (x_i - x_c) × m_i ẋ_i over all particles: what (20)(21) say that outside forces change.
+    """
+    model = state.robot.model
+    found = pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v)
+    return read_only(np.concatenate([found.linear, found.angular]))
+
+
+def momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
+    """Time derivative of `momentum` under the acceleration q̈, shape (6,), N and N·m, world.
+
+    Newton and Euler: (f_c + m g, τ_c), with the wrench (f_c, τ_c) of (20)(21) that the contact forces have about the centre of
+    mass. Torques of the joints are internal and do not show up.
+
+    state: where the robot is and how it moves.
+    qdd: q̈, shape (nv,), base in the base frame, as v of `State`.
+    """
+    model = state.robot.model
+    qdd = checked("qdd", qdd, (state.robot.nv,))
+    rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, qdd)
+    return read_only(np.concatenate([rate.linear, rate.angular]))
 
 
 def grasp_matrix(points: Array, about: Array) -> Array:
@@ -52,17 +77,19 @@ def com_wrench(state: State, contacts: Contacts) -> Affine:
 def wrench_objective(state: State, contacts: Contacts, force: npt.ArrayLike, moment: npt.ArrayLike) -> Quadratic:
     """(22) ½ ‖f̃_c - G_f λ‖² + ½ ‖τ̃_c - G_τ λ‖² as a cost on λ.
 
-    force: f̃_c, shape (3,), N; moment: τ̃_c, shape (3,), N·m; world, about the centre of mass: what the ground should
-    do to the robot, so standing still asks for minus the weight of gravity, (0, 0, m g).
+    state: where the robot is.
+    contacts: whose forces are λ, shape (k,).
+    force: f̃_c, shape (3,), N, world: what the ground should do to the robot; to stand still, its weight upwards.
+    moment: τ̃_c, shape (3,), N·m, world, about the centre of mass.
     """
-    wanted = np.concatenate([checked("force", force, (3,), "N"), checked("moment", moment, (3,), "N·m")])
-    return Quadratic.of(com_wrench(state, contacts) - wanted)
+    desired = np.concatenate([checked("force", force, (3,), "N"), checked("moment", moment, (3,), "N·m")])
+    return Quadratic.of(com_wrench(state, contacts) - desired)
 
 
-def wanted_wrench(
+def desired_wrench(
     state: State, com_acceleration: npt.ArrayLike, angular_momentum_rate: npt.ArrayLike = (0.0, 0.0, 0.0)
 ) -> tuple[Array, Array]:
-    """The (f̃_c, τ̃_c) of (22) for a wanted motion: f = m (a - g), Newton; τ = L̇, Euler. Shapes (3,), N and N·m, world.
+    """The (f̃_c, τ̃_c) of (22) for a desired motion: f = m (a - g), Newton; τ = L̇, Euler. Shapes (3,), N and N·m, world.
 
     com_acceleration: a, shape (3,), m/s². angular_momentum_rate: L̇ about the centre of mass, shape (3,), N·m.
     """
@@ -91,27 +118,32 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
 
     a: one number for all points or shape (n,).
     """
-    n = contacts.n_points
-    values = iter(checked("the nominal normal force a", [a] * n if np.ndim(a) == 0 else a, (n,), "N"))
+    count = contacts.n_points
+    values = iter(checked("the nominal normal force a", [a] * count if np.ndim(a) == 0 else a, (count,), "N"))
     return _per_point(contacts, lambda n: (np.outer(n, n), next(values) * n))
 
 
 def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
-    """(23) Σ h_i(f_i) = Σ ½ ‖tangential part‖² + (α/2) ‖normal part - a‖², as a cost on λ. α ≥ 0; a in N.
+    """(23) Σ h_i(f_i) = Σ ½ ‖tangential part‖² + (α/2) ‖normal part - a‖², as a cost on λ, shape (k,). Source: §3.1.1.
 
-    A preference, not a limit: nothing keeps a force in its cone or from pulling. Source: the document, §3.1.1.
+    A preference, not a limit: nothing keeps a force in its cone, or from pulling.
+
+    contacts: all with forces at points.
+    alpha: α ≥ 0, weight of the normal part beside the tangential one.
+    a: the normal force that each contact should carry, N; one number for all points or shape (n,).
     """
     return tangential_bias(contacts) + positive("alpha", alpha, allow_zero=True) * normal_bias(contacts, a)
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueForForces:
-    """(25) The smallest torques that give wanted forces, in closed form.
+    """(25) The smallest torques that give desired forces, in closed form.
 
-    torque: `Affine` λ -> τ, the pseudo-inverse solution, shape (k,) N to (d,) N·m. reachable: the forces that any
-    torques can give, as an `Affine` β̂ -> λ with orthonormal columns. free_torques: (d, f), torques that change no
-    force: the redundancy. With fewer torques than forces not every λ is reachable: `torque` then answers for the
-    nearest reachable accelerations.
+    With fewer torques than forces not every λ is reachable: `torque` then answers for the nearest reachable accelerations.
+
+    torque: `Affine` λ -> τ, the pseudo-inverse solution, shape (k,) N to (d,) N·m.
+    reachable: the forces that any torques can give, as an `Affine` β̂ -> λ with orthonormal columns.
+    free_torques: (d, f), torques that change no force: the redundancy.
     """
 
     torque: Affine
@@ -119,14 +151,13 @@ class TorqueForForces:
     free_torques: Array
 
     def gap(self, forces: npt.ArrayLike) -> float:
-        """Distance, N, of wanted forces (k,) from those that torques can give; 0 when reachable."""
-        wanted = checked("forces", np.ravel(forces), (self.reachable.n_out,), "N") - self.reachable.b
-        return float(np.linalg.norm(wanted - self.reachable.A @ (self.reachable.A.T @ wanted)))
+        """Distance, N, of desired forces (k,) from those that torques can give; 0 when reachable."""
+        return float(np.linalg.norm(np.ravel(forces) - self.nearest(forces)))
 
     def nearest(self, forces: npt.ArrayLike) -> Array:
-        """The reachable forces nearest to wanted ones, shape (k,), N."""
-        wanted = checked("forces", np.ravel(forces), (self.reachable.n_out,), "N") - self.reachable.b
-        return self.reachable(self.reachable.A.T @ wanted)
+        """The reachable forces nearest to desired ones, shape (k,), N."""
+        forces = checked("forces", np.ravel(forces), (self.reachable.n_out,), "N")
+        return self.reachable(self.reachable.A.T @ (forces - self.reachable.b))
 
 
 def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:

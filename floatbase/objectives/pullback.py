@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from floatbase._arrays import Array
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics import Block, EquationsOfMotion, FeasibleSpace, accelerations_from_torques
 from floatbase.linear_algebra import null_space, rank
@@ -29,6 +28,9 @@ def cost_on_space(
     """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β.
 
     A cost on all three at once is moved by `cost.pullback(space.map)`.
+
+    space: β -> (q̈, τ, λ), as from `feasible_space`.
+    qdd, tau, forces: costs on vectors of shape (nv,), (d,) and (k,).
     """
     total = Quadratic.zero(space.dimension)
     for cost, part in ((qdd, space.qdd), (tau, space.tau), (forces, space.forces)):
@@ -73,8 +75,3 @@ def seen_from_best(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadr
     block has full column rank.
     """
     return cost.pullback(best_coordinates(cost, space, block))
-
-
-def minimise_on(cost: Quadratic, subspace: Affine) -> Array:
-    """The point of least cost on an affine subspace x = subspace(β), shape (n,): unconstrained in β."""
-    return subspace(cost.pullback(subspace).minimiser())

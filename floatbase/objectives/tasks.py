@@ -21,10 +21,12 @@ from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
-from floatbase.robots import State, check_turns
+from floatbase.robots import State, check_unit_lengths
 
 Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 _ZERO3 = (0.0, 0.0, 0.0)
+_ROTATION_TOLERANCE = 1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
+_ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 
 
 @runtime_checkable
@@ -46,6 +48,9 @@ class Task(Protocol):
 
 
 def _value(name: str, target: Target, t: float, shape: tuple[int, ...]) -> Array:
+    """A target at time t. One that does not move was checked when its task was made, but for the shape of a robot's own."""
+    if isinstance(target, np.ndarray) and target.shape == shape:
+        return target
     return checked(name, target(t) if callable(target) else target, shape)
 
 
@@ -65,10 +70,13 @@ def _fixed(name: str, target: Target, shape: tuple[int, ...]) -> Target:
 
 @dataclass(frozen=True, eq=False)
 class CoMTask:
-    """Bring the centre of mass to a position, shape (3,), m, world; residual in q̈, m/s².
+    """Bring the centre of mass to a position; residual in q̈, m/s².
 
-    velocity [m/s] and acceleration [m/s²], shape (3,), world: those of a moving target. kp [1/s²], kd [1/s]: gains; kd
-    is critically damped by default.
+    position: shape (3,), m, world.
+    velocity, acceleration: shape (3,), m/s and m/s², world: those of a moving target.
+    kp, kd: gains, 1/s² and 1/s; kd is critically damped by default.
+    weight: of ½‖residual‖² in the objective.
+    name: in messages and tables.
     """
 
     position: Target
@@ -96,10 +104,12 @@ class CoMTask:
 
 @dataclass(frozen=True, eq=False)
 class OrientationTask:
-    """Bring a frame to an orientation R_world_frame, shape (3, 3); residual in q̈, rad/s².
+    """Bring a frame to an orientation; residual in q̈, rad/s². The error is e = log(R R_desiredᵀ), rad, world-aligned.
 
-    frame: its name; "base" is the base link. The error is e = log(R R_desiredᵀ), rad, world-aligned.
-    angular_velocity [rad/s], angular_acceleration [rad/s²], shape (3,), world: those of a moving target.
+    frame: its name; "base" is the base link.
+    rotation: R_world_frame, shape (3, 3).
+    angular_velocity, angular_acceleration: shape (3,), rad/s and rad/s², world: those of a moving target.
+    kp, kd, weight: as for `CoMTask`.
     """
 
     frame: str = "base"
@@ -127,8 +137,10 @@ class OrientationTask:
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_ω q̈ + J̇_ω q̇ - α, shape (3,), rad/s², world-aligned."""
         state = eom.state
-        wanted = nearest_rotation(self.name, _value("rotation", self.rotation, t, (3, 3)))
-        e = pin.log3(state.frame_pose(self.frame).rotation @ wanted.T)
+        desired = _value("rotation", self.rotation, t, (3, 3))
+        if callable(self.rotation):
+            desired = nearest_rotation(self.name, desired)
+        e = pin.log3(state.frame_pose(self.frame).rotation @ desired.T)
         e_dot = state.frame_velocity(self.frame)[3:] - _value("angular velocity", self.angular_velocity, t, (3,))
         feed = _value("angular acceleration", self.angular_acceleration, t, (3,))
         J, drift = state.frame_jacobian(self.frame)[3:], state.frame_drift(self.frame)[3:]
@@ -137,11 +149,15 @@ class OrientationTask:
 
 @dataclass(frozen=True, eq=False)
 class FrameTask:
-    """Bring a frame's origin to a position, shape (3,), m, world; residual in q̈, m/s². A foot that swings, a hand.
+    """Bring a frame's origin to a position; residual in q̈, m/s². A foot that swings, a hand.
 
     The origin of a ball foot's frame is not where it touches: `Contacts.positions` has the sole, one radius lower where the
-    frame sits in the ball's centre. So aim at `state.point(frame)`, or at a place on the ground and the radius above it.
-    velocity [m/s] and acceleration [m/s²], shape (3,), world: those of a moving target.
+    frame sits in the ball's centre. So aim at `state.point(frame)`, or at a position one radius above the ground.
+
+    frame: its name.
+    position: shape (3,), m, world.
+    velocity, acceleration: shape (3,), m/s and m/s², world: those of a moving target.
+    kp, kd, weight: as for `CoMTask`.
     """
 
     frame: str
@@ -175,9 +191,10 @@ class FrameTask:
 
 @dataclass(frozen=True, eq=False)
 class PostureTask:
-    """Bring the joints to those of a configuration q, shape (nq,) (its base part does not count); residual in q̈, rad/s².
+    """Bring the joints to those of a configuration; residual in q̈, rad/s².
 
-    (cos, sin) of joints without limits must be of length 1.
+    q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of length 1.
+    kp, kd, weight, name: as for `CoMTask`.
     """
 
     q: Target
@@ -195,9 +212,9 @@ class PostureTask:
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
         state, robot = eom.state, eom.robot
-        wanted = _value("q of posture", self.q, t, (robot.nq,))
-        check_turns(robot.model, "q of posture", wanted, first=2 if robot.is_floating else 1)
-        e = state.difference(wanted)[-robot.d :]
+        desired = _value("q of posture", self.q, t, (robot.nq,))
+        check_unit_lengths(robot.model, "q of posture", desired, first=2 if robot.is_floating else 1)
+        e = state.difference(desired)[-robot.d :]
         e_dot = state.v[-robot.d :]
         return _motion_residual(self, robot.S.T, np.zeros(robot.d), np.zeros(robot.d), e, e_dot)
 
@@ -206,7 +223,7 @@ class PostureTask:
 class ForceTask:
     """Keep contact forces near a target, shape (k,), N, world, zero by default; residual in λ, N.
 
-    With a small weight this is the force regularisation that chooses among forces of equal wrench.
+    With a small weight it chooses among forces of equal wrench: the force regularisation.
     """
 
     target: Target | None = None
@@ -219,8 +236,8 @@ class ForceTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """λ - target, shape (k,), N."""
-        wanted = np.zeros(eom.k) if self.target is None else _value("target forces", self.target, t, (eom.k,))
-        return Affine.identity(eom.k) - wanted
+        target = np.zeros(eom.k) if self.target is None else _value("target forces", self.target, t, (eom.k,))
+        return Affine.identity(eom.k) - target
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,8 +254,8 @@ class TorqueTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """τ - target, shape (d,), N·m."""
-        wanted = np.zeros(eom.d) if self.target is None else _value("target torques", self.target, t, (eom.d,))
-        return Affine.identity(eom.d) - wanted
+        target = np.zeros(eom.d) if self.target is None else _value("target torques", self.target, t, (eom.d,))
+        return Affine.identity(eom.d) - target
 
 
 def _keep_target(task: ForceTask | TorqueTask) -> None:
@@ -252,7 +269,7 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
     """The tasks that keep a robot where `state` has it: centre of mass, base orientation, posture.
 
     To go elsewhere, replace the centre of mass's target, and mind the posture: its weight, 0.1, holds the joints back. go2
-    asked to go 30 mm to the left ends 12 mm short; with a posture task of weight 1e-3 it ends within 1 mm.
+    with a target 30 mm to the left ends 12 mm short; with a posture task of weight 1e-3 it ends within 1 mm.
     """
     if not isinstance(state, State):
         raise InputError(f"standing_tasks needs a State, as robot.standing(), not {type(state).__name__}.")
@@ -271,12 +288,12 @@ def _motion_residual(
 def nearest_rotation(name: str, R: Array) -> Array:
     """The rotation nearest to R (3, 3), which may be off by the rounding of printed digits or of float32.
 
-    Raises `InputError` where it is off by more than 1e-6.
+    Raises `InputError` where R Rᵀ is off by more than 1e-6 of the identity, or R mirrors.
     """
-    left = np.max(np.abs(R @ R.T - np.eye(3))) if np.all(np.isfinite(R)) else np.inf
-    if not left <= 1e-6 or np.linalg.det(R) < 0:
+    error = np.max(np.abs(R @ R.T - np.eye(3))) if np.all(np.isfinite(R)) else np.inf
+    if not error <= _ROTATION_TOLERANCE or np.linalg.det(R) < 0:
         raise InputError(f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, determinant +1.")
-    if left < 1e-14:
+    if error < _ROTATION_ROUNDING:
         return R
     U, _, Vt = np.linalg.svd(R)
     nearest: Array = U @ Vt

@@ -1,9 +1,12 @@
-"""What can be loaded: the catalogue, and any other robot of example-robot-data once its feet are given."""
+"""Robots from files: the catalogue, any other robot of example-robot-data once its feet are given, and URDFs of one's own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,72 +14,13 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, positive, read_only
 from floatbase.errors import InputError, UnknownNameError, unknown_name
-from floatbase.robots.robot import Foot, Robot, check_turns, torque_limits_of
+from floatbase.robots.entries import CATALOGUE, Entry
+from floatbase.robots.robot import Foot, Robot, torque_limits_of
 
-
-@dataclass(frozen=True)
-class Entry:
-    """What the catalogue adds to a robot of example-robot-data: its feet, true torque limits, and what it is for."""
-
-    description: str
-    feet: tuple[Foot, ...] = ()
-    torque_limit: float | None = None
-    joints: Mapping[str, float] = field(default_factory=dict)
-    sources: Mapping[str, str] = field(default_factory=dict)
-
-
-def _balls(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Foot, ...]:
-    return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
-
-
-def _soles(frames: Sequence[str], x: tuple[float, float], y: tuple[float, float]) -> tuple[Foot, ...]:
-    corners = np.array([[x[1], y[1], 0.0], [x[1], y[0], 0.0], [x[0], y[0], 0.0], [x[0], y[1], 0.0]])
-    return tuple(Foot(frame, corners=corners) for frame in frames)
-
-
-_SOLO_FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
-_SOLO_SOURCES = {
-    "foot radius": "half the width of the foot's mesh in example-robot-data",
-    "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular robot architecture, 2020 "
-    "(the URDF says 1000 N·m, which no motor of this size gives)",
-}
-
-CATALOGUE: Mapping[str, Entry] = {
-    "go2": Entry(
-        "quadruped with 3 joints a leg: as many leg torques as contact forces",
-        _balls(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022),
-        sources={"foot radius": "the foot's mesh in example-robot-data", "torque limits": "URDF"},
-    ),
-    "solo12": Entry(
-        "small quadruped with 3 joints a leg, weak motors: torque limits are near",
-        _balls(_SOLO_FEET, 0.016),
-        torque_limit=2.7,
-        sources=_SOLO_SOURCES,
-    ),
-    "solo8": Entry(
-        "small quadruped with 2 joints a leg: fewer torques than contact forces",
-        _balls(_SOLO_FEET, 0.016),
-        torque_limit=2.7,
-        sources=_SOLO_SOURCES,
-    ),
-    "anymal_kinova": Entry(
-        "quadruped with an arm: more torques than contact forces",
-        _balls(("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), 0.031, (0.0, 0.0, 0.02325)),
-        sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
-    ),
-    "talos": Entry(
-        "humanoid with flat feet: each foot carries a wrench through its corners",
-        _soles(("left_sole_link", "right_sole_link"), (-0.1, 0.1), (-0.06, 0.06)),
-        sources={"sole": "20 cm × 12 cm, within the ankle's collision mesh", "torque limits": "URDF"},
-    ),
-    "ur5": Entry(
-        "arm bolted to the ground: the fixed-base equations (1)",
-        joints={"shoulder_lift_joint": -1.3, "elbow_joint": 1.6, "wrist_1_joint": -0.3, "wrist_2_joint": 0.0},
-        sources={"torque limits": "URDF"},
-    ),
-}
+PLATE = (0.4, 0.03)  # width and thickness, m, of the plate on which `unbolted` lets a robot stand
+_FLIGHT_HEIGHT = 1.0  # m: where a robot without bolts and plate floats
 
 
 def catalogue() -> dict[str, str]:
@@ -94,12 +38,14 @@ def load(
 ) -> Robot:
     """Load a robot by name.
 
-    name: one of `catalogue()`, or any other robot of example-robot-data that has a URDF. feet: frames (or `Foot` values)
-    that can touch the ground; by default as the catalogue has them. A floating-base robot outside the catalogue needs
-    them. foot_radius: radius of the feet given as frames, m, 0 by default. torque_limits: one number or shape (d,),
-    N·m; by default those of the catalogue or the URDF. posture: shape (nq,), a configuration to stand in; by default
-    the one that comes with the robot. Raises `UnknownNameError` with the near names, and `InputError` for feet or
-    limits that do not fit.
+    name: one of `catalogue()`, or any other robot of example-robot-data that has a URDF.
+    feet: frames (or `Foot` values) that can touch the ground; by default as the catalogue has them. A floating-base robot
+        outside the catalogue needs them.
+    foot_radius: radius of the feet given as frames, m, 0 by default.
+    torque_limits: one number or shape (d,), N·m; by default those of the catalogue or the URDF.
+    posture: shape (nq,), a configuration to stand in; by default the one that comes with the robot.
+
+    Raises `UnknownNameError` with the near names, and `InputError` for feet or limits that do not fit.
     """
     loader = _loader(name)
     entry = CATALOGUE.get(name)
@@ -121,10 +67,13 @@ def load_urdf(
 ) -> Robot:
     """Load a robot of your own from a URDF file.
 
-    name: the file's name without its ending by default. floating: whether the root link is free to move. package_dirs: where
-    meshes named package://… lie; the file's own folder is always searched. The rest as for `load`; the posture is that of
-    all joints at zero by default. Raises `InputError` for a file that is not there or cannot be read, and for planar and
-    floating joints inside the robot.
+    path: of the URDF file.
+    name: the file's name without its ending by default.
+    floating: whether the root link is free to move.
+    package_dirs: where meshes named package://… lie; the file's own folder is always searched.
+    feet, foot_radius, torque_limits, posture: as for `load`; the posture is that of all joints at zero by default.
+
+    Raises `InputError` for a file that is not there or cannot be read, and for planar and floating joints inside the robot.
     """
     urdf = Path(path).expanduser().resolve()
     if not urdf.is_file():
@@ -143,6 +92,37 @@ def load_urdf(
                 "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
             )
     return _robot(name, model, loader, None, pin.neutral(model), list(feet), foot_radius, torque_limits, posture)
+
+
+def unbolted(robot: Robot, plate: bool = False) -> Robot:
+    """A fixed-base robot with its base free to move: the links and joints of its URDF are the same, the bolts are gone.
+
+    Bolts are the link "world", which some URDFs have below the base, and the joints that hang from it.
+
+    robot: with a fixed base, such as ur5.
+    plate: let it stand on a square plate that has no weight (`PLATE`); else it touches nothing and floats 1 m up.
+    """
+    if robot.is_floating:
+        raise InputError(f"{robot.name} has no bolts; unbolted takes a robot with a fixed base, such as ur5.")
+    tree = ElementTree.parse(robot.urdf).getroot()
+    for element in [*tree.findall("link[@name='world']"), *tree.findall("joint/parent[@link='world']/..")]:
+        tree.remove(element)
+    urdf = Path(tempfile.mkdtemp(dir=_scratch().name)) / f"{robot.name}.urdf"
+    urdf.write_text(ElementTree.tostring(tree, encoding="unicode"), encoding="utf-8")
+    half, thick = 0.5 * PLATE[0], PLATE[1]
+    corners = np.array([[x, y, -thick] for x, y in ((half, half), (half, -half), (-half, -half), (-half, half))])
+    loose = load_urdf(urdf, name=robot.name, package_dirs=robot.package_dirs, torque_limits=robot.torque_limits)
+    return replace(
+        loose,
+        feet=(Foot(loose.base, corners=corners),) if plate else (),
+        posture=read_only([0.0, 0.0, thick if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0, *robot.posture]),
+    )
+
+
+@cache
+def _scratch() -> tempfile.TemporaryDirectory[str]:
+    """A folder that goes when Python ends."""
+    return tempfile.TemporaryDirectory(prefix="floatbase-")
 
 
 def _model(urdf: Path, floating: bool) -> pin.Model:
@@ -168,7 +148,7 @@ def _robot(
         package_dirs=loader.package_dirs,
         feet=_feet(name, model, entry, feet, foot_radius, loader.free_flyer),
         torque_limits=_torque_limits(model, loader.free_flyer, entry, torque_limits),
-        posture=start if posture is None else _checked_posture(model, posture),
+        posture=start if posture is None else posture,  # type: ignore[arg-type]  # Robot checks it
         description=entry.description if entry else "",
         sources=entry.sources if entry else {},
     )
@@ -226,23 +206,17 @@ def _reference(model: pin.Model, loader: _Loader, entry: Entry | None) -> Array:
     return read_only(pin.normalize(model, q))
 
 
-def _checked_posture(model: pin.Model, asked: npt.ArrayLike) -> Array:
-    q = checked("posture", asked, (model.nq,))
-    check_turns(model, "posture", q)
-    return q
-
-
-def _torque_limits(model: pin.Model, free_flyer: bool, entry: Entry | None, asked: npt.ArrayLike | None) -> Array:
+def _torque_limits(model: pin.Model, free_flyer: bool, entry: Entry | None, requested: npt.ArrayLike | None) -> Array:
     d = model.nv - (6 if free_flyer else 0)
-    if asked is not None:
-        return torque_limits_of(d, asked)
+    if requested is not None:
+        return torque_limits_of(d, requested)
     if entry is not None and entry.torque_limit is not None:
         return read_only(np.full(d, entry.torque_limit))
     effort = np.array(model.effortLimit)[model.nv - d :]
     return read_only(np.where(effort > 0, effort, np.inf))  # URDF writers put 0 where they do not know
 
 
-def limb_ends(model: pin.Model) -> tuple[str, ...]:
+def _limb_ends(model: pin.Model) -> tuple[str, ...]:
     """Names of the links that carry no other link, behind the last joint of a limb: feet, fingers, heads."""
     inner = set(model.parents)
     bodies = {i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}
@@ -255,19 +229,24 @@ def limb_ends(model: pin.Model) -> tuple[str, ...]:
 
 
 def _feet(
-    name: str, model: pin.Model, entry: Entry | None, asked: Sequence[str | Foot] | None, radius: float | None, free_flyer: bool
+    name: str,
+    model: pin.Model,
+    entry: Entry | None,
+    requested: Sequence[str | Foot] | None,
+    radius: float | None,
+    free_flyer: bool,
 ) -> tuple[Foot, ...]:
-    if asked is None:
+    if requested is None:
         if radius is not None:
             raise InputError("foot_radius goes with feet=[…]: the catalogue's feet have their own radius.")
         if entry is None and free_flyer:
             raise InputError(
                 f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be given: "
                 f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
-                f"Its limbs end with {', '.join(limb_ends(model))}."
+                f"Its limbs end with {', '.join(_limb_ends(model))}."
             )
         return entry.feet if entry else ()
-    if isinstance(asked, str):
-        raise InputError(f'feet must be a list of frames, as in feet=["{asked}"].')
+    if isinstance(requested, str):
+        raise InputError(f'feet must be a list of frames, as in feet=["{requested}"].')
     r = 0.0 if radius is None else positive("foot_radius", radius, "m", allow_zero=True)
-    return tuple(foot if isinstance(foot, Foot) else Foot(foot, r) for foot in asked)
+    return tuple(foot if isinstance(foot, Foot) else Foot(foot, r) for foot in requested)

@@ -18,14 +18,18 @@ from floatbase.errors import InputError, unknown_name
 if TYPE_CHECKING:
     from floatbase.robots.state import State
 
+UNIT_LENGTH_TOLERANCE = 1e-6  # quaternions printed with seven digits pass; normalising what is further off could hide a fault
+_AREA_TOLERANCE = 1e-6  # m: corners nearer to one line than this span no area; feet are measured to 0.1 mm
+
 
 @dataclass(frozen=True, eq=False)
 class Foot:
-    """Where a robot can touch the ground.
+    """Where a robot can touch the ground: a ball, or a flat foot with corners.
 
-    frame: name of the frame that carries the foot. A ball foot has a `radius` in m and the ball's `centre`, shape (3,)
-    in m, in that frame. A flat foot has `corners`, shape (n, 3) in m, in that frame, whose z axis points out of the
-    ground when the foot stands; its radius is 0.
+    frame: name of the frame that carries the foot; a flat foot's z axis points out of the ground when it stands.
+    radius: of the ball, m; 0 for a flat foot.
+    centre: of the ball, shape (3,), m, in the frame.
+    corners: of a flat foot, shape (n, 3), m, in the frame; None for a ball.
     """
 
     frame: str
@@ -45,14 +49,24 @@ class Foot:
         """Whether the foot stands on its corners rather than on a point."""
         return self.corners is not None
 
+    @property
+    def middle(self) -> Array:
+        """The ball's centre, or the middle of the corners; shape (3,), m, in the frame."""
+        return self.centre if self.corners is None else read_only(self.corners.mean(axis=0))
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot as the equations need it. Made by `load`; nothing in it changes afterwards.
 
+    name: as it was loaded.
     model: the Pinocchio model; q = (base position [m, world], base quaternion x y z w, joints), or joints alone.
+    urdf, package_dirs: the file, and where its meshes named package://… lie.
+    feet: where it can touch the ground.
     torque_limits: shape (d,), N·m (N for prismatic joints), +inf where none is known.
     posture: shape (nq,), a configuration to stand in, before the feet are put on the ground.
+    description: what it is for.
+    sources: where the numbers come from that are not the URDF's.
     """
 
     name: str
@@ -64,6 +78,10 @@ class Robot:
     posture: Array
     description: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,)))
+        check_unit_lengths(self.model, "posture", self.posture)
 
     @cached_property
     def is_floating(self) -> bool:
@@ -124,7 +142,7 @@ class Robot:
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
-        """Names of all frames that can be asked for: bodies, joints and fixed frames."""
+        """Names of all frames: bodies, joints and fixed frames."""
         return tuple(str(f.name) for f in self.model.frames if f.name != "universe")
 
     @cached_property
@@ -168,13 +186,19 @@ class Robot:
         """
         from floatbase.robots.standing import stand
 
-        return stand(self, height)
+        return self._standing if height is None else stand(self, height)
+
+    @cached_property
+    def _standing(self) -> State:
+        from floatbase.robots.standing import stand
+
+        return stand(self)
 
     def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:
         """A random state around standing, the same for the same seed.
 
         spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with
-        that deviation in rad/s and m/s. Joint limits are kept.
+        that deviation in rad/s and m/s. Joints stay within their limits.
         """
         from floatbase.robots.state import State
 
@@ -197,40 +221,46 @@ class Robot:
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
 
 
-def check_turns(model: pin.Model, name: str, q: Array, hint: str = "", first: int = 1) -> None:
-    """Check that what stands for a turn in q, shape (nq,), has length 1: quaternions, and (cos, sin) of joints without limits.
+def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", first: int = 1) -> None:
+    """Check that quaternions, and (cos, sin) of joints without limits, have length 1 in a configuration.
 
-    first: the first of Pinocchio's joints that counts. Raises `InputError` with the place in `name`, what to divide by, and the
-    hint.
+    Raises `InputError` with the entries, what to divide by, and the hint.
+
+    model: the Pinocchio model.
+    name: of the configuration, for the message.
+    q: shape (nq,), the configuration.
+    hint: put behind the message's last word.
+    first: the first of Pinocchio's joints that counts: 2 leaves the base of a floating robot out.
     """
-    if pin.isNormalized(model, q, 1e-6):
+    if pin.isNormalized(model, q, UNIT_LENGTH_TOLERANCE):
         return
     for i in range(first, model.njoints):
-        places = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # they come first
-        turn = slice(model.idx_qs[i] + places, model.idx_qs[i] + model.nqs[i])
-        length = float(np.linalg.norm(q[turn]))
-        if model.nqs[i] == model.nvs[i] or abs(length - 1.0) <= 1e-6:
+        offset = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # positions come first
+        part = slice(model.idx_qs[i] + offset, model.idx_qs[i] + model.nqs[i])
+        length = float(np.linalg.norm(q[part]))
+        if model.nqs[i] == model.nvs[i] or abs(length - 1.0) <= UNIT_LENGTH_TOLERANCE:
             continue
-        place = f"{name}[{turn.start}:{turn.stop}]"
-        what = f"the base quaternion {place} (x y z w)"
-        if i > 1 or places != 3:
-            what = f"{place}, {'cosine and sine' if turn.stop - turn.start == 2 else 'the quaternion'} of {model.names[i]!r},"
+        entries = f"{name}[{part.start}:{part.stop}]"
+        what = f"the base quaternion {entries} (x y z w)"
+        if i > 1 or offset != 3:
+            what = f"{entries}, {'cosine and sine' if part.stop - part.start == 2 else 'the quaternion'} of {model.names[i]!r},"
         raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
 
 
 def spread_corners(frame: str, corners: Array) -> Array:
     """The corners, after checking that they span an area: on a line they cannot hold all six motions of a foot."""
-    if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=1e-6) < 2:
+    if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=_AREA_TOLERANCE) < 2:
         raise InputError(f"the corners of {frame} span no area; a flat foot needs at least 3 that are not on one line.")
     return corners
 
 
-def torque_limits_of(d: int, asked: npt.ArrayLike) -> Array:
-    """Torque limits asked for, one number or (d,), N·m, +inf for none, as shape (d,). Raises `InputError`."""
+def torque_limits_of(d: int, requested: npt.ArrayLike) -> Array:
+    """Requested torque limits, one number or (d,), N·m, +inf for none, as shape (d,). Raises `InputError`."""
     try:
-        limits = np.array([asked] * d if np.ndim(asked) == 0 else asked, dtype=np.float64)
+        limits = np.array([requested] * d if np.ndim(requested) == 0 else requested, dtype=np.float64)
     except (TypeError, ValueError):
         limits = np.zeros(0)
     if limits.shape != (d,) or not np.all(limits > 0):  # NaN is not > 0 either
-        raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); got shape {np.shape(asked)}: {asked!r}.")
+        got = f"got shape {np.shape(requested)}: {requested!r}"
+        raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); {got}.")
     return read_only(limits)

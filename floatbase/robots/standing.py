@@ -7,11 +7,13 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked
 from floatbase.errors import InputError
+from floatbase.linear_algebra import RANK_TOLERANCE
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
-_TOLERANCE = 1e-11  # m and rad
-_STEPS = 50
+_TOLERANCE = 1e-11  # m and rad: a hundred roundings of a robot of 1 m
+_STEPS = 50  # the catalogue's robots take five
+_LARGEST_STEP = 0.2  # m and rad: Gauss-Newton's Jacobian is good that far
 
 
 def stand(robot: Robot, height: float | None = None) -> State:
@@ -27,12 +29,12 @@ def stand(robot: Robot, height: float | None = None) -> State:
         error, J = _gap(state, posture, height)
         if np.max(np.abs(error)) < _TOLERANCE:
             return state
-        step = -np.linalg.pinv(J, rcond=1e-9) @ error
-        state = State(robot, pin.integrate(robot.model, state.q, np.clip(step, -0.2, 0.2)))
+        step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
+        state = State(robot, pin.integrate(robot.model, state.q, np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)))
     raise InputError(
         f"{robot.name} cannot put all its feet on the ground"
         + (f" with its base {height:g} m above it" if height is not None else "")
-        + f": {np.max(np.abs(error)):.2g} m is left. Ask for another height, or load it with another posture."
+        + f": {np.max(np.abs(error)):.2g} m remain. Ask for another height, or load it with another posture."
     )
 
 
@@ -54,24 +56,19 @@ def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Arr
     J_base = np.eye(state.robot.nv)[:6]
     errors += list(pin.log3(posture.frame_pose("base").rotation.T @ R))
     rows += list(J_base[3:])
-    place = state.q[:3] - posture.q[:3] if height is None else state.q[:3] - [*posture.q[:2], height]
-    kept = 2 if height is None else 3
-    errors += list(place[:kept])
-    rows += list((R @ J_base[:3])[:kept])
+    offset = state.q[:3] - [*posture.q[:2], 0.0 if height is None else height]
+    fixed = 2 if height is None else 3
+    errors += list(offset[:fixed])
+    rows += list((R @ J_base[:3])[:fixed])
     return np.array(errors), np.array(rows)
-
-
-def _sole_offset(foot: Foot) -> Array:
-    """The point of the foot whose height counts, in the foot's frame: the ball's centre or the middle of the corners."""
-    return foot.centre if foot.corners is None else foot.corners.mean(axis=0)
 
 
 def _sole_height(state: State, foot: Foot) -> float:
     """Height of the foot's lowest point above z = 0, m."""
-    return float(state.point(foot.frame, _sole_offset(foot))[2] - foot.radius)
+    return float(state.point(foot.frame, foot.middle)[2] - foot.radius)
 
 
 def _sole_jacobian(state: State, foot: Foot) -> Array:
     """Jacobian of the point whose height counts, shape (3, nv)."""
     J = state.frame_jacobian(foot.frame)
-    return J[:3] - pin.skew(state.frame_pose(foot.frame).rotation @ _sole_offset(foot)) @ J[3:]
+    return J[:3] - pin.skew(state.frame_pose(foot.frame).rotation @ foot.middle) @ J[3:]

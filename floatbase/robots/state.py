@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,19 +11,24 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, read_only
 from floatbase.errors import InputError
-from floatbase.robots.robot import Robot, check_turns
+from floatbase.robots.robot import Robot, check_unit_lengths
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class State:
     """A configuration q and a velocity v of a robot, and all that follows from them alone.
 
+    A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts of frames are given in the
+    world-aligned frame at the point requested.
+
+    robot: as from `fb.load`.
     q: shape (nq,): base position [m, world], base quaternion x y z w, joints [rad or m].
-    v: shape (nv,): base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint velocities.
-    Jacobians, velocities and drifts of frames are given in the world-aligned frame at the point asked for.
-    Raises `InputError` for wrong shapes, entries that are not finite, and turns (the base's quaternion, (cos, sin) of joints
-    without limits) that are not of unit length.
+    v: shape (nv,): base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint velocities; 0 by default.
+
+    Raises `InputError` for wrong shapes, entries that are not finite, and quaternions (also (cos, sin) of joints without
+    limits) that are not of unit length.
     """
 
     robot: Robot
@@ -32,13 +38,10 @@ class State:
     def __init__(self, robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike | None = None):
         if not isinstance(robot, Robot):
             raise InputError(f"State needs a Robot first, as in State(robot, q, v), not {type(robot).__name__}.")
-        vars(self)["robot"] = robot
-        vars(self)["q"] = checked("q", q, (robot.nq,))
-        vars(self)["v"] = checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,))
-        check_turns(robot.model, "q", self.q, ", or use robot.standing()")
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise InputError(f"a State does not change; state.replace({name}=…) makes a new one." if name in "qv" else name)
+        object.__setattr__(self, "robot", robot)
+        object.__setattr__(self, "q", checked("q", q, (robot.nq,)))
+        object.__setattr__(self, "v", checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,)))
+        check_unit_lengths(robot.model, "q", self.q, ", or use robot.standing()")
 
     @cached_property
     def _data(self) -> pin.Data:

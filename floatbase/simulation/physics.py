@@ -1,9 +1,8 @@
-"""MuJoCo from the same URDF: ground, feet, torque motors, pushes, measured contact forces."""
+"""A robot in MuJoCo: torques and pushes in, states and contact forces out."""
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite
 
 import mujoco
@@ -11,23 +10,28 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only, unit_vector
-from floatbase.dynamics import UP
-from floatbase.errors import InputError, SimulationError
-from floatbase.robots import Foot, Robot, State
-from floatbase.simulation.conversion import Conversion, body_name
+from floatbase._arrays import Array, checked, cross, positive
+from floatbase.dynamics import UP, Contacts
+from floatbase.errors import InputError
+from floatbase.robots import Robot, State
+from floatbase.simulation.build import Ground, body_name, build_model
+from floatbase.simulation.conversion import Conversion
 
-_CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
-_GROUND = "ground"
-FALLEN_HEIGHT = 0.4  # a base is down when less is left of its height over the ground at the last reset
-FALLEN_TILT = np.deg2rad(60.0)  # between the base's vertical now and at the last reset
+_FALLEN_HEIGHT = 0.4  # part of the base's height at the last reset: a crouch keeps more, lying down does not
+_FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))  # of the base's tilt since the last reset: no leg brings it back from there
+_LEAST_STATURE = 1e-3  # m: a base that begins lower than this lies on the ground, and its height measures no fall
+_CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
+_FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
+_NORMAL_AND_TANGENTS = np.arange(3)  # places of a contact's forces in the solver's, from its address on
 
 
 @dataclass(frozen=True, eq=False)
 class Push:
     """A force on the robot for a while.
 
-    force: (3,) N, world, at the origin of a frame of the robot; "base" is the base link. start, duration: s.
+    force: (3,) N, world, at the origin of the frame.
+    start, duration: s, on the simulation's clock.
+    frame: name of a frame of the robot; "base" is the base link.
     """
 
     force: Array
@@ -42,28 +46,21 @@ class Push:
 
     def acts_at(self, t: float) -> bool:
         """Whether the push acts in the step that begins at t, s."""
-        return self.start - 1e-9 <= t < self.start + self.duration - 1e-9
-
-
-@dataclass(frozen=True)
-class Ground:
-    """The ground: a plane through the origin. normal: (3,), world, made unit. mu: coefficient of friction with the feet."""
-
-    mu: float = 1.0
-    normal: Array = field(default_factory=lambda: UP)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", positive("friction coefficient mu of the ground", self.mu))
-        object.__setattr__(self, "normal", unit_vector("normal of the ground", self.normal))
+        return self.start - _CLOCK_ERROR <= t < self.start + self.duration - _CLOCK_ERROR
 
 
 class Simulation:
     """A robot on the ground in MuJoCo, driven by joint torques.
 
-    The model is edited from the robot's own URDF: free joint for a floating base, a ball at each foot (or at each
-    corner of a flat foot), a plane with friction, a torque motor with its limit on each joint, rotor inertia as in the
-    robot. Joint friction and damping are off, as in (1)-(7); joint limits of the URDF are on. Only feet and ground touch.
-    ground: a `Ground`, or the coefficient of friction of a level one. timestep: s.
+    MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat foot one at each corner),
+    each joint a torque motor with the robot's limit and rotor inertia, the ground a plane with friction. Joint friction and
+    damping are off, as in (1)-(7); the URDF's joint limits are on. Only feet and ground touch.
+
+    robot: as from `fb.load`.
+    ground: a `Ground`, or the coefficient of friction of a level one.
+    timestep: s.
+
+    `model` and `data` are MuJoCo's own; `feet` are the robot's feet as `Contacts`.
     Raises `SimulationError` when MuJoCo cannot build the robot.
     """
 
@@ -73,30 +70,30 @@ class Simulation:
         self.robot = robot
         self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self.timestep = positive("timestep", timestep, "s")
-        self.model = _build(robot, self.ground, self.timestep)
+        self.feet = Contacts.feet(robot)
+        self.model = build_model(robot, self.ground, self.timestep)
         self.data = mujoco.MjData(self.model)
         self._convert = Conversion(robot, self.model)
         self._motors = np.array([self.model.actuator(name).id for name in robot.joint_names], dtype=int)
-        self._points = {geom: i for i, geom in enumerate(_point_geoms(robot))}
-        self._point_of_geom = {self.model.geom(name).id: i for name, i in self._points.items()}
-        self._wrench = np.zeros(6)
-        self._pushed = self.data.xfrc_applied
-        warning = mujoco.mjtWarning
-        kinds = (warning.mjWARN_BADQPOS, warning.mjWARN_BADQVEL, warning.mjWARN_BADQACC, warning.mjWARN_BADCTRL)
-        self._warnings = [self.data.warning[int(kind)] for kind in kinds]
-        self._geoms = np.array([self.model.geom(name).id for name in self._points], dtype=int)
-        self._below = self.model.geom_size[self._geoms, 0][:, None] * self.ground.normal
+        self._balls = np.array([self.model.geom(name).id for name in self.point_names], dtype=int)
+        self._point_of_geom = np.zeros(self.model.ngeom, dtype=int)
+        self._point_of_geom[self._balls] = np.arange(len(self._balls))
+        self._below = self.model.geom_size[self._balls, :1] * self.ground.normal
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
+        # views into MuJoCo's memory
+        self._base_position = self.data.xpos[self._base]
+        self._base_vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
+        self._fatal_warnings = self.data.warning.number[_FATAL:]
         self.reset()
 
     @property
     def point_names(self) -> tuple[str, ...]:
         """Names of the points of the robot that can touch the ground: feet, or corners of flat feet."""
-        return tuple(self._points)
+        return self.feet.point_names
 
     @property
     def time(self) -> float:
-        """s."""
+        """s since the last reset."""
         return float(self.data.time)
 
     @property
@@ -110,25 +107,29 @@ class Simulation:
         return self._convert.v(self.data.qpos, self.data.qvel)
 
     @property
+    def joints(self) -> tuple[Array, Array]:
+        """Angles, rad (or m), and velocities of the actuated joints, shape (d,) each, as `Actuators` take them."""
+        return self._convert.joints(self.data.qpos, self.data.qvel)
+
+    @property
     def state(self) -> State:
         """The robot's state now."""
         return State(self.robot, self.q, self.v)
 
     @property
     def diverged(self) -> bool:
-        """Whether MuJoCo met numbers it could not go on with since the last reset; it drops torques beyond 1e10."""
-        bad = any(warning.number for warning in self._warnings)
+        """Whether positions, velocities, accelerations or torques became infinite, NaN or larger than MuJoCo takes."""
         qpos, qvel = self.data.qpos, self.data.qvel
-        return bad or not (isfinite(qpos @ qpos) and isfinite(qvel @ qvel))
+        finite = isfinite(qpos @ qpos) and isfinite(qvel @ qvel)  # MuJoCo itself finds out only in the next step
+        return not finite or bool(self._fatal_warnings.any())
 
     @property
     def fallen(self) -> bool:
-        """Whether a floating base is far lower or more tilted than at the last reset."""
+        """Whether a floating base has lost 60 % of its height, or tilts by 60°, since the last reset."""
         if not self.robot.is_floating:
             return False
-        height, up = self._base_pose()
-        sunk = self._upright[0] - height > (1.0 - FALLEN_HEIGHT) * self._stature
-        return sunk or float(up @ self._upright[1]) < np.cos(FALLEN_TILT)
+        sunk = self._start_height - self._base_height() > (1.0 - _FALLEN_HEIGHT) * self._stature
+        return sunk or float(self._base_vertical @ self._start_vertical) < _FALLEN_COSINE
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing upright on the ground's plane by default, at time 0."""
@@ -140,23 +141,23 @@ class Simulation:
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
-        self._upright = self._base_pose()
-        self._stature = self._base_stature(state)
+        self._start_height, self._start_vertical = self._base_height(), self._base_vertical.copy()
+        # what a fall is measured by, m: where the base begins on the ground, its distance from the centre of mass
+        lies = self._start_height <= _LEAST_STATURE
+        self._stature = float(np.linalg.norm(state.com - self._base_position)) if lies else self._start_height
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
-        self.data.ctrl[self._motors] = self._checked_torques(tau)
-        self._pushed[:] = 0.0
+        self.advance(checked("torques", tau, (self.robot.d,), "N·m"), pushes)
+
+    def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
+        """`step` without its check, for loops that have checked the torques already: float64, finite, shape (d,)."""
+        self.data.ctrl[self._motors] = tau
+        self.data.xfrc_applied[:] = 0.0
         for push in pushes:
-            if push.acts_at(self.time):
+            if push.acts_at(self.data.time):
                 self._apply(push)
         mujoco.mj_step(self.model, self.data)
-
-    def _checked_torques(self, tau: npt.ArrayLike) -> npt.ArrayLike:
-        """The torques, or an `InputError`; their square tells in a third of the time that all of them are finite."""
-        if type(tau) is np.ndarray and tau.shape == self._motors.shape and tau.dtype == np.float64 and isfinite(tau @ tau):
-            return tau
-        return checked("torques", tau, (self.robot.d,), "N·m")
 
     def torques(self) -> Array:
         """Torques that the motors gave during the last step, within their limits, shape (d,), N·m."""
@@ -164,40 +165,17 @@ class Simulation:
 
     def contact_forces(self) -> Array:
         """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world, ordered as `point_names`."""
-        forces = np.zeros((len(self._points), 3))
-        for i in range(self.data.ncon):
-            contact = self.data.contact[i]
-            point = self._point_of_geom.get(contact.geom[1], -1)
-            if point < 0 or contact.efc_address < 0:
-                continue
-            mujoco.mj_contactForce(self.model, self.data, i, self._wrench)
-            # rows of the frame: normal from the ground (geom 0) to the foot (geom 1), then two tangents
-            forces[point] += contact.frame.reshape(3, 3).T @ self._wrench[:3]
+        forces = np.zeros((len(self._balls), 3))
+        if self.data.ncon:
+            contact = self.data.contact
+            in_frame = self.data.efc_force[contact.efc_address[:, None] + _NORMAL_AND_TANGENTS]
+            # one plane (geom 0), so one frame for all contacts: its rows are normal and tangents, from the plane to the ball
+            forces[self._point_of_geom[contact.geom[:, 1]]] = in_frame @ contact.frame[0].reshape(3, 3)
         return forces
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the lowest point of each ball along the ground's normal."""
-        return self.data.geom_xpos[self._geoms] - self._below
-
-    def _standing(self) -> State:
-        """The robot standing on the ground; on a slope turned with it, so that every foot touches."""
-        state = self.robot.standing()
-        if not self.robot.is_floating:
-            return state
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(self.ground.normal))
-        attitude = (turn * pin.Quaternion(*state.q[[6, 3, 4, 5]])).normalized()
-        return state.replace(q=np.concatenate([turn.matrix() @ state.q[:3], attitude.coeffs(), state.q[7:]]))
-
-    def _base_pose(self) -> tuple[float, Array]:
-        """Height of the base's origin over the ground, m, and its vertical in the world, shape (3,)."""
-        vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
-        return float(self.ground.normal @ self.data.xpos[self._base]), vertical.copy()
-
-    def _base_stature(self, state: State) -> float:
-        """What a fall is measured by, m: the height of the base at a reset; of a base that begins on the ground or below it,
-        how far the centre of mass is from it."""
-        height = self._upright[0]
-        return height if height > 1e-3 else float(np.linalg.norm(state.com - self.data.xpos[self._base]))
+        return self.data.geom_xpos[self._balls] - self._below
 
     def pushed_body(self, push: Push) -> int:
         """MuJoCo's number of the body that a push acts on.
@@ -220,172 +198,21 @@ class Simulation:
         """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""
         frame, body = self.robot.model.frames[self.robot.frame_id(push.frame)], self.pushed_body(push)
         at = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ frame.placement.translation
-        self._pushed[body, :3] += push.force
-        self._pushed[body, 3:] += np.cross(at - self.data.xipos[body], push.force)
+        self.data.xfrc_applied[body, :3] += push.force
+        self.data.xfrc_applied[body, 3:] += cross(at - self.data.xipos[body], push.force)
+
+    def _standing(self) -> State:
+        """The robot standing on the ground; on a slope turned with it, so that every foot touches."""
+        state = self.robot.standing()
+        if not self.robot.is_floating:
+            return state
+        turn = pin.Quaternion.FromTwoVectors(np.array(UP), np.array(self.ground.normal))
+        attitude = (turn * pin.Quaternion(*state.q[[6, 3, 4, 5]])).normalized()
+        return state.replace(q=np.concatenate([turn.matrix() @ state.q[:3], attitude.coeffs(), state.q[7:]]))
+
+    def _base_height(self) -> float:
+        """Height of the base's origin over the ground, m."""
+        return float(self.ground.normal @ self._base_position)
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"
-
-
-def _build(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
-    """The edited model."""
-    spec = _spec(robot)
-    spec.option.timestep = timestep
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = 100.0  # friction as stiff as the normal: feet creep less
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    if robot.is_floating:
-        spec.body(body_name(robot.base)).add_freejoint()
-    for joint in spec.joints:
-        if joint.name in robot.joint_names:
-            at = robot.model.idx_vs[robot.model.getJointId(joint.name)]
-            joint.armature = float(robot.model.armature[at])
-            joint.damping[:] = 0.0
-            joint.frictionloss = 0.0
-    _add_ground(spec, ground)
-    for foot in robot.feet:
-        _add_foot(spec, foot, ground.mu)
-    for name, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
-        _add_motor(spec, name, float(limit))
-    try:
-        model = spec.compile()
-    except ValueError as error:
-        raise SimulationError(f"MuJoCo cannot build {robot.name} from {robot.urdf.name}: {error}") from None
-    if model.nv != robot.nv:
-        raise SimulationError(
-            f"MuJoCo finds {model.nv} degrees of freedom in {robot.urdf.name}, the robot has {robot.nv}: "
-            "its model was changed after it was read from the URDF."
-        )
-    return model
-
-
-def _spec(robot: Robot) -> mujoco.MjSpec:
-    """The URDF without its shapes: they are the viewer's business, and feet are added as balls."""
-    root = ElementTree.parse(robot.urdf).getroot()
-    if robot.is_floating:
-        _rename_links(root)
-    for link in root.findall("link"):
-        for shape in link.findall("visual") + link.findall("collision"):
-            link.remove(shape)
-    try:
-        spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-    except ValueError as error:
-        raise SimulationError(f"MuJoCo cannot read {robot.urdf.name}: {error}") from None
-    spec.compiler.fusestatic = True  # welded links become one body
-    for body in spec.bodies:
-        if not _is_possible(body):
-            _hand_inertia_on(body)
-    return spec
-
-
-def _rename_links(root: ElementTree.Element) -> None:
-    """Give every link the name that it has as a body: MuJoCo welds a link called world to its own world."""
-    for link in root.findall("link"):
-        link.set("name", body_name(link.get("name", "")))
-    for end in (*root.findall("joint/parent"), *root.findall("joint/child")):
-        end.set("link", body_name(end.get("link", "")))
-
-
-def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
-    """A body's inertia in its own frame, as the URDF gives it."""
-    ixx, iyy, izz, ixy, ixz, iyz = body.fullinertia
-    tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    R = _rotation(body.iquat)  # the tensor's axes may be turned from the body's
-    inertia = pin.Inertia.Zero()  # its constructor refuses tensors that are not positive, and we look for those
-    inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), R @ tensor @ R.T
-    return inertia
-
-
-def _is_possible(body: mujoco.MjsBody) -> bool:
-    """Whether some mass distribution has this inertia: principal values positive, none larger than the two others' sum."""
-    if not np.isfinite(body.fullinertia[0]):
-        return True  # the URDF gives none
-    smallest, middle, largest = np.linalg.eigvalsh(_inertia(body).inertia)
-    return bool(smallest > 1e-15 and smallest + middle >= largest * (1.0 - 1e-9))
-
-
-def _hand_inertia_on(body: mujoco.MjsBody) -> None:
-    """Add a placeholder link's impossible inertia to a welded neighbour's: their sum, which is all that moves, is possible."""
-    welded = {child.name: (child, _placement(child).inverse()) for child in body.bodies if not child.joints}
-    if not body.joints and body.parent.name != "world":
-        welded[body.parent.name] = (body.parent, _placement(body))
-    neighbours = [found for found in welded.values() if np.isfinite(found[0].fullinertia[0])]
-    if not neighbours:
-        return  # MuJoCo will say what is wrong with it
-    neighbour, placement = max(neighbours, key=lambda found: float(found[0].mass))
-    total = _inertia(neighbour) + placement.act(_inertia(body))
-    tensor = total.inertia
-    neighbour.mass, neighbour.ipos, neighbour.iquat = total.mass, total.lever, [1.0, 0.0, 0.0, 0.0]
-    neighbour.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-    body.mass, body.fullinertia, body.explicitinertial = 0.0, [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], False
-
-
-def _placement(body: mujoco.MjsBody) -> pin.SE3:
-    """A body's frame in its parent's."""
-    return pin.SE3(_rotation(body.quat), np.array(body.pos))
-
-
-def _rotation(wxyz: np.ndarray) -> np.ndarray:
-    """The rotation matrix of one of MuJoCo's quaternions."""
-    R = np.zeros(9)
-    mujoco.mju_quat2Mat(R, np.array(wxyz))
-    return R.reshape(3, 3)
-
-
-def _add_ground(spec: mujoco.MjSpec, ground: Ground) -> None:
-    quat = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quat, np.array(ground.normal))
-    plane = spec.worldbody.add_geom(
-        name=_GROUND,
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0.0, 0.0, 0.05],
-        quat=quat,
-        contype=1,
-        conaffinity=0,
-    )
-    _set_contact(plane, ground.mu)
-
-
-def _add_foot(spec: mujoco.MjSpec, foot: Foot, mu: float) -> None:
-    body = spec.body(body_name(foot.frame))
-    if body is None:
-        raise SimulationError(f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links.")
-    for name, centre, radius in _balls(foot):
-        ball = body.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[radius, 0.0, 0.0],
-            pos=centre,
-            mass=0.0,
-            contype=0,
-            conaffinity=1,
-        )
-        _set_contact(ball, mu)
-
-
-def _set_contact(geom: mujoco.MjsGeom, mu: float) -> None:
-    """Friction without spinning or rolling resistance, and a contact as stiff as 1 kHz allows."""
-    geom.condim = 3
-    geom.friction = [mu, 0.0, 0.0]
-    geom.solref = [0.004, 1.0]
-    geom.solimp = [0.95, 0.99, 0.001, 0.5, 2.0]
-
-
-def _balls(foot: Foot) -> list[tuple[str, Array, float]]:
-    """Name, centre in the frame and radius of each ball that a foot stands on."""
-    if foot.corners is None:
-        return [(foot.frame, foot.centre, max(foot.radius, 1e-4))]
-    up = np.array([0.0, 0.0, _CORNER_RADIUS])
-    return [(f"{foot.frame} corner {i}", read_only(c + up), _CORNER_RADIUS) for i, c in enumerate(foot.corners)]
-
-
-def _point_geoms(robot: Robot) -> list[str]:
-    return [name for foot in robot.feet for name, _, _ in _balls(foot)]
-
-
-def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
-    motor = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    motor.set_to_motor()
-    if np.isfinite(limit):
-        motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        motor.ctrlrange = [-limit, limit]

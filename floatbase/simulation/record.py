@@ -1,12 +1,13 @@
-"""`Rollout`: what happened under a controller on the physics, row by row."""
+"""`Rollout`: what happened under a controller on the physics, row by row; `Recorder` collects it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
+import pinocchio as pin
 
 from floatbase._arrays import Array, read_only
 from floatbase.dynamics import Contacts
@@ -19,16 +20,27 @@ Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """What happened, one row for each control tick, taken before the tick's torques act.
+    """What happened: one row for each of n control ticks. Read-only.
 
-    contacts: all that the controller had at any time; its stance at row i is `contacts_at(i)` (`stances`, one for each row,
-    is empty where it never changed). time: (n,) s, the simulation's clock. q: (n, nq). v: (n, nv). tau: (n, d) N·m, the
-    torques applied, within the motors' limits, their mean over the tick. tau_desired: (n, d) N·m, what the controller asked
-    for. planned: (n, k) N, world, the controller's forces at `contacts`, 0 at those that its stance did not have (NaN where
-    it gave no forces). measured: (n, k) N, world, those of the physics during the tick, whether or not the stance had the
-    contact (NaN for a constraint that the physics does not know). foot_positions: (n, points, 3) m, world.
-    outcome: "completed", "fell", "diverged" or "controller failed" (then `error` holds its exception, which may be that its
-    torques were no numbers): the record ends there.
+    contacts: all that the controller had at any time; its stance at row i is `contacts_at(i)`.
+
+    Before the tick:
+    time: (n,) s, the simulation's clock.
+    q, v: (n, nq) and (n, nv), as in `State`.
+    foot_positions: (n, points, 3) m, world, of the contacts' points; NaN for points that the physics does not have.
+
+    During the tick:
+    tau: (n, d) N·m, the torques applied, within the motors' limits; their mean.
+    tau_desired: (n, d) N·m, the controller's.
+    planned: (n, k) N, world, the controller's forces at `contacts`: 0 at those that its stance did not have, NaN where it
+        gave no forces.
+    measured: (n, k) N, world, the physics' forces at `contacts`, whether or not the stance had them; their mean. NaN for
+        contacts that the physics does not have.
+
+    pushes: those handed to `rollout`.
+    outcome: why the record ends there: "completed", "fell", "diverged" or "controller failed".
+    error: of a controller that failed: the exception it raised, or one that names the NaN or infinite torque it gave.
+    stances: the controller's contacts at each row; empty where they were `contacts` throughout.
     """
 
     robot: Robot
@@ -54,11 +66,11 @@ class Rollout:
         return State(self.robot, self.q[i], self.v[i])
 
     def contacts_at(self, i: int) -> Contacts:
-        """The stance of the controller at row i."""
+        """The controller's stance at row i."""
         return self.stances[i] if self.stances else self.contacts
 
     def force(self, contact: str, kind: Literal["measured", "planned"] = "measured") -> Array:
-        """The force of one contact through time, shape (n, 3), N, world: of a flat foot the resultant of its corners.
+        """The force of one contact through time, shape (n, 3), N, world; of a flat foot the resultant of its corners.
 
         contact: its name, as "FL_foot". kind: "measured" or "planned". Raises `UnknownNameError` for other names.
         """
@@ -68,50 +80,123 @@ class Rollout:
 
     @property
     def final(self) -> State:
-        """The last state on record."""
+        """The state at the last row."""
         self._check_not_empty()
         return self.state(-1)
 
-    @property
+    @cached_property
     def com(self) -> Array:
         """Centre of mass at each row, shape (n, 3), m, world."""
-        return read_only(np.reshape([self.state(i).com for i in range(len(self))], (-1, 3)))
-
-    def _check_not_empty(self) -> None:
-        if not len(self):
-            raise InputError(f"this record is empty: {self.outcome}{'' if self.error is None else f', {self.error}'}")
+        model, data = self.robot.model, self.robot.model.createData()
+        return read_only(np.reshape([pin.centerOfMass(model, data, q).copy() for q in self.q], (-1, 3)))
 
     def slip(self) -> Array:
         """How far each contact point strayed from where it was first, shape (points,), m."""
         self._check_not_empty()
         return read_only(np.linalg.norm(self.foot_positions - self.foot_positions[0], axis=2).max(axis=0))
 
+    def _check_not_empty(self) -> None:
+        if not len(self):
+            raise InputError(f"this record is empty: {self.outcome}{'' if self.error is None else f', {self.error}'}")
+
     def __repr__(self) -> str:
         span = f"{len(self)} rows to {self.time[-1]:.3f} s" if len(self) else "no row"
         return f"Rollout({self.robot.name}, {span}, {self.outcome})"
 
 
-class Row(NamedTuple):
-    """One tick: clock, state and feet before it, torques and the physics' point forces (points, 3) during it, the plan."""
+class Recorder:
+    """Collects the rows of a rollout of at most `ticks` ticks: `before` and `during` each tick, `finished` at the end.
 
-    time: float
-    q: Array
-    v: Array
-    tau: Array
-    tau_desired: Array
-    forces: Array
-    feet: Array
-    stance: Contacts
-    planned: Array | None
+    stance: the controller's contacts at the start.
+    """
+
+    def __init__(self, sim: Simulation, stance: Contacts, ticks: int):
+        self._sim, self._first, self._n = sim, stance, 0
+        d, points = sim.robot.d, len(sim.point_names)
+        sizes = {"time": (), "q": (sim.robot.nq,), "v": (sim.robot.nv,), "tau": (d,), "tau_desired": (d,)}
+        self._rows = {name: np.empty((ticks, *size)) for name, size in sizes.items()}
+        self._forces, self._positions = np.empty((ticks, points, 3)), np.empty((ticks, points, 3))  # of the physics' points
+        self._stances: list[Contacts] = []
+        self._plans: list[Array | None] = []
+
+    def before(self, q: Array, v: Array) -> None:
+        """Keep clock, state and feet before a tick. They count when `during` completes the row."""
+        n = self._n
+        self._rows["time"][n], self._rows["q"][n], self._rows["v"][n] = self._sim.time, q, v
+        self._positions[n] = self._sim.contact_positions()
+
+    def during(self, tau: Array, tau_desired: Array, forces: Array, stance: Contacts, planned: Array | None) -> None:
+        """Complete the row.
+
+        tau, tau_desired: (d,) N·m, as in `Rollout`.
+        forces: (points, 3) N, world, the physics' mean forces at its points.
+        stance: the controller's contacts.
+        planned: (k,) N, world, the controller's forces at the stance, or None.
+        """
+        n = self._n
+        self._rows["tau"][n], self._rows["tau_desired"][n], self._forces[n] = tau, tau_desired, forces
+        self._stances.append(stance)
+        self._plans.append(planned)
+        self._n += 1
+
+    def finished(self, pushes: tuple[Push, ...], outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
+        """The record. Raises `InputError` where a contact was of one kind in one stance and of another in a later one."""
+        contacts = self._first
+        for stance in dict.fromkeys(self._stances):
+            contacts = _joined(contacts, stance)
+        measured, positions = self._at_contacts(contacts)
+        return Rollout(
+            self._sim.robot,
+            contacts,
+            **{name: read_only(rows[: self._n]) for name, rows in self._rows.items()},
+            planned=self._planned(contacts),
+            measured=measured,
+            foot_positions=positions,
+            pushes=pushes,
+            outcome=outcome,
+            error=error,
+            stances=() if all(stance is contacts for stance in self._stances) else tuple(self._stances),
+        )
+
+    def _planned(self, contacts: Contacts) -> Array:
+        """Planned forces at the contacts, shape (n, k)."""
+        forces, entries = np.full((self._n, contacts.k), np.nan), {}
+        for stance in dict.fromkeys(self._stances):
+            parts = [np.r_[contacts.force_slice(name)] for name in stance.names]
+            entries[stance] = np.concatenate([np.zeros(0, dtype=int), *parts])
+        for row, stance, planned in zip(forces, self._stances, self._plans, strict=True):
+            if planned is not None:
+                row[:] = 0.0
+                row[entries[stance]] = planned
+        return read_only(forces)
+
+    def _at_contacts(self, contacts: Contacts) -> tuple[Array, Array]:
+        """Forces (n, k) and positions (n, points, 3) of the contacts from those of the physics' feet; NaN where it has none.
+
+        A point contact in the middle of a flat foot takes the sum of its corners' forces and the mean of their positions.
+        """
+        n, feet = self._n, self._sim.feet
+        all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
+        for contact in contacts:
+            forces, positions = np.full((n, contact.k), np.nan), np.full((n, len(contact.point_names), 3), np.nan)
+            if contact.name in feet.names:
+                part = feet.force_slice(contact.name)
+                points = slice(part.start // 3, part.stop // 3)
+                if contact.point_names == feet[contact.name].point_names:
+                    forces, positions = self._forces[:n, points].reshape(n, contact.k), self._positions[:n, points]
+                elif len(contact.point_names) == 1:
+                    forces = self._forces[:n, points].sum(axis=1)
+                    positions = self._positions[:n, points].mean(axis=1, keepdims=True)
+            all_forces.append(forces)
+            all_positions.append(positions)
+        return read_only(np.concatenate(all_forces, axis=1)), read_only(np.concatenate(all_positions, axis=1))
 
 
-def joined(contacts: Contacts, stance: Contacts) -> Contacts:
-    """The contacts and those of a stance that are not among them yet, by name.
+def _joined(contacts: Contacts, stance: Contacts) -> Contacts:
+    """The contacts and, after them, those of a stance whose names are not among them yet.
 
     Raises `InputError` for a contact that has become one of another kind.
     """
-    if stance is contacts:
-        return contacts
     for contact in stance:
         if contact.name in contacts.names and contact.k != contacts[contact.name].k:
             raise InputError(
@@ -120,75 +205,3 @@ def joined(contacts: Contacts, stance: Contacts) -> Contacts:
             )
     new = [contact for contact in stance if contact.name not in contacts.names]
     return contacts + Contacts(new) if new else contacts
-
-
-def recorded(
-    sim: Simulation,
-    contacts: Contacts,
-    rows: Sequence[Row],
-    *,
-    pushes: tuple[Push, ...],
-    outcome: Outcome,
-    error: FloatbaseError | None,
-) -> Rollout:
-    """The record of rows, with the forces of all contacts that the rows' stances have."""
-    robot, points = sim.robot, len(sim.point_names)
-    sizes = ((), (robot.nq,), (robot.nv,), (robot.d,), (robot.d,), (points, 3), (points, 3))
-    time, q, v, tau, tau_desired, forces, feet = (
-        read_only([row[i] for row in rows]).reshape((len(rows), *size)) for i, size in enumerate(sizes)
-    )
-    measured, positions = _measured(contacts, sim.point_names, forces, feet)
-    stances = tuple(row.stance for row in rows)
-    return Rollout(
-        robot,
-        contacts,
-        time=time,
-        q=q,
-        v=v,
-        tau=tau,
-        tau_desired=tau_desired,
-        planned=_planned(contacts, rows),
-        measured=measured,
-        foot_positions=positions,
-        pushes=pushes,
-        outcome=outcome,
-        error=error,
-        stances=() if all(stance is contacts for stance in stances) else stances,
-    )
-
-
-def _planned(contacts: Contacts, rows: Sequence[Row]) -> Array:
-    """Planned forces in the entries of all contacts, shape (n, k): 0 at contacts that a row's stance does not have."""
-    forces = np.full((len(rows), contacts.k), np.nan)
-    for i, row in enumerate(rows):
-        if row.planned is None:
-            continue
-        forces[i] = 0.0
-        for name in row.stance.names:
-            forces[i, contacts.force_slice(name)] = row.planned[row.stance.force_slice(name)]
-    return read_only(forces)
-
-
-def _measured(contacts: Contacts, names: tuple[str, ...], forces: Array, feet: Array) -> tuple[Array, Array]:
-    """Forces (n, k) and positions (n, points, 3) of the contacts from those of the physics' points, both (n, names, 3).
-
-    A point contact in the middle of a flat foot takes all its corners. NaN for what the physics does not know.
-    """
-    columns = _columns(contacts, names)
-    known = columns.sum(axis=1) > 0
-    measured = np.full((len(forces), contacts.k), np.nan)
-    at_points = np.where(known[:, None], columns @ forces, np.nan)
-    measured[:, contacts.point_entries] = at_points.reshape(len(forces), 3 * contacts.n_points)
-    count = np.maximum(columns.sum(axis=1, keepdims=True), 1.0)
-    return read_only(measured), read_only(np.where(known[:, None], columns @ feet / count, np.nan))
-
-
-def _columns(contacts: Contacts, measured: tuple[str, ...]) -> Array:
-    """Which measured points make up each point of the contacts, shape (n, n_measured), of 0 and 1.
-
-    A point contact in the middle of a flat foot takes all its corners.
-    """
-    match = [
-        [float(name == point or name.startswith(f"{point} corner ")) for name in measured] for point in contacts.point_names
-    ]
-    return np.array(match).reshape(contacts.n_points, len(measured))

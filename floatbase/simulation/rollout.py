@@ -7,17 +7,19 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.simulation.physics import Push, Simulation
-from floatbase.simulation.record import Outcome, Rollout, Row, joined, recorded
+from floatbase.simulation.record import Recorder, Rollout
+
+_PERIOD_ERROR = 1e-6  # part of a period by which a time may miss a whole number of them: how people round
+_TIME_ERROR = 1e-9  # part of the time by which it may: the rounding of many periods
 
 
 class Controller(Protocol):
-    """Anything that gives torques for a state: its answer has `.tau`, shape (d,), N·m, and may have `.forces`, shape (k,).
+    """Anything that gives torques for a state: its answer has `.tau`, shape (d,), N·m, and may have `.forces`, shape (k,), N.
 
     It may have an attribute `contacts`, a `Contacts`: the stance that its last answer was for, which may change from one
     tick to the next. Without it all feet are taken.
@@ -28,12 +30,15 @@ class Controller(Protocol):
 
 
 class Actuators(Protocol):
-    """What stands between the torques a controller asks for and those the joints get, with a memory of its own."""
+    """What stands between the torques that a controller desires and those that the joints get; it may have a memory."""
 
     def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
         """The torques of the next dt s, shape (d,), N·m.
 
-        q_joints, v_joints: (d,) rad and rad/s, positions and velocities of the joints now.
+        tau_desired: (d,) N·m, the controller's.
+        q_joints: (d,) rad, angles of the joints now.
+        v_joints: (d,) rad/s, their velocities.
+        dt: s.
         """
 
 
@@ -45,58 +50,57 @@ def rollout(
     control_period: float | None = None,
     actuators: Actuators | None = None,
 ) -> Rollout:
-    """Run a controller on the physics for `duration` s, a whole number of control periods, from its present state.
+    """Run a controller on the physics from its present state.
 
-    pushes: forces on the robot; their start is on the simulation's clock, which a reset sets to 0. control_period: s,
-    a whole multiple of the simulation's timestep, which it is by default. actuators: what the commanded torques pass
-    through in every step of the physics, such as `HydraulicActuators`; none by default, then joints get what was asked
-    for. They keep their state from one rollout to the next: reset them yourself, `actuators.reset(…)`, with the
-    simulation.
-    A controller that changes its stance shows the present one as `.contacts`. A fall, a divergence of the physics, a
-    controller that finds no answer or torques that are no numbers end the rollout; the record up to there is returned and
-    says so.
-    Raises `InputError` for a period or a duration that does not divide, a push that is none or moves nothing, a controller
-    that cannot be called as controller(q, v, t), and an answer without `.tau`.
+    sim: the physics; where it ends, the next rollout goes on.
+    controller: called as controller(q, v, t) once in each control period; see `Controller`.
+    duration: s, a whole number of control periods.
+    pushes: forces on the robot; they start on the simulation's clock, which a reset sets to 0.
+    control_period: s, a whole number of the simulation's timesteps; one by default.
+    actuators: what the controller's torques pass through in every timestep, such as `HydraulicActuators`; without it the
+        joints get the controller's torques, within the motors' limits. Its memory lasts from one rollout to the next: reset
+        it with the simulation.
+
+    A fall, a divergence of the physics, an error of the package that the controller raises, NaN or infinite torques end the
+    rollout: `outcome` says so, and the rows up to there are returned.
+    Raises `InputError` for a control period or a duration that is no whole number of periods, for a push that moves nothing,
+    for a controller that cannot be called as controller(q, v, t), and for an answer without `.tau`.
     """
     _check(sim, controller, pushes)
     period = sim.timestep if control_period is None else control_period
     substeps = _multiple("control_period", period, "the simulation's timestep", sim.timestep)
     ticks = _multiple("duration", duration, "the control period", substeps * sim.timestep)
-    run = _Run(sim, controller, tuple(pushes), actuators)
-    outcome: Outcome = "completed"
-    error: FloatbaseError | None = None
+    loop = _Loop(sim, controller, tuple(pushes), actuators)
+    record = Recorder(sim, loop.stance(), ticks)
     for _ in range(ticks):
-        try:
-            command = controller(sim.q, sim.v, sim.time)
-        except FloatbaseError as failure:
-            outcome, error = "controller failed", failure
-            break
-        try:
-            run.tick(command, substeps)
-        except _NotFinite as failure:
-            outcome, error = "controller failed", failure
-            break
+        failure = loop.tick(substeps, record)
+        if failure is not None:
+            return record.finished(loop.pushes, "controller failed", failure)
         if sim.diverged:
-            outcome = "diverged"
-            break
+            return record.finished(loop.pushes, "diverged")
         if sim.fallen:
-            outcome = "fell"
-            break
-    return run.record(outcome, error)
+            return record.finished(loop.pushes, "fell")
+    return record.finished(loop.pushes, "completed")
 
 
 def _multiple(name: str, time: float, unit: str, period: float) -> int:
-    """How many periods, s, make up a time, s; `InputError` where it is no whole number of them."""
+    """How many periods, s, make up a time, s.
+
+    name, time: of what is checked.
+    unit, period: what the period is of, and how long.
+
+    Raises `InputError` where it is no whole number of them.
+    """
     time = positive(name, time, "s")
     count = round(time / period)
-    if count < 1 or abs(count * period - time) > 1e-6 * period + 1e-9 * time:
+    if count < 1 or abs(count * period - time) > _PERIOD_ERROR * period + _TIME_ERROR * time:
         near = max(count, 1) * period
         raise InputError(f"{name} {time:g} s is not a whole multiple of {unit} {period:g} s; {near:g} s would be.")
     return count
 
 
 def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> None:
-    """What a rollout is handed must be of the right kind, and of one robot."""
+    """Raise `InputError` for what is of another kind or of another robot."""
     if not isinstance(sim, Simulation):
         raise InputError(f"rollout needs a Simulation first, as fb.Simulation(robot), not {sim!r}.")
     if not callable(controller):
@@ -116,7 +120,7 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
 
 
 def _check_call(controller: Controller) -> None:
-    """A controller must take (q, v, t). What does not tell its parameters, as some that are not Python, is let pass."""
+    """Raise `InputError` for a controller that does not take (q, v, t). Compiled ones that hide their parameters pass."""
     try:
         signature = inspect.signature(controller)
     except (TypeError, ValueError):
@@ -132,83 +136,85 @@ def _check_call(controller: Controller) -> None:
 
 
 class _NotFinite(InputError):
-    """Torques that are no numbers: an outcome, where other mistakes in a controller are raised."""
+    """NaN or infinite torques: they end the rollout, where other mistakes in a controller are raised."""
 
 
-class _Run:
-    """The rows collected on the way."""
+class _Loop:
+    """One tick after the other."""
 
     def __init__(self, sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None):
-        self.sim = sim
-        self.controller = controller
-        self.pushes = pushes
-        self.actuators = actuators
-        self.feet = Contacts.feet(sim.robot)
-        self.contacts = self._stance()
-        self.rows: list[Row] = []
+        self._sim, self._controller, self._actuators, self.pushes = sim, controller, actuators, pushes
 
-    def tick(self, command: Any, substeps: int) -> None:
-        """Apply one command for its period and keep what was there before and during it."""
-        desired = self._desired(command)
-        stance = self._stance()
-        planned = self._planned(command, stance)
-        if not self.rows or stance is not self.rows[-1].stance:
-            self.contacts = joined(self.contacts, stance)
-        sim = self.sim
-        time, q, v, feet = sim.time, sim.q, sim.v, sim.contact_positions()
+    def tick(self, substeps: int, record: Recorder) -> FloatbaseError | None:
+        """Ask the controller once, go on for that many timesteps, and record it; the error where there are no torques."""
+        sim = self._sim
+        q, v = sim.q, sim.v
+        record.before(q, v)
+        try:
+            command = self._controller(q, v, sim.time)
+        except FloatbaseError as failure:
+            return failure
+        try:
+            self._apply(command, substeps, record)
+        except _NotFinite as failure:
+            return failure
+        return None
+
+    def stance(self) -> Contacts:
+        """The controller's contacts now; all feet when it names none."""
+        contacts = getattr(self._controller, "contacts", None)
+        return contacts if isinstance(contacts, Contacts) else self._sim.feet
+
+    def _apply(self, command: Any, substeps: int, record: Recorder) -> None:
+        """Let a command act for its period, and record it."""
+        sim, stance = self._sim, self.stance()
+        desired, planned = self._desired(command), _planned(command, stance)
         forces, applied = np.zeros((len(sim.point_names), 3)), np.zeros(sim.robot.d)
         for _ in range(substeps):
-            sim.step(self._actuated(desired), self.pushes)
-            forces += sim.contact_forces() / substeps
-            applied += sim.torques() / substeps
-        self.rows.append(Row(time, q, v, applied, desired, forces, feet, stance, planned))
+            sim.advance(self._actuated(desired), self.pushes)
+            forces += sim.contact_forces()
+            applied += sim.torques()
+        record.during(applied / substeps, desired, forces / substeps, stance, planned)
 
     def _desired(self, command: Any) -> Array:
-        """The torques of a command, shape (d,)."""
+        """The torques of a command, shape (d,), N·m."""
         if not hasattr(command, "tau"):
-            d = self.sim.robot.d
+            d = self._sim.robot.d
             raise InputError(
                 f"a controller must answer with .tau, shape ({d},), N·m, as a Command does; got {command!r}. Any object "
                 f"with .tau will do: types.SimpleNamespace(tau=…)."
             )
-        return self._finite("the controller's torques", command.tau)
-
-    def _stance(self) -> Contacts:
-        """The contacts that the controller has now; all feet when it names none."""
-        contacts = getattr(self.controller, "contacts", None)
-        return contacts if isinstance(contacts, Contacts) else self.feet
-
-    def _planned(self, command: Any, stance: Contacts) -> Array | None:
-        """The forces of a command, shape (k,), or None where it has none."""
-        forces = getattr(command, "forces", None)
-        if forces is None:
-            return None
-        planned = np.array(forces, dtype=np.float64)
-        if planned.shape != (stance.k,):
-            raise InputError(
-                f"the controller planned forces of shape {planned.shape}; its contacts ({', '.join(stance.names)}) have "
-                f"{stance.k} numbers. A controller that changes its stance has the present one as its .contacts."
-            )
-        return planned
+        return self._checked("the controller's torques", command.tau)
 
     def _actuated(self, desired: Array) -> Array:
-        """The torques the joints get in the next step when these are wanted, N·m."""
-        if self.actuators is None:
+        """The torques that the joints get in the next timestep, shape (d,), N·m."""
+        if self._actuators is None:
             return desired
-        sim, robot = self.sim, self.sim.robot
-        # joints without limits are stored as (cos, sin); the way from the neutral configuration holds their angles
-        q_joints = pin.difference(robot.model, pin.neutral(robot.model), sim.q)[robot.nv - robot.d :]
-        tau = self.actuators.step(desired, q_joints, sim.v[robot.nv - robot.d :], sim.timestep)
-        return self._finite("the actuators' torques", tau)
+        tau = self._actuators.step(desired, *self._sim.joints, self._sim.timestep)
+        return self._checked("the actuators' torques", tau)
 
-    def _finite(self, name: str, tau: Any) -> Array:
-        """The torques, shape (d,); `_NotFinite` where they are no numbers."""
-        tau = np.array(tau, dtype=np.float64)
-        if tau.shape == (self.sim.robot.d,) and not np.all(np.isfinite(tau)):
-            joint = self.sim.robot.joint_names[int(np.argmin(np.isfinite(tau)))]
-            raise _NotFinite(f"{name} hold {tau[~np.isfinite(tau)][0]} at {joint} at {self.sim.time:.3f} s.")
-        return checked(name, tau, (self.sim.robot.d,), "N·m")
+    def _checked(self, name: str, tau: Any) -> Array:
+        """Torques as a read-only array, shape (d,). Raises `_NotFinite`, or `InputError` for another shape."""
+        sim = self._sim
+        try:
+            return checked(name, tau, (sim.robot.d,), "N·m")
+        except InputError:
+            if np.shape(tau) != (sim.robot.d,):
+                raise
+            i = int(np.argmin(np.isfinite(tau)))
+            joint = sim.robot.joint_names[i]
+            raise _NotFinite(f"{name} hold {np.asarray(tau)[i]} at {joint} at {sim.time:.3f} s.") from None
 
-    def record(self, outcome: Outcome, error: FloatbaseError | None) -> Rollout:
-        """The finished value."""
-        return recorded(self.sim, self.contacts, self.rows, pushes=self.pushes, outcome=outcome, error=error)
+
+def _planned(command: Any, stance: Contacts) -> Array | None:
+    """A copy of a command's forces, shape (k,), N, world, or None where it has none."""
+    forces = getattr(command, "forces", None)
+    if forces is None:
+        return None
+    planned = np.array(forces, dtype=np.float64)
+    if planned.shape != (stance.k,):
+        raise InputError(
+            f"the controller planned forces of shape {planned.shape}; its contacts ({', '.join(stance.names)}) have "
+            f"{stance.k} numbers. A controller that changes its stance has the present one as its .contacts."
+        )
+    return planned

@@ -1,8 +1,11 @@
-"""The viewer: the picture of a state in the page, played, plotted and saved."""
+"""The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and saves them.
+
+`Viewer` draws. `View` says from where it looks. `shapes`, `marks` and `props` make further items for a picture, `plots` makes
+figures of a rollout, and `FIGURES` are the document's figures. `page` and `wire` are for programs that write web pages.
+"""
 
 from floatbase.viewer import geometry, marks, page, plots, props, recording, shapes, wire
 from floatbase.viewer.camera import PRESETS, View
-from floatbase.viewer.canvas import Canvas
 from floatbase.viewer.colours import (
     ALARM,
     BACKGROUNDS,
@@ -18,14 +21,11 @@ from floatbase.viewer.colours import (
     X_AXIS,
     hexadecimal,
 )
-from floatbase.viewer.displays import Displays
 from floatbase.viewer.figures import FIGURES
-from floatbase.viewer.lowering import code
 from floatbase.viewer.meshes import robot_meshes
-from floatbase.viewer.painter import below, nice
+from floatbase.viewer.painter import below
 from floatbase.viewer.recording import push_at
 from floatbase.viewer.shapes import Item, Picture
-from floatbase.viewer.text import text_picture
 from floatbase.viewer.viewer import Viewer
 from floatbase.viewer.visuals import Piece, urdf_visuals
 from floatbase.viewer.window import Window
@@ -45,8 +45,6 @@ __all__ = [
     "PRESETS",
     "WARNING",
     "X_AXIS",
-    "Canvas",
-    "Displays",
     "Item",
     "Picture",
     "Piece",
@@ -54,11 +52,9 @@ __all__ = [
     "Viewer",
     "Window",
     "below",
-    "code",
     "geometry",
     "hexadecimal",
     "marks",
-    "nice",
     "page",
     "plots",
     "props",
@@ -66,7 +62,6 @@ __all__ = [
     "recording",
     "robot_meshes",
     "shapes",
-    "text_picture",
     "urdf_visuals",
     "wire",
 ]

@@ -1,4 +1,4 @@
-"""From where the page looks at the robot."""
+"""The camera: from where the page looks at the robot."""
 
 from __future__ import annotations
 
@@ -15,13 +15,16 @@ from floatbase.errors import InputError
 
 @dataclass(frozen=True)
 class View:
-    """A direction to look from.
+    """A direction to look from, and what fills the picture.
 
-    azimuth: degrees around the vertical, 0 in front of the robot (+x), 90 at its left (+y). elevation: degrees above the
-    ground. distance: 1 fills the picture with the robot. angle: vertical field of view, degrees. feet: fill it with the
-    robot's feet instead. around: a point, m, world, and a radius, m, to fill it with instead of the robot.
-    Raises `InputError` for what no camera can do: an elevation beyond ±90, an angle that is not between 0 and 180, a distance
-    or a radius that is not above 0, and numbers that are not finite.
+    azimuth: degrees around the vertical; 0 is in front of the robot (+x), 90 at its left (+y).
+    elevation: degrees above the horizontal.
+    distance: 1 fills the picture; 2 is twice as far away.
+    angle: vertical field of view, degrees.
+    feet: whether the robot's feet fill the picture, instead of the whole robot.
+    around: a point, (3,), m, world, and a radius, m: this ball fills the picture, instead of the robot.
+    Raises `InputError` for an elevation beyond ±90, an angle not between 0 and 180, a distance or radius that is not
+    positive, and numbers that are not finite.
     """
 
     azimuth: float = 40.0
@@ -68,8 +71,11 @@ PRESETS = {
 }
 
 
-def eye_and_target(view: View, low: Array, high: Array) -> tuple[Array, Array]:
-    """The point looked at and the point looked from, m, world, so that the box from `low` to `high` fills the picture."""
+def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
+    """The point that the camera looks at, and where the camera is: (3,) each, m, world.
+
+    low, high: (3,), m, world, corners of the box that fills the picture.
+    """
     if view.around is None:
         target, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     else:

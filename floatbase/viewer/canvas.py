@@ -1,4 +1,4 @@
-"""The picture that a window shows: told what it should be, it sends only what is different."""
+"""The canvas: it is given whole pictures, and sends the window only what changes from one to the next."""
 
 from __future__ import annotations
 
@@ -10,42 +10,45 @@ ROOT = "/meshcat/"
 
 
 class Canvas:
-    """A window that is drawn on by whole pictures: path -> item. What a picture does not hold is removed."""
+    """Draws whole pictures (path -> item) into a window. What the next picture does not contain is removed.
+
+    picture: what the window shows now.
+    """
 
     def __init__(self, window: Window):
         self.window = window
         self.picture: Picture = {}
-        self._torn = False
+        self._interrupted = False
         self._settings: dict[wire.Key, bytes] = {}
 
     def draw(self, picture: Picture) -> int:
-        """Show this picture and nothing else, in one frame; return how many commands that took."""
-        updates = [wire.delete(ROOT)] if self._torn else []
-        old: Picture = {} if self._torn else self.picture
+        """Show this picture and nothing else. Returns how many commands that took; all go into one frame."""
+        updates = [wire.delete(ROOT)] if self._interrupted else []
+        old: Picture = {} if self._interrupted else self.picture
         updates += [wire.delete(ROOT + path) for path in old if path not in picture]
         for path, item in picture.items():
             updates += _changes(ROOT + path, old.get(path), item)
         if updates:
-            self._torn = True  # stays so when an interrupt comes between here and the end: the next picture starts afresh
+            self._interrupted = True  # stays so when an interrupt comes before the end: the next picture is drawn anew
             self.window.put(updates)
         self.picture = dict(picture)
-        self._torn = False
+        self._interrupted = False
         return len(updates)
 
     def set(self, *updates: wire.Update) -> None:
-        """Send settings of the page, as background, camera and title, but those that are so already."""
+        """Send settings of the page (background, camera, title and the like), except those that were sent already."""
         fresh = [(key, command) for key, command in updates if self._settings.get(key) != command]
         if fresh:
             self.set_again(*fresh)
 
     def set_again(self, *updates: wire.Update) -> None:
-        """Send settings of the page, also those that are so already: the reader may have changed them there."""
+        """Send settings of the page, also those that were sent already: the reader may have changed them in the page."""
         self.window.put(updates)
         self._settings.update(updates)
 
 
 def _changes(path: str, old: Item | None, new: Item) -> list[wire.Update]:
-    """The commands that lead from one item to another at the same path."""
+    """The commands that change the item at a path from `old`, None if there is none, to `new`."""
     updates = []
     anew = old is None or old.shape is not new.shape
     if anew:

@@ -1,7 +1,7 @@
-"""The one colour code, in 3-D and in plots: colour-blind safe (Okabe and Ito), RGB from 0 to 1.
+"""The colours of all 3-D pictures and plots, RGB from 0 to 1, safe for the colour-blind (Okabe and Ito).
 
-Dark blue is what was measured, light blue what was planned. A friction cone is green while its force is inside, orange when
-a facet or the cone's surface is reached, vermilion when the force is outside, and a faint grey where there is no force.
+Measured forces are dark blue, planned forces light blue. A friction cone is green when its force is inside, orange when the
+force reaches a facet or the surface, vermilion when it is outside, and a faint grey when there is no force.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ CALM = _rgb("#009E73")
 WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
-SUPPORT = CALM  # veiled, on the ground
-PUSH = _rgb("#222222")  # on a dark background, the colour of its text
+SUPPORT = CALM
+PUSH = _rgb("#222222")  # on a dark background it is light, as text is
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
@@ -33,9 +33,9 @@ X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")
 Z_AXIS = _rgb("#0072B2")
 
-GHOST_NAME = "wanted posture"  # unless it is called something else
+GHOST_NAME = "desired posture"  # in the legend, unless `show` gets another name
 
-# part of a picture, its colour, and what it is: the legend, in this order
+# the legend, in this order: first part of the item's path, colour, meaning
 LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("measured", MEASURED, "measured force"),
     ("planned", PLANNED, "planned force"),
@@ -50,11 +50,11 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("ghost", GHOST, GHOST_NAME),
 )
 
-# cone status -> colour, in the order of growing worry; and how opaque
+# status of a friction cone -> its colour and its opacity
 CONE = {"idle": IDLE, "inside": CALM, "active": WARNING, "outside": ALARM}
 CONE_ALPHA = {"idle": 0.12, "inside": 0.28, "active": 0.28, "outside": 0.28}
 
-# background -> (top, bottom) of the page, colour of the ground's lines, colour of text
+# background -> colours of the page's top and bottom, of the ground's lines, and of text
 BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
     "white": (_rgb("#FFFFFF"), _rgb("#FFFFFF"), _rgb("#DDDDDD"), _rgb("#222222")),
     "light": (_rgb("#FBFCFE"), _rgb("#DFE5EC"), _rgb("#BCC5CF"), _rgb("#222222")),
@@ -68,5 +68,5 @@ def hexadecimal(colour: RGB) -> str:
 
 
 def with_alpha(colour: RGB, alpha: float) -> RGBA:
-    """The colour, so opaque: 0 is not seen, 1 hides what is behind."""
+    """The colour with an opacity: 0 is invisible, 1 hides what is behind."""
     return (*colour, alpha)

@@ -1,17 +1,17 @@
-"""Which page of a window shows what: the newest display in a notebook is live, earlier ones keep the picture they had."""
+"""Several displays of one viewer in a notebook: the newest is live, each earlier one keeps its picture."""
 
 from __future__ import annotations
 
-from floatbase.viewer.wire import Scene
+from floatbase.viewer.scene import Scene
 
-KEPT = 20  # pictures kept at most; what they share with each other and with the live scene is held once
+KEPT = 20  # pictures at most; they share their commands with each other and with the live scene
 
 
 class Displays:
-    """The displays of one scene, numbered from 1 as they open.
+    """The displays of one scene, numbered from 1 in the order in which they open.
 
-    A new display usually shows what its cell has just drawn. So an earlier one keeps the scene as it was before that cell
-    began, or when the last display opened, whichever is later; `mark` is to be called before each cell.
+    A new display usually shows what its cell has just drawn. So the display before it keeps the scene as it was when that
+    cell began, or when the display before it opened, if that was later. `begin_cell` must be called before each cell.
     """
 
     def __init__(self, scene: Scene):
@@ -20,19 +20,19 @@ class Displays:
         self._before = scene.copy()
         self._kept: dict[int, Scene] = {}
 
-    def mark(self) -> None:
-        """What is drawn from here on belongs to the next display."""
+    def begin_cell(self) -> None:
+        """From now on, what is drawn belongs to the next display."""
         self._before = self._scene.copy()
 
     def open(self) -> int:
-        """Open a display and return its number; the one before keeps its picture from here on."""
+        """Open a display and return its number. The display before it keeps its picture from now on."""
         if self.newest:
             self._kept[self.newest] = self._before
             self._kept.pop(self.newest - KEPT, None)
         self.newest += 1
-        self.mark()
+        self.begin_cell()
         return self.newest
 
     def kept(self, number: int) -> Scene | None:
-        """The scene that a display keeps; None for one that is live, unknown, or too old."""
+        """The scene that a display keeps; None for a display that is live, unknown, or too old."""
         return self._kept.get(number)

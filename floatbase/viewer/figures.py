@@ -1,7 +1,7 @@
-"""The document's figures as scenes: each function gives a `Viewer` with the figure drawn.
+"""The document's figures as 3-D scenes: each function returns a `Viewer` that shows one figure.
 
-Figure 1 left: a robot bolted to the ground. Figure 1 right: a floating base. Figure 2: the quadruped whose centre of mass
-is steered. Figure 3 left and right: the friction cone, and the plane through normal and force.
+Figure 1: left a robot bolted to the ground, right a floating base. Figure 2: a quadruped, its base, centre of mass and feet.
+Figure 3: left the friction cone, right the plane through normal and force.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ MU = 0.7
 
 
 def figure_1_left(background: str = "white") -> Viewer:
-    """A fixed-base robot pushes a wall: the wall's force f_r, and the moment τ_b by which the bolts keep the base where it is.
+    """A fixed-base robot pushes a wall: the force f_r of the wall, and the moment τ_b of the bolts, which hold the base.
 
-    (1) needs no such term: the bolts answer whatever comes. τ_b = -(p - p_base) × f_r, as the ground exerts it on the base.
+    τ_b = -(p - p_base) × f_r, as the ground exerts it on the base. (1) has no such term: bolts bear any moment.
     """
     robot = load("ur5")
     view = Viewer(robot, background=background)
@@ -48,7 +48,7 @@ def figure_1_left(background: str = "white") -> Viewer:
 
 
 def figure_1_right(background: str = "white") -> Viewer:
-    """A floating base: the contact forces f_i add up to the force f_c and the moment τ_c at the centre of mass, (20)(21)."""
+    """A floating base: the contact forces f_i sum to the force f_c and the moment τ_c at the centre of mass, (20)(21)."""
     robot = load("go2")
     view = Viewer(robot, background=background, scale=0.004)
     state, scale = robot.standing(), 0.004
@@ -69,14 +69,14 @@ def figure_1_right(background: str = "white") -> Viewer:
 
 
 def figure_2(background: str = "white") -> Viewer:
-    """A quadrupedal robot: its base frame, its centre of mass x_c, which is another point, and its feet x_i."""
+    """A quadrupedal robot: its base frame, its centre of mass x_c (another point), and its feet x_i."""
     robot = load("go2")
     view = Viewer(robot, background=background)
     state = robot.standing()
     contacts = Contacts.points(robot, MU)
     positions = contacts.positions(state)
     labels = {f"x{{{i + 1}}}": _outside(position, state.com) for i, position in enumerate(positions)}
-    labels["x{4}"] = positions[3] + [-0.06, 0.04, 0.01]  # behind the robot: outside would be hidden by its own foot
+    labels["x{4}"] = positions[3] + [-0.06, 0.04, 0.01]  # behind the robot, since its own foot would hide it outside
     labels["x{c}"] = state.com + [0.065, -0.035, -0.035]
     pose = state.frame_pose(robot.base).homogeneous
     labels["base"] = pose[:3, 3] + [0.0, 0.0, 0.24]
@@ -90,7 +90,7 @@ def figure_2(background: str = "white") -> Viewer:
 
 
 def figure_3_left(background: str = "white") -> Viewer:
-    """(28) The friction cone: a force f, its part f_⊥ along the normal and its part f_∥ along the surface."""
+    """(28) The friction cone: a force f, its normal part f_⊥ and its tangential part f_∥."""
     view, along, across = _cone_stage(background)
     force = along + across
     picture = _cone() | {
@@ -106,7 +106,7 @@ def figure_3_left(background: str = "white") -> Viewer:
 
 
 def figure_3_right(background: str = "white") -> Viewer:
-    """(28) In the plane of normal and force: α_∥ cannot be larger than μ α_⊥."""
+    """(28) The plane through normal and force: α_∥ is at most μ α_⊥."""
     view, along, across = _cone_stage(background)
     height, most = along[2], MU * along[2]
     plane = np.array([[0, 0, 0], [0, MU * 0.8, 0.8], [0, -MU * 0.8, 0.8]], dtype=float)
@@ -141,20 +141,20 @@ FIGURES: dict[str, Callable[..., Viewer]] = {
 
 
 def _example_forces(weight: float) -> Array:
-    """Forces at four feet, (4, 3), N, inside their cones, that lean and carry the weight unevenly."""
+    """Forces at four feet, (4, 3), N: they carry the weight unevenly, and lean, inside their cones."""
     shares = np.array([0.32, 0.21, 0.27, 0.20])
     lean = np.array([[-0.25, 0.15, 1.0], [0.30, 0.20, 1.0], [0.10, 0.35, 1.0], [-0.35, 0.20, 1.0]])
     return weight * shares[:, None] * lean
 
 
 def _cone_stage(background: str) -> tuple[Viewer, Array, Array]:
-    """A viewer for a cone alone, and the two parts of a force in it, m."""
+    """A viewer for a cone alone, and the normal and the tangential part of a force in it, drawn in m."""
     view = Viewer(load("go2"), background=background)
     return view, np.array([0.0, 0.0, 0.6]), np.array([0.0, 0.26, 0.0])
 
 
 def _cone() -> Picture:
-    """A cone 0.8 m high at the origin."""
+    """A friction cone 0.8 m high at the origin, with its contact patch."""
     return {
         "shape/cone": shapes.friction_cone(np.zeros(3), [0.0, 0.0, 1.0], MU, 0.8, "inside"),
         "patch/contact": shapes.contact_patch(np.zeros(3), [0.0, 0.0, 1.0], 0.05),
@@ -169,13 +169,13 @@ def _rod(start: Array, end: Array, colour: RGB) -> shapes.Item:
 
 
 def _outside(position: Array, centre: Array) -> Array:
-    """A point beside a foot, away from the robot."""
+    """A point 7 cm beside a foot, away from the robot's centre."""
     away = (position - centre) * [1.0, 1.0, 0.0]
     return np.asarray(position + 0.07 * away / np.linalg.norm(away))
 
 
 def _labels(view: Viewer, texts: Mapping[str, npt.ArrayLike]) -> Picture:
-    """Labels of mathematics, by their text."""
+    """Labels without plates. texts: text -> position, (3,), m."""
     height = 0.085 * view.painter.size
     return {
         f"label/{i}": shapes.label(at, text, height, view.painter.text, plate=False)

@@ -1,4 +1,4 @@
-"""Plain triangle meshes: vertices, shape (n, 3), and faces, shape (m, 3), counted from the vertices."""
+"""Triangle meshes of simple shapes. A mesh is vertices, shape (n, 3), and faces, shape (m, 3): indices of the vertices."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
 
 
 def revolved(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
-    """The surface that (radius, height) pairs sweep around the z axis; a profile listed upwards faces outwards.
+    """A surface of revolution around the z axis.
 
-    Each stretch of the profile has vertices of its own, so that its edges stay sharp.
+    profile: (radius, height) of its corners; listed upwards, the surface faces outwards. sides: number of sides of a circle.
+    Each piece of the profile has its own vertices, so that its edges look sharp.
     """
     angles = 2.0 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
@@ -36,7 +37,7 @@ def revolved(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
 
 
 def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
-    """Faces between two circles; a circle that shrank to a point needs none on its side."""
+    """Faces between two circles. low, high: whether the lower and the upper circle have a radius above 0."""
     i = np.arange(sides)
     j = (i + 1) % sides
     up = np.stack([i, j, j + sides], axis=1) if low else np.zeros((0, 3), int)
@@ -45,7 +46,7 @@ def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
 
 
 def ball(radius: float, sides: int = 20) -> Mesh:
-    """A ball around the origin."""
+    """A ball around the origin. sides: number of sides of its equator."""
     heights = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 1)
     angles = 2.0 * np.pi * np.arange(sides) / sides
     rings = [
@@ -57,7 +58,12 @@ def ball(radius: float, sides: int = 20) -> Mesh:
 
 
 def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 14) -> Mesh:
-    """A closed cylinder from one point to another."""
+    """A closed cylinder.
+
+    start, end: (3,), centres of its ends.
+    radius: in the same unit.
+    sides: number of sides of a circle.
+    """
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.linalg.norm(b - a))
     vertices, faces = revolved([(0, 0), (radius, 0), (radius, length), (0, length)], sides)
@@ -75,20 +81,26 @@ def frame_along(direction: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def fan(corners: npt.ArrayLike) -> Mesh:
-    """A flat convex polygon, seen from the side its corners run counter-clockwise on."""
+    """A flat convex polygon. corners: (n, 3); it faces the side from which they run counter-clockwise."""
     points = np.asarray(corners, dtype=np.float32)
     i = np.arange(1, len(points) - 1)
     return points, np.stack([np.zeros_like(i), i, i + 1], axis=1).astype(np.uint32)
 
 
 def pyramid(rays: npt.ArrayLike) -> Mesh:
-    """The sides of the cone of rays, from the origin to the rays' ends; each side has vertices of its own."""
+    """The sides of a pyramid with its tip at the origin. rays: (n, 3), its edges. Each side has its own vertices."""
     ends = np.asarray(rays, dtype=np.float32)
     return merged([fan([np.zeros(3), a, b]) for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)])
 
 
 def torus_arc(radius: float, tube: float, start: float, end: float, sides: int = 40) -> Mesh:
-    """Part of a ring around z, from one angle to the other (rad)."""
+    """A part of a torus around the z axis.
+
+    radius: of the ring.
+    tube: radius of the tube.
+    start, end: angles where the part begins and ends, rad.
+    sides: number of pieces along the ring.
+    """
     around = np.linspace(start, end, sides + 1)
     across = 2.0 * np.pi * np.arange(10) / 10
     reach = radius + tube * np.cos(across)

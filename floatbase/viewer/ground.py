@@ -1,4 +1,4 @@
-"""The ground in the picture: level, a slope that was given, or the slope that the contacts stand on."""
+"""The ground in the picture: level, a given slope, or the slope on which the contacts stand."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from floatbase.friction import tangents
 from floatbase.viewer.colours import RGB
 from floatbase.viewer.shapes import Item, ground, placed
 
-STEEPEST = 0.2  # vertical part of a normal below which contacts stand on walls, not on the ground
-STEP = 0.01  # m: a plane as near to the origin goes through it, so that it does not tremble with the feet
+STEEPEST = 0.2  # least vertical part of a normal of the ground: contacts with less stand on walls
+STEP = 0.01  # m; the height of the ground is rounded to this, so that it does not tremble with the feet
 
 
 class Plane(NamedTuple):
-    """All points with normal · p = offset. normal: unit, world, upwards. offset: m."""
+    """The points p with normal · p = offset. normal: (3,), unit, world, upwards. offset: m."""
 
     normal: tuple[float, float, float]
     offset: float = 0.0
 
     def height(self, point: Array) -> float:
-        """z of the plane below or above a point, shape (3,), m."""
+        """z of the plane, m, below or above a point, shape (3,), m."""
         x, y, z = self.normal
         return (self.offset - x * float(point[0]) - y * float(point[1])) / z
 
     def lines(self, colour: RGB) -> Item:
-        """Its grid."""
+        """The lines of the plane's grid."""
         return _lines(self, colour)
 
 
@@ -36,9 +36,10 @@ LEVEL = Plane((0.0, 0.0, 1.0))
 
 
 def plane_under(normals: Array, positions: Array) -> Plane:
-    """The slope that contact points, shape (n, 3), m, with these normals, shape (n, 3), stand on.
+    """The slope on which contact points stand. normals: (n, 3), unit, world. positions: (n, 3), m, world.
 
-    Level through the origin where they have several normals or none, or do not lie in one plane, and on walls.
+    It is level, through the origin, when there are no points, when their normals differ, when they do not lie in one plane,
+    and when they stand on a wall.
     """
     if not len(normals) or np.ptp(normals, axis=0).max() > 1e-6 or normals[0, 2] < STEEPEST:
         return LEVEL

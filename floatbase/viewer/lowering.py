@@ -1,6 +1,6 @@
-"""Objects as three.js reads them: meshes, lines and labels, lowered to plain data.
+"""Meshes, lines and labels as plain data that three.js reads.
 
-A `Shape` is a value: what is equal is the same object, so a picture that shows it again sends nothing.
+Equal shapes are the same object, so that a picture that shows a shape again sends nothing.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _TYPES = {"Uint8Array": "u1", "Int16Array": "<i2", "Uint16Array": "<u2", "Uint32
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A lowered three.js object, ready for `set_object`; its object is called "shape", so animations find its material."""
+    """A three.js object as plain data. The object is named "shape", so that animations find its material."""
 
     lowered: dict[str, Any]
     name: str = ""
 
     @cached_property
     def packed(self) -> bytes:
-        """The object as it goes over the wire, packed once for all that show it."""
+        """The object in MessagePack, for `wire.set_object`. It is packed once for all pictures."""
         return umsgpack.packb(self.lowered)
 
 
@@ -63,15 +63,22 @@ def mesh(
     opacity: float = 1.0,
     flat: bool = False,
     lit: bool = True,
-    through: bool = False,
-    veil: bool = False,
+    on_top: bool = False,
+    hide_back: bool = False,
     name: str = "",
 ) -> Shape:
-    """Triangles of one colour, or with `colours`, shape (n, 3), 0-255, for each vertex.
+    """Triangles.
 
-    Vertices travel as 16-bit numbers, 1/32767 of the largest: half the bytes, and finer than the eye. flat: each triangle
-    is shaded for itself.
-    lit: shaded at all. through: seen through what is in front of it. veil: translucent, but hides its own far side.
+    vertices: (n, 3), m. They are sent as 16-bit numbers, as multiples of 1/32767 of the largest.
+    faces: (m, 3), indices of the vertices.
+    colour: RGB of the whole mesh.
+    colours: (n, 3), 0-255, RGB of each vertex; None for one colour.
+    opacity: 0 is invisible, 1 hides what is behind.
+    flat: whether each triangle has one shade, so that edges look sharp.
+    lit: whether the mesh is shaded by light.
+    on_top: whether it is drawn over whatever is in front of it.
+    hide_back: whether a translucent mesh hides its own far side.
+    name: of the shape.
     """
     points = np.asarray(vertices, dtype=np.float64)
     step = max(float(np.abs(points).max(initial=0.0)), 1e-9) / 32767
@@ -84,21 +91,21 @@ def mesh(
         "color": code(colour),
         "vertexColors": colours is not None,
         "side": 2,
-        "transparent": opacity < 1.0 or through,  # so that no veil comes over what is seen through all
+        "transparent": opacity < 1.0 or on_top,  # three.js draws translucent objects last
         "opacity": opacity,
-        "depthWrite": opacity == 1.0 or veil,
-        "depthTest": not through,
+        "depthWrite": opacity == 1.0 or hide_back,
+        "depthTest": not on_top,
     }
     if lit:
         material |= {"shininess": 25, "specular": 0x1C1C1C, "flatShading": flat}
     lowered = _object("Mesh", {"attributes": attributes, "index": index}, material, step)
-    if through:
+    if on_top:
         lowered["object"]["renderOrder"] = 5
     return Shape(lowered, name)
 
 
 def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
-    """Line segments between each two of the points, shape (2 m, 3), one pixel wide."""
+    """m line segments, one pixel wide. points: (2 m, 3), start and end of each, m."""
     attributes = {"position": _array("Float32Array", points, 3)}
     material = {
         "type": "LineBasicMaterial",
@@ -110,7 +117,13 @@ def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
 
 
 def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.13, 0.13)) -> Shape:
-    """Text that faces the reader, its letters `height` m high: a picture on a sprite. Braces lower a part: "f{c}"."""
+    """Text that always faces the reader.
+
+    text: the text; braces make a subscript: "f{c}".
+    height: height of its letters, m.
+    plate: whether a plate lies behind it.
+    colour: RGB of the text.
+    """
     picture = text_picture(text, plate, colour)
     tall, wide = picture.shape[:2]
     image = {"type": "Uint8Array", "width": wide, "height": tall, "data": umsgpack.Ext(0x12, picture[::-1].tobytes())}

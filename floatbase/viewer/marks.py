@@ -1,4 +1,4 @@
-"""Marks in the picture: wrenches, pushes, the support region, frames."""
+"""Marks in the picture: wrenches, pushes, support regions, frames."""
 
 from __future__ import annotations
 
@@ -16,14 +16,18 @@ from floatbase.viewer.ground import LEVEL, Plane
 from floatbase.viewer.lowering import Shape
 from floatbase.viewer.shapes import ARROW, Item, Picture, arrow, arrow_width, directed, flat_polygon, label, placed
 
-OUTLINE = 0.6  # how wide a push's outline is, over the radius of its shaft
+OUTLINE = 0.6  # width of the outline of a push, over the radius of its shaft
 
 
 def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike, size: float, colour: RGB = COM) -> Picture:
-    """A force, shape (3,), as a straight arrow from `position`, and a moment, shape (3,), as a curled arrow around its axis.
+    """A force as a straight arrow, and a moment as a curled arrow around its axis. Either may be zero, and is left out.
 
-    Both are lengths, m, world: the force times the picture's scale, and the moment times the scale over `size`. So the
-    curled arrow's radius is the force that makes the moment at a lever of `size` m.
+    position: (3,), m, world, where both begin.
+    force: (3,), m, world: the force times the picture's scale (m/N).
+    moment: (3,), m, world: the moment times the scale, over `size`. So the radius of the curled arrow is the length of a
+        force that has this moment at a lever of `size` m.
+    size: size of the robot, m.
+    colour: RGB of both.
     """
     picture: Picture = {}
     if np.linalg.norm(force) > 1e-6:
@@ -34,7 +38,10 @@ def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike,
 
 
 def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM) -> Item:
-    """An arrow that turns around `moment`'s direction by the right-hand rule, its radius as long as `moment`, m."""
+    """An arrow that turns around an axis by the right-hand rule.
+
+    position: (3,), m, world, its centre. moment: (3,), m, world: along the axis, as long as the radius. colour: RGB.
+    """
     moment, radius = directed("a curled arrow", moment)
     return Item(_unit_curl(colour), placed(position, geometry.frame_along(moment / radius), radius))
 
@@ -42,8 +49,13 @@ def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = C
 def push(
     position: npt.ArrayLike, vector: npt.ArrayLike, size: float, colour: RGB = PUSH, outline: RGB = (1.0, 1.0, 1.0)
 ) -> Item:
-    """A push: an arrow that ends at `position`, where it acts, as long as `vector`, m, world; seen through the robot, with an
-    outline, so that it stands out from a robot of its own colour."""
+    """A push: an arrow that ends where the push acts. It is drawn over the robot, with an outline that sets it off.
+
+    position: (3,), m, world, where the push acts.
+    vector: (3,), m, world, from the arrow's start to its end.
+    size: size of the robot, m, from which the arrow has its width.
+    colour, outline: RGB of the arrow and of its outline.
+    """
     vector, length = directed("an arrow", vector)
     width = arrow_width(length, size)
     rotation = geometry.frame_along(vector / length)
@@ -52,9 +64,9 @@ def push(
 
 
 def support_region(positions: npt.ArrayLike, lift: float, ground: Plane = LEVEL) -> Picture:
-    """The convex hull of contact points, shape (n, 3), seen from above, laid on the ground, `lift` m over it.
+    """The convex hull of contact points, seen from above; nothing for fewer than three points, or for points on a line.
 
-    Fewer than three points, or points on a line, have no region: nothing is drawn.
+    positions: (n, 3), m, world. lift: m, how far above the ground it is drawn. ground: the plane on which it lies.
     """
     points = np.asarray(positions, dtype=np.float64)[:, :2]
     try:
@@ -68,7 +80,10 @@ def support_region(positions: npt.ArrayLike, lift: float, ground: Plane = LEVEL)
 
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
-    """A frame, shape (4, 4), as three rods: x vermilion, y green, z blue, seen through the robot; with its name when given."""
+    """The axes of a frame as three rods, x vermilion, y green, z blue, drawn over the robot.
+
+    pose: (4, 4), homogeneous, world. length: of the rods, m. name: a label; without one there is none.
+    """
     matrix = np.array(checked("pose of a frame", pose, (4, 4)))
     matrix[:3, :3] *= positive("length of a frame's axes", length, "m")
     picture = {"/axes": Item(_axes(), matrix)}
@@ -91,9 +106,9 @@ def _unit_curl(colour: RGB) -> Shape:
 
 @lru_cache(maxsize=64)
 def _outlined_arrow(colour: RGB, outline: RGB, slender: int) -> Shape:
-    """The unit arrow, drawn over a wider one. slender: its length over its shaft's radius, which the outline's ends need.
+    """The unit arrow, drawn over a wider one. slender: its length over the radius of its shaft.
 
-    One mesh seen through all is painted in the order of its faces, so the outline comes first.
+    A mesh on top is painted in the order of its faces, so the outline comes first.
     """
     (_, _), (shaft, _), (_, neck), (head, _), (_, tip) = ARROW
     opening = head / (slender * (tip - neck))  # of the head, as it is drawn
@@ -103,7 +118,7 @@ def _outlined_arrow(colour: RGB, outline: RGB, slender: int) -> Shape:
     around = geometry.revolved([(0.0, -back), (wide, -back), (wide, low), (opening * slender * (top - low), low), (0.0, top)])
     parts = [around, geometry.revolved(ARROW)]
     colours = [np.tile(np.round(255 * np.array(c)), (len(p), 1)) for c, (p, _) in zip((outline, colour), parts, strict=True)]
-    return lowering.mesh(*geometry.merged(parts), colours=np.vstack(colours), lit=False, through=True)
+    return lowering.mesh(*geometry.merged(parts), colours=np.vstack(colours), lit=False, on_top=True)
 
 
 @lru_cache(maxsize=1)
@@ -114,4 +129,4 @@ def _axes() -> Shape:
         np.tile(np.round(255 * np.array(colour)), (len(vertices), 1))
         for colour, (vertices, _) in zip((X_AXIS, Y_AXIS, Z_AXIS), rods, strict=True)
     ]
-    return lowering.mesh(*geometry.merged(rods), colours=np.vstack(colours), through=True)
+    return lowering.mesh(*geometry.merged(rods), colours=np.vstack(colours), on_top=True)

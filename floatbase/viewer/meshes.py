@@ -1,4 +1,4 @@
-"""Robot meshes: the light ones in `assets/`, else the URDF's own, else primitives along the kinematic tree."""
+"""Meshes of robots: the light ones in `assets/`, else those of the URDF, else balls and rods along the kinematic tree."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ from floatbase.viewer.colours import ROBOT
 
 @dataclass(frozen=True, eq=False)
 class JointMesh:
-    """What one joint moves.
+    """The mesh that one joint moves.
 
-    joint: Pinocchio's number of the joint. vertices: (n, 3), m, in the joint's frame. faces: (m, 3), into the vertices.
-    colours: (n, 3), 0-255.
+    joint: Pinocchio's number of the joint.
+    vertices: (n, 3), m, in the joint's frame.
+    faces: (m, 3), indices of the vertices.
+    colours: (n, 3), RGB of each vertex, 0-255.
     """
 
     joint: int
@@ -31,7 +33,7 @@ class JointMesh:
 
 
 def robot_meshes(robot: Robot) -> list[JointMesh]:
-    """The meshes of a robot, one for each joint that moves something visible; fixed parts belong to joint 0, the world."""
+    """The meshes of a robot, one for each joint that moves something visible. Fixed parts belong to joint 0, the world."""
     asset = assets_root() / "meshes" / f"{robot.name}.npz"
     if asset.is_file():
         return _by_joint([mesh for part in _parts(asset) for mesh in _placed(robot, *part)])
@@ -47,10 +49,10 @@ Part = tuple[str, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[n
 
 @lru_cache(maxsize=8)
 def _parts(asset: Path) -> list[Part]:
-    """Joint name, vertices, faces and colours of each part of a file; its layout stands in assets/build_meshes.py."""
+    """Joint name, vertices, faces and colours of each part in a file. assets/build_meshes.py describes the file."""
     parts = []
-    with np.load(asset) as held:
-        data = {name: held[name] for name in held.files}
+    with np.load(asset) as file:
+        data = {name: file[name] for name in file.files}
     vertex, face = data["vertex_start"], data["face_start"]
     for i, joint in enumerate(data["joints"]):
         rows = slice(vertex[i], vertex[i + 1])
@@ -67,9 +69,9 @@ def _placed(
     faces: npt.NDArray[np.uint32],
     colours: npt.NDArray[np.uint8],
 ) -> list[JointMesh]:
-    """The part on its joint; on the joint above when this one was locked; nowhere when the model lacks it.
+    """One part as the mesh of its joint, or of the joint above if the joint was locked; none if the model lacks the joint.
 
-    What is bolted to the world moves with the base when the bolts are cut, and the base of a robot that is bolted stays.
+    Parts of the world and of the base move with the base of a floating robot, and stand still on a fixed one.
     """
     model = robot.model
     if joint in ("universe", "root_joint"):
@@ -84,7 +86,7 @@ def _placed(
 
 
 def _by_joint(meshes: list[JointMesh]) -> list[JointMesh]:
-    """One mesh for each joint: what hangs on the same joint made one."""
+    """The meshes of each joint merged into one."""
     together = []
     for joint in dict.fromkeys(mesh.joint for mesh in meshes):
         own = [mesh for mesh in meshes if mesh.joint == joint]
@@ -96,7 +98,7 @@ def _by_joint(meshes: list[JointMesh]) -> list[JointMesh]:
 
 
 def _from_urdf(robot: Robot) -> list[JointMesh]:
-    """The URDF's own visuals, merged joint by joint. Raises `ImportError` without trimesh."""
+    """The visuals of the URDF, merged for each joint. Raises `ImportError` without trimesh."""
     from floatbase.viewer.visuals import urdf_visuals
 
     pieces = urdf_visuals(robot)
@@ -129,6 +131,6 @@ def _from_tree(robot: Robot) -> list[JointMesh]:
 
 
 def _feet(robot: Robot, joint: int) -> list[Any]:
-    """Frames of the feet that a joint carries."""
+    """The frames of the feet that a joint carries."""
     frames = [robot.model.frames[robot.frame_id(foot.frame)] for foot in robot.feet]
     return [frame for frame in frames if frame.parentJoint == joint]

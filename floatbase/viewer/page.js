@@ -1,5 +1,5 @@
 "use strict";
-// floatbase's page around meshcat's viewer: our own commands, the player, and frames of commands.
+// floatbase's page around meshcat's viewer: our own commands, the player, and messages of several commands.
 
 const part = (id) => document.getElementById(id);
 
@@ -8,7 +8,7 @@ function startViewer() {
   viewer.gui.__folders.Scene.close();
   const player = startPlayer(viewer);
   const camera = startCamera(viewer);
-  const own = {
+  const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
     set_title: (command) => { part("title").textContent = command.text; },
@@ -20,13 +20,13 @@ function startViewer() {
   };
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
-    (own[command.type] || meshcat)(command);
+    (commands[command.type] || meshcat)(command);
     viewer.set_dirty();
   };
   return viewer;
 }
 
-// Words in the middle of the page, for when there is no picture.
+// Show a text in the middle of the page, where there is no picture.
 function say(words) {
   part("notice").textContent = words;
   part("notice").style.display = "block";
@@ -37,8 +37,8 @@ const NO_WEBGL = "This 3-D picture needs WebGL, which this browser does not have
 const NO_UNPACKING = "This page is packed in a way that this browser is too old to open. Open it in a current one: Chrome or " +
   "Edge from 80, Firefox from 113, Safari from 16.4.";
 
-// The viewer, or null and words in the page where the browser cannot draw.
-function viewerOrWords() {
+// The viewer; where the browser cannot draw, null and a text in the page.
+function viewerOrText() {
   try {
     return startViewer();
   } catch (error) {
@@ -55,24 +55,24 @@ function legendLine([colour, text]) {
   return line;
 }
 
-// Where the page looks from. meshcat's camera node cannot move the point that the mouse turns around.
+// The camera. meshcat's camera node cannot move the point that the mouse turns around.
 function startCamera(viewer) {
   let followed = [], last = null, room = false;
-  // looked up anew each time, because another picture puts another object there, or none
-  const where = () => {
+  // searched each time, because another picture has another object there, or none
+  const position = () => {
     const node = followed.reduce((at, name) => at && at.children[name], viewer.scene_tree);
     return node ? node.object.getWorldPosition(new MeshCat.THREE.Vector3()) : null;
   };
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
     if (followed.length) {
-      const now = where();
+      const now = position();
       if (now && last) {
         const step = now.clone().sub(last).setY(0);
         viewer.camera.position.add(step);
         viewer.controls.target.add(step);
       }
-      last = now || last;  // a robot that is taken away and drawn again elsewhere is followed there
+      last = now || last;  // a robot that is removed and drawn again elsewhere is followed there
     }
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
     if (room && !viewer.gui.closed) viewer.camera.setViewOffset(w, h, viewer.gui.width / 2, 0, w, h);
@@ -80,7 +80,7 @@ function startCamera(viewer) {
     render();
   };
   return {
-    makeRoom() { room = true; },  // the picture's middle is left of the panel while that is open
+    makeRoom() { room = true; },  // while the panel is open, the middle of the picture is left of it
     look(command) {
       viewer.camera.fov = command.fov;
       viewer.camera.position.fromArray(command.position);
@@ -88,7 +88,7 @@ function startCamera(viewer) {
     },
     follow(command) {
       followed = command.node.split("/").filter((name) => name);
-      last = where();
+      last = position();
     },
   };
 }
@@ -119,9 +119,9 @@ function startPlayer(viewer) {
       bar.style.display = command.animations.length ? "flex" : "none";
       if (!command.animations.length) return;
       slider.max = animator().duration;
-      const wanted = String(command.options.speed);
-      if (![...speed.options].some((option) => option.value == wanted)) speed.add(new Option(`${wanted}×`, wanted));
-      speed.value = wanted;
+      const requested = String(command.options.speed);
+      if (![...speed.options].some((option) => option.value == requested)) speed.add(new Option(`${requested}×`, requested));
+      speed.value = requested;
       animator().mixer.timeScale = command.options.speed;
       if (command.options.paused) animator().pause();
       if (!ticking) tick();
@@ -129,7 +129,7 @@ function startPlayer(viewer) {
   };
 }
 
-// A frame is commands drawn together, each after its length; one that fails is reported and does not stop the others.
+// A frame is several commands that are drawn together, each after its length. One that fails is reported; the others go on.
 function apply(frame) {
   const view = new DataView(frame);
   for (let at = 0; at < frame.byteLength;) {
@@ -143,8 +143,8 @@ function apply(frame) {
   }
 }
 
-// A browser gives its pages 16 WebGL contexts together. So a page in a frame starts when it is first seen, and while it is out
-// of sight it gives its context back and leaves a still image; changed(seen) is called whenever that changes.
+// A browser has 16 WebGL contexts for all its pages. So a page in a frame starts when it is first seen. While it is out of
+// sight it returns its context and shows a still image. changed(seen) is called whenever that changes.
 function onSight(changed) {
   if (window.top === window) return changed(true);
   new IntersectionObserver((entries) => changed(entries.at(-1).isIntersecting)).observe(document.documentElement);
@@ -191,12 +191,12 @@ function startRest(viewer) {
   };
 }
 
-// Call start() once, when the page is first seen, and look after its context from then on.
+// Call start() once, when the page is first seen, and manage its context from then on.
 function startWhenSeen(start) {
   let rest = null, blind = false;
   onSight((seen) => {
     if (rest === null && seen && !blind) {
-      window.viewer = viewerOrWords();
+      window.viewer = viewerOrText();
       blind = viewer === null;
       if (blind) return;
       rest = startRest(viewer);
@@ -206,7 +206,7 @@ function startWhenSeen(start) {
   });
 }
 
-// The live page: follow a window, and come back by itself when the window does.
+// The live page: follow a window. When the window closes, wait for one at the same address.
 function follow(rest) {
   const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket${location.search}`);
   socket.binaryType = "arraybuffer";
@@ -214,10 +214,10 @@ function follow(rest) {
   part("kept").querySelector("button").onclick = () => socket.send('{"type": "live"}');
   socket.onmessage = async (message) => {
     if (typeof message.data == "string") {
-      const asked = JSON.parse(message.data);
+      const request = JSON.parse(message.data);
       await rest.awake();
       viewer.set_3d_pane_size();
-      socket.send(JSON.stringify({type: "image", id: asked.id, data: viewer.capture_image()}));
+      socket.send(JSON.stringify({type: "image", id: request.id, data: viewer.capture_image()}));
     } else {
       apply(message.data);
       viewer.num_messages_received++;
@@ -237,7 +237,7 @@ async function comeBack() {
   setTimeout(comeBack, 500);
 }
 
-// The file: unpack meshcat's viewer and the scene that lie in the page.
+// The file: it contains meshcat's viewer and the scene, packed.
 async function unpack(id) {
   const packed = Uint8Array.from(atob(part(id).textContent), (letter) => letter.charCodeAt(0));
   return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
@@ -262,8 +262,8 @@ function draw(scene) {
   viewer.set_3d_pane_size();
 }
 
-// The inner page: says that it is ready, is handed {code, scene}, and answers with a picture or what went wrong. The page
-// around it takes it away when it is out of sight.
+// The inner page: it says that it is ready, receives {code, scene}, and answers with a picture or an error. The page around
+// it removes it when it is out of sight.
 function waitForScene() {
   window.onmessage = ({data}) => {
     window.onmessage = null;

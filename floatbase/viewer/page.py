@@ -1,7 +1,7 @@
-"""The pages: the live one, which follows a window; the file that holds a scene and needs no server; and the inner page,
-which stands in a frame of a page of several scenes.
+"""The three pages: the live page, the file, and the inner page.
 
-All load meshcat's own viewer and feed it the same frames (see `wire.frame`); what they add to it stands in page.js.
+The live page follows a window. The file contains a scene and needs no server. The inner page shows one scene in a frame of a
+page with several scenes. All load meshcat's viewer and give it the same messages (see `wire.frame`); page.js holds the rest.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ by itself.</div>
 
 @cache
 def viewer_code() -> bytes:
-    """meshcat's viewer, one JavaScript file, from the installed package."""
+    """meshcat's viewer, one JavaScript file of the installed package. Raises `ViewerError` without meshcat."""
     spec = find_spec("meshcat")
     if spec is None or not spec.submodule_search_locations:
         raise ViewerError("meshcat is not installed; the viewer needs it. Install it with: pip install meshcat")
@@ -48,33 +48,36 @@ def live_page() -> str:
 
 
 def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
-    """A page that holds the viewer and a scene, and needs neither server nor network: 0.3 MB and the scene."""
+    """A page that contains the viewer (0.3 MB) and a scene, and needs neither server nor network.
+
+    commands: of the scene, as `Scene.file_commands` gives them.
+    """
     text = held_viewer_code() + held("scene", wire.frame(commands))
     return _page(f"{text}<script>{_own('page.js')}open();</script>", title)
 
 
 def scene_in(text: str) -> list[bytes]:
-    """The commands that a file page holds. Raises `ViewerError` for another text."""
+    """The commands in the text of a file page. Raises `ViewerError` for any other text."""
     found = re.search(r'id="scene">([^<]*)<', text)
     if found is None:
-        raise ViewerError("this page holds no scene; pages that do are written by Viewer.save.")
+        raise ViewerError("this page contains no scene; Viewer.save writes pages that do.")
     return wire.unframe(gzip.decompress(base64.b64decode(found.group(1))))
 
 
 @cache
 def inner_page() -> str:
-    """A page for a frame: the page around it hands it the viewer's code and a frame of commands, as page.js says."""
+    """A page for a frame inside another page, which gives it the viewer's code and a scene (see page.js)."""
     return _page(f"<script>{_own('page.js')}waitForScene();</script>", "floatbase")
 
 
 @cache
 def held_viewer_code() -> str:
-    """meshcat's viewer packed into a page, under the name viewer-code."""
+    """meshcat's viewer as a script element with the id "viewer-code"; see `held`."""
     return held("viewer-code", viewer_code())
 
 
 def held(name: str, data: bytes) -> str:
-    """Data packed into a page, for a script of the page to unpack by its name."""
+    """Data as a script element with the id `name`: compressed, in base64. `unpack(name)` in page.js reads it."""
     packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
     return f'<script type="text/plain" id="{name}">{packed}</script>'
 

@@ -1,4 +1,4 @@
-"""What is drawn for a state: a pure function from robot, state, contacts and forces to a picture."""
+"""The painter: makes a picture of a robot from its state, contacts and forces. It has no effect on any page."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ from floatbase.viewer.ground import LEVEL, Plane, plane_under
 from floatbase.viewer.meshes import JointMesh, robot_meshes
 from floatbase.viewer.shapes import Item, Picture
 
-CORNER_RADIUS = 0.48  # of a cone at a corner of a flat foot, over the distance to the next corner
+CORNER_RADIUS = 0.48  # radius of a cone at a corner of a flat foot, over the distance to the next corner: they do not meet
+VISIBLE = 1e-3  # of the robot's weight: a smaller force is neither drawn nor judged
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces at the points of contacts: shape (n, 3) each, N, world, what the ground does to the robot."""
+    """Forces of the ground on the robot at n contact points, measured and planned: shape (n, 3) each, N, world, or None."""
 
     measured: Array | None
     planned: Array | None
 
     @property
     def kinds(self) -> list[tuple[str, Array | None, RGB]]:
-        """Name, forces and colour of each kind."""
+        """Name, forces and colour of the measured and of the planned forces."""
         return [("measured", self.measured, MEASURED), ("planned", self.planned, PLANNED)]
 
     @property
     def judged(self) -> Array | None:
-        """Those that colour the cones: the measured ones where there are any."""
+        """The forces that colour the cones: the measured ones if there are any."""
         return self.planned if self.measured is None else self.measured
 
 
@@ -47,13 +48,16 @@ class Forces:
 class Painter:
     """Draws a robot.
 
-    scale: m drawn for a newton; None for one that fits the robot. facets, inside: of the friction polyhedra; None for round
-    cones. ground: None for the one that the contacts stand on. lines, text, paper: colours of the ground's lines, of text and
-    of what is behind them.
+    robot: the robot.
+    requested_scale: length of a drawn force, m/N; None for one that fits the robot.
+    facets: number of facets of the friction polyhedra; None draws round cones.
+    inside: whether the polyhedra lie inside the cones.
+    ground: the ground; None for the plane that the contacts stand on.
+    lines, text, paper: colours of the ground's lines, of text, and of the background.
     """
 
     robot: Robot
-    asked_scale: float | None
+    requested_scale: float | None
     facets: int | None
     inside: bool
     ground: Plane | None
@@ -79,8 +83,12 @@ class Painter:
         extra: Mapping[str, Item] | None = None,
         lifted: Collection[str] = (),
     ) -> Picture:
-        """Everything that was asked for, as path -> item; the arguments are those of `Viewer.show`, and lifted: names of
-        contacts that do not stand just now, which have no patch, no cone and no part in the support region."""
+        """The picture, path -> item, of everything that the arguments ask for.
+
+        lifted: names of contacts that do not touch the ground just now: they have no patch and no cone, and do not count for
+            the support region.
+        The other arguments are those of `Viewer.show`.
+        """
         self._check_state(state)
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
@@ -110,7 +118,7 @@ class Painter:
         return picture | dict(extra or {})
 
     def replace(self, facets: int | None) -> Painter:
-        """The same with other friction polyhedra; what was computed for the robot is kept."""
+        """A painter with another number of facets. It shares what this one has computed for the robot."""
         other = replace(self, facets=facets)
         for name in ("home", "box", "feet_box", "size", "scale", "_meshes", "_shapes", "_ghosts", "_scale_bars"):
             if name in self.__dict__:
@@ -118,17 +126,17 @@ class Painter:
         return other
 
     def stage(self) -> Picture:
-        """The ground alone."""
+        """A picture of the ground alone."""
         return {"ground": (self.ground or LEVEL).lines(self.lines)}
 
     @cached_property
     def home(self) -> State:
-        """The robot as it stands."""
+        """The robot's standing state."""
         return self.robot.standing()
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of the robot where it stands, m, world."""
+        """Lowest and highest corner of the standing robot's bounding box, m, world."""
         poses = self.home.joint_transforms
         points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in self._meshes]
         together = np.vstack(points)
@@ -136,8 +144,10 @@ class Painter:
 
     @cached_property
     def feet_box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of a box around the feet and what they stand in, m, world; a robot without feet is all
-        feet."""
+        """Lowest and highest corner of a box around the standing robot's feet and their cones, m, world.
+
+        A robot without feet has the box of the whole robot.
+        """
         feet = [(foot, self.home.frame_pose(foot.frame)) for foot in self.robot.feet]
         points = [pose.act(p) for foot, pose in feet for p in ([foot.centre] if foot.corners is None else foot.corners)]
         if not points:
@@ -147,21 +157,21 @@ class Painter:
 
     @cached_property
     def size(self) -> float:
-        """How large the robot is when it stands, m: half the diagonal of its box."""
+        """Size of the standing robot, m: half the diagonal of its bounding box."""
         low, high = self.box
         return 0.5 * float(np.linalg.norm(high - low))
 
     @cached_property
     def scale(self) -> float:
-        """Metres drawn for a newton: 1, 2 or 5 times a power of ten, so that the weight is about twice as long as the
-        centre of mass is high."""
-        if self.asked_scale is not None:
-            return self.asked_scale
+        """Length of a drawn force, m/N: as requested, else 1, 2 or 5 times a power of ten that makes the weight about twice as
+        long as the centre of mass is high."""
+        if self.requested_scale is not None:
+            return self.requested_scale
         return nice(2.0 * max(float(self.home.com[2] - self.box[0][2]), 0.6 * self.size) / self.robot.weight)
 
     def cone_height(self, contacts: Contacts) -> float:
-        """m: for half as much again as each point carries at rest, but not so high as to hide the robot, nor as to make the
-        cones of one foot's corners grow into each other by much."""
+        """Height of the friction cones, m: that of 1.5 times the normal force at rest, but not so high that the cones hide the
+        robot, or that cones at the corners of one foot meet."""
         height = min(self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size)
         feet = (contact for contact in contacts if isinstance(contact, FlatFootContact) and contact.mu > 0)
         return min([height] + [CORNER_RADIUS * float(pdist(foot.corners).min()) / foot.mu for foot in feet])
@@ -176,11 +186,11 @@ class Painter:
 
     @cached_property
     def _ghosts(self) -> list[lowering.Shape]:
-        return [lowering.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, veil=True) for mesh in self._meshes]
+        return [lowering.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, hide_back=True) for mesh in self._meshes]
 
     @cached_property
     def _paths(self) -> list[tuple[int, str]]:
-        """Joint of every mesh, and its name as a part of a path."""
+        """For every mesh, the number of its joint, and the joint's name as part of a path."""
         return [(mesh.joint, plain(self.robot.model.names[mesh.joint])) for mesh in self._meshes]
 
     def _robot(self, state: State, root: str, looks: list[lowering.Shape]) -> Picture:
@@ -188,7 +198,7 @@ class Painter:
         return {f"{root}/{name}": Item(look, poses[joint]) for (joint, name), look in zip(self._paths, looks, strict=True)}
 
     def _contacts(self, contacts: Contacts, positions: Array, forces: Forces, cones: bool, stands: list[bool]) -> Picture:
-        """Forces at every point, and patches and cones at those that stand."""
+        """Forces at every point, and patches and cones at the points that stand on the ground."""
         picture: Picture = {}
         height = self.cone_height(contacts)
         rows = zip(contacts.point_names, positions, contacts.normals, contacts.mus, strict=True)
@@ -206,27 +216,27 @@ class Painter:
         return picture
 
     def _cone(self, position: Array, normal: Array, mu: float, height: float, force: Array | None) -> Picture:
-        """A cone or polyhedron in the colour that the force gives it; where there is none, it stands there grey and faint."""
+        """A cone or polyhedron in the colour that the force gives it; without a force it is grey and faint."""
         judged = None if force is None or self._is_quiet(force) else force
         if self.facets is None:
             status = "idle" if judged is None else _friction_cone(tuple(normal.tolist()), mu).status(judged)
             return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
         polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inside)
         status = "idle" if judged is None else polyhedron.status(judged)
-        status = "inside" if status == "active" else status  # the facets that are reached light up instead
+        status = "inside" if status == "active" else status  # an active facet has a colour of its own
         active = () if judged is None else polyhedron.active_facets(judged)
         return shapes.friction_polyhedron(position, polyhedron, height, status, active)
 
     def _is_quiet(self, force: Array) -> bool:
-        """Whether a force is too small to be seen or judged: below a thousandth of the weight."""
+        """Whether a force is too small to be drawn or judged."""
         return float(force @ force) < self._quiet
 
     @cached_property
     def _quiet(self) -> float:
-        return (1e-3 * self.robot.weight) ** 2
+        return (VISIBLE * self.robot.weight) ** 2
 
     def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
-        """The name of every point, below and outside of it."""
+        """The name of every contact point, beside it and away from the robot."""
         picture: Picture = {}
         for name, position in zip(contacts.point_names, positions, strict=True):
             away = (position - state.com) * [1.0, 1.0, 0.0]
@@ -260,8 +270,10 @@ class Painter:
         return {}
 
     def _scale_bar_on(self, ground: Plane) -> Picture:
-        """A bar for a round force of about a quarter of the weight, on the ground to the left of the feet, and behind a tall
-        robot, whose picture shows less of the ground in front."""
+        """A bar as long as a force of about a quarter of the weight is drawn, on the ground at the left of the feet.
+
+        It starts behind a tall robot, because the picture of one shows little ground in front.
+        """
         force = nice(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
@@ -286,7 +298,7 @@ class Painter:
 
 
 def kinds(picture: Picture) -> set[str]:
-    """What a picture shows, in the words of `LEGEND`: the first part of every path; a cone without force is an "idle cone"."""
+    """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a force is an "idle cone"."""
     idle = shapes.cone_colour("idle")
     return {"idle cone" if item.colour == idle else path.split("/")[0] for path, item in picture.items()}
 
@@ -299,28 +311,28 @@ def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
 
 @lru_cache(maxsize=256)
 def _polyhedron(normal: tuple[float, ...], mu: float, facets: int, inside: bool) -> FrictionPolyhedron:
-    """A polyhedron, once: a ground has few."""
+    """The polyhedron with these values. There are few different ones, so each is made once."""
     return FrictionPolyhedron(np.array(normal), mu, facets, inside)
 
 
 def nice(value: float) -> float:
-    """The number of 1, 2, 5 times a power of ten that is nearest to `value` by ratio."""
+    """Of the numbers 1, 2, 5 times a power of ten, the one whose ratio to `value` is nearest to 1."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)
 
 
 def below(path: str, items: Mapping[str, Item]) -> Picture:
-    """Items under a common path."""
+    """The same items, each path prefixed by `path`."""
     return {path + name: item for name, item in items.items()}
 
 
 def plain(name: str) -> str:
-    """A name as one part of a path."""
+    """The name as one part of a path: without slashes."""
     return name.replace("/", "_")
 
 
 def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -> Array | None:
-    """Forces as (n, 3), checked against the contacts."""
+    """Forces as an array of shape (n, 3) for the n contact points. Raises `InputError` for any other number of forces."""
     if value is None:
         return None
     if contacts is None:

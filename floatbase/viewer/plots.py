@@ -1,4 +1,4 @@
-"""Curves of a record, in the colours of the scene: centre of mass, forces against their cones, torques against limits."""
+"""Plots of a rollout in the colours of the scene: centre of mass, forces, friction, torques."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from floatbase.viewer.colours import ALARM, COM, LIMIT, MEASURED, PLANNED, PUSH,
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
+CARRIES = 0.01  # of the weight: the direction of a smaller force says nothing about friction
+
 
 def plot(rollout: Rollout) -> Figure:
-    """Centre of mass, friction used and torques used, one below the other."""
+    """A figure of three plots: centre of mass, friction and torques."""
     figure, axes = plt.subplots(3, 1, figsize=(8, 8), sharex=True, layout="constrained")
     plot_com(rollout, axes[0])
     plot_friction(rollout, axes[1])
@@ -29,7 +31,7 @@ def plot(rollout: Rollout) -> Figure:
 
 
 def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """How far the centre of mass has moved since the start, mm, in x, y and z."""
+    """How far the centre of mass has moved since the start in x, y and z, mm. axis: to plot on; None for a new figure."""
     axis = _axis(axis)
     moved = 1000.0 * (rollout.com - rollout.com[0])
     for column, name, colour in zip(moved.T, "xyz", (X_AXIS, Y_AXIS, Z_AXIS), strict=True):
@@ -38,7 +40,7 @@ def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """Normal force at every contact point, N: measured, planned as a wider line behind it."""
+    """Measured normal force at every contact point, N; behind it, as a wider line, the planned one. axis: as for `plot_com`."""
     axis = _axis(axis)
     for i, (planned, measured) in enumerate(
         zip(_normal(rollout, rollout.planned), _normal(rollout, rollout.measured), strict=True)
@@ -49,9 +51,9 @@ def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """(28) Share of the friction that every contact uses: ‖f_tangent‖ / (μ f_normal); beyond 1 the force is outside the cone.
+    """(28) ‖f_tangent‖ / (μ f_normal) at every contact point, planned and measured. Above 1 a force is outside its cone.
 
-    Points that carry less than a hundredth of the weight have no meaningful share and are left out.
+    The curve of a point has gaps where it carries little; see `friction_used`. axis: as for `plot_com`.
     """
     axis = _axis(axis)
     for forces, colour, name, width in (
@@ -65,7 +67,7 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """Torque at every joint as a share of its limit; joints without a limit are left out."""
+    """Torque over its limit, for every joint that has one. axis: as for `plot_com`."""
     axis = _axis(axis)
     limited = np.isfinite(rollout.robot.torque_limits)
     share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
@@ -76,19 +78,22 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def friction_used(rollout: Rollout, forces: Array) -> Array:
-    """‖f_tangent‖ / (μ f_normal) at each point through time, shape (k/3, n), NaN where little is carried; forces (n, k), N."""
+    """‖f_tangent‖ / (μ f_normal) at each contact point and time, shape (k/3, n); NaN where the point carries little.
+
+    forces: (n, k), N, world, for n times and k/3 points.
+    """
     f = np.reshape(forces, (len(rollout.time), -1, 3))
     normals, mus = rollout.contacts.normals, rollout.contacts.mus
     push = np.einsum("nij,ij->ni", f, normals)
     slide = np.linalg.norm(f - push[:, :, None] * normals, axis=2)
-    carried = push > 0.01 * rollout.robot.weight
+    carried = push > CARRIES * rollout.robot.weight
     share = np.full_like(push, np.nan)
     np.divide(slide, mus * push, out=share, where=carried)
     return np.asarray(share.T)
 
 
 def _normal(rollout: Rollout, forces: Array) -> Array:
-    """Normal force at each point through time, shape (k/3, n), N."""
+    """Normal force at each contact point and time, shape (k/3, n), N. forces: as for `friction_used`."""
     f = np.reshape(forces, (len(rollout.time), -1, 3))
     return np.asarray(np.einsum("nij,ij->in", f, rollout.contacts.normals))
 
@@ -98,7 +103,7 @@ def _axis(axis: Axes | None) -> Axes:
 
 
 def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:
-    """Labels, legend, and when the robot was pushed."""
+    """Add labels, a legend, and a band for each push."""
     for i, push in enumerate(rollout.pushes):
         axis.axvspan(push.start, push.start + push.duration, color=PUSH, alpha=0.12, label="" if i else "push")
     axis.set(xlabel="time [s]", ylabel=label)

@@ -1,4 +1,4 @@
-"""Things beside the robot: a rolling wheel, a hydraulic cylinder, a wall, a slab that the robot is bolted to."""
+"""Things beside the robot: a wheel, a hydraulic cylinder, a wall, bolts."""
 
 from __future__ import annotations
 
@@ -20,10 +20,13 @@ WALL: RGB = (0.78, 0.76, 0.72)
 
 
 def wheel(centre: npt.ArrayLike, axis: npt.ArrayLike, radius: float, angle: float, width: float | None = None) -> Item:
-    """A wheel with spokes.
+    """A wheel with spokes, one of them marked.
 
-    centre: (3,), m, world. axis: (3,), world, its axle. radius, width: m. angle: rad, how far it has turned about the axle, by
-    the right-hand rule, from where its marked spoke points as far up as it can.
+    centre: (3,), m, world.
+    axis: (3,), world, direction of its axle.
+    radius: m.
+    angle: rad, how far it has turned about the axle by the right-hand rule; at 0 the marked spoke points upwards.
+    width: m; None for 0.35 of the radius.
     """
     axle = unit_vector("axis of the wheel", axis)
     positive("radius of the wheel", radius, "m")
@@ -40,13 +43,14 @@ def wheel(centre: npt.ArrayLike, axis: npt.ArrayLike, radius: float, angle: floa
 def hydraulic_cylinder(
     base: npt.ArrayLike, end: npt.ArrayLike, stroke: tuple[float, float], pressures: tuple[float, float] = (0.5, 0.5)
 ) -> Picture:
-    """A double-acting cylinder between two points, shape (3,), m, world: barrel, rod, piston and its two chambers.
+    """A double-acting hydraulic cylinder: barrel, rod, piston and two chambers.
 
-    stroke: the shortest and the longest distance between the points, m. pressures: of the chamber at the base and of the one
-    around the rod, from 0 (drawn pale) to 1 (drawn in full colour).
+    base, end: (3,), m, world, its two ends.
+    stroke: the shortest and the longest distance between the ends, m.
+    pressures: of the chamber at the base and of the chamber around the rod, from 0 (pale) to 1 (full colour).
     """
     if not 0.0 < stroke[0] < stroke[1]:
-        raise InputError(f"stroke of the cylinder is {stroke}; it must be its shortest and its longest length, m, above zero.")
+        raise InputError(f"stroke of the cylinder is {stroke}; it must be its shortest and longest length, m, above zero.")
     start = checked("base of the cylinder", base, (3,), "m")
     way, length = directed("a cylinder", checked("end of the cylinder", end, (3,), "m") - start)
     turned = geometry.frame_along(way / length)
@@ -67,7 +71,12 @@ def hydraulic_cylinder(
 
 
 def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: float) -> Item:
-    """A wall: a slab whose face through `position` looks along `normal`, both (3,), world, m."""
+    """A wall.
+
+    position: (3,), m, world, centre of its front.
+    normal: (3,), world, out of its front.
+    width, height: m.
+    """
     n = unit_vector("normal of the wall", normal)
     side = np.cross([0.0, 0.0, 1.0], n)
     if np.linalg.norm(side) < 1e-6:
@@ -81,7 +90,7 @@ def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: f
 
 
 def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
-    """Bolts on a circle around a base on the ground, radius in m."""
+    """`count` bolts on a circle. position: (3,), m, world, centre of the circle. radius: of the circle, m."""
     positive("radius of the bolts' circle", radius, "m")
     picture: Picture = {}
     for i in range(count):
@@ -93,7 +102,7 @@ def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
 
 @lru_cache(maxsize=1)
 def _unit_wheel() -> Shape:
-    """Around z, of radius 1 and width 1, one of its spokes marked."""
+    """A wheel around z, of radius 1 and width 1, one of its spokes marked."""
     tyre = geometry.revolved([(0.8, -0.5), (1.0, -0.5), (1.0, 0.5), (0.8, 0.5), (0.8, -0.5)], 48)
     hub = geometry.revolved([(0.0, -0.5), (0.16, -0.5), (0.16, 0.5), (0.0, 0.5)])
     angles = 2.0 * np.pi * np.arange(6) / 6
@@ -105,7 +114,7 @@ def _unit_wheel() -> Shape:
 
 @lru_cache(maxsize=1)
 def _tube() -> Shape:
-    """Along z, 1 long, of radius 1, seen through."""
+    """A translucent tube along z, 1 long, of radius 1."""
     return lowering.mesh(*geometry.revolved([(1.0, 0.0), (1.0, 1.0)], 32), STEEL, opacity=0.35)
 
 

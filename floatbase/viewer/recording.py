@@ -1,4 +1,4 @@
-"""Moving pictures: a rollout, or any list of pictures, as one animation that the page plays, seeks and slows down."""
+"""Animations: a list of pictures as one command, which the page plays, seeks and slows down."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from floatbase.viewer.shapes import Item, Picture
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
-REPETITIONS = 10_000  # meshcat's default is 1, after which a picture falls back to its start
+REPETITIONS = 10_000  # meshcat's default is 1: it plays once and returns to the start
+STILL = 1e-7  # m, and 1 for colours and quaternions: what changes less gets no track; single precision would not show it
 _SMOOTH, _STEP = 2301, 2300  # three.js: linear and discrete interpolation
 
 
@@ -25,7 +26,7 @@ _SMOOTH, _STEP = 2301, 2300  # three.js: linear and discrete interpolation
 class Animation:
     """Pictures in time.
 
-    first: every item that ever appears, as it is at its first appearance. command: what makes them move.
+    first: every item that ever appears, as it first appears. command: the command that moves them. duration: s.
     """
 
     first: Picture
@@ -35,7 +36,11 @@ class Animation:
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """One item through time: present (n,), matrices (n, 4, 4), colours (n, 4) or None. Where absent, as last or first seen."""
+    """One item in n pictures.
+
+    item: as it first appears. present: (n,), whether the picture shows it. matrices: (n, 4, 4). colours: (n, 4), or None.
+    Where it is not present, matrices and colours are those of the last picture before that shows it, else of the first.
+    """
 
     item: Item
     present: npt.NDArray[np.bool_]
@@ -46,9 +51,13 @@ class _Course:
 def animate(
     times: npt.ArrayLike, pictures: Iterable[Picture], root: str, speed: float = 1.0, paused: bool = False
 ) -> Animation:
-    """The animation that shows picture i from times[i], s, on.
+    """The animation of some pictures.
 
-    root: path that the items lie below. speed: 1 for real time. paused: wait for the reader to press play.
+    times: (n,), s; picture i is shown from times[i] on.
+    pictures: n pictures, path -> item each.
+    root: the path below which all items lie.
+    speed: 1 for real time.
+    paused: whether the reader must press play first.
     """
     t = np.asarray(times, dtype=np.float64) - np.asarray(times, dtype=np.float64)[0]
     courses = _courses(list(pictures))
@@ -63,14 +72,17 @@ def animate(
 
 
 def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
-    """Rows of a record to draw, `rate` a second: the first, the last, and those nearest to the ticks between."""
+    """The rows of a record to draw: the first, the last, and `rate` rows a second between. times: (n,), s, of all rows."""
     t = np.asarray(times, dtype=np.float64)
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
     return np.unique(np.clip(np.searchsorted(t, ticks - 1e-9), 0, len(t) - 1))
 
 
 def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] | None:
-    """Frame and force of the push that acts at a row of a record, or that ended less than `seen` s before; the newest one."""
+    """Frame and force (N, world) of the push that acts at a row of a record; None without one. Of several, the newest.
+
+    seen: s that a push is still shown after its end.
+    """
     now = float(rollout.time[row])
     for push in sorted(rollout.pushes, key=lambda push: push.start, reverse=True):
         if push.acts_at(now) or 0.0 <= now - push.start < push.duration + seen - 1e-9:
@@ -79,12 +91,12 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
 
 
 def lifted_at(rollout: Rollout, row: int) -> frozenset[str]:
-    """Names of the record's contacts that the controller's stance does not have at a row: feet that swing."""
+    """Names of the feet that swing at a row of a record: its contacts that the controller does not have then."""
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 
 def _courses(pictures: list[Picture]) -> dict[str, _Course]:
-    """Every item's course; a path that shows several shapes in turn becomes several items."""
+    """Every item in time. A path that shows several shapes in turn becomes several items."""
     seen: dict[str, dict[int, Item]] = {}
     for i, picture in enumerate(pictures):
         for path, item in picture.items():
@@ -108,8 +120,8 @@ def _course(items: dict[int, Item], n: int) -> _Course:
 
 
 def _tracks(course: _Course, t: Array) -> Iterator[dict[str, Any]]:
-    """Tracks of what changes; what stays as it is has none."""
-    # scale is a track of its own: a scaled matrix has no quaternion
+    """A track for each property that changes."""
+    # scale has its own track, because a scaled matrix has no quaternion
     scales = np.linalg.norm(course.matrices[:, :3, :3], axis=1)
     quaternions = _quaternions(course.matrices[:, :3, :3] / scales[:, None, :])
     yield from _track("position", "vector3", t, course.matrices[:, :3, 3])
@@ -123,7 +135,7 @@ def _tracks(course: _Course, t: Array) -> Iterator[dict[str, Any]]:
 
 
 def _track(name: str, kind: str, t: Array, values: Array, interpolation: int = _SMOOTH) -> Iterator[dict[str, Any]]:
-    if np.ptp(values, axis=0).max() < 1e-7:
+    if np.ptp(values, axis=0).max() < STILL:
         return
     yield {
         "name": name if "." in name else f".{name}",
@@ -139,7 +151,7 @@ def _floats(values: Array) -> umsgpack.Ext:
 
 
 def _quaternions(rotations: Array) -> Array:
-    """Rotations (n, 3, 3) as quaternions x y z w, shape (n, 4), each on the side of the one before."""
+    """Rotations (n, 3, 3) as quaternions x y z w, shape (n, 4); of q and -q the one that is nearer to the one before."""
     from scipy.spatial.transform import Rotation
 
     quaternions = Rotation.from_matrix(rotations).as_quat()

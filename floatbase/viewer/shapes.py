@@ -1,7 +1,7 @@
-"""What is drawn beside the robot: force arrows, friction cones, contact patches, the centre of mass, ground, labels.
+"""Force arrows, friction cones, contact patches, the centre of mass, the ground, labels.
 
-Each function gives items: a shape of unit size, and the pose and scale that make it this one. So a force that changes costs
-one matrix, and the scene itself says how long an arrow is and how wide a cone opens.
+Each function returns items. An item is a shape of unit size, and a matrix that scales and places it. So a force that changes
+costs one matrix, and the matrix tells how long an arrow is and how wide a cone opens.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ ARROW = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.78), (2.1, 0.78), (0.0, 1.0))  # (radiu
 
 
 class Item(NamedTuple):
-    """One thing in the picture: a shape, its pose and scale as a matrix (4, 4) in the world, its colour if that may change."""
+    """One object in a picture.
+
+    shape: what it looks like. matrix: (4, 4), its pose and scale in the world. colour: RGBA if it may change, else None.
+    """
 
     shape: Shape
     matrix: Array
@@ -36,14 +39,15 @@ class Item(NamedTuple):
 
 _EYE = read_only(np.eye(3))
 
-# path below the scene's root -> item; no path may lie below another, because a pose moves all that is below it
+# path -> item. No path may lie below another one, because a matrix moves everything below its path.
 Picture = dict[str, Item]
 
 
 def placed(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0) -> Array:
-    """The matrix that scales along a shape's own axes, turns it, and puts it at `position`.
+    """The matrix, (4, 4), that scales a shape, then turns it, then places it.
 
-    Raises `InputError` for a position that is no point, and for numbers that are not finite.
+    position: (3,), m, world. rotation: (3, 3); None for the identity. scale: one number, or (3,) along the shape's own axes.
+    Raises `InputError` for a position of another shape, and for numbers that are not finite.
     """
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = (_EYE if rotation is None else np.asarray(rotation)) * np.asarray(scale)
@@ -60,7 +64,10 @@ def placed(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale
 
 
 def directed(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
-    """A vector, shape (3,), and its length; `InputError` when it has none, for what has no length has no direction."""
+    """The vector, shape (3,), m, and its length. what: its name, for the error.
+
+    Raises `InputError` for a vector without length: it has no direction.
+    """
     array = np.asarray(vector, dtype=np.float64)
     length = math.sqrt(array @ array) if array.shape == (3,) else 0.0
     if not 1e-12 < length < math.inf:
@@ -70,10 +77,13 @@ def directed(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
 
 
 def arrow(start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False) -> Item:
-    """An arrow from `start` along `vector`, as long as the vector, both in m, world.
+    """An arrow.
 
-    size: of the robot, m; the shaft is wide enough to be seen beside it, and wider the longer the arrow, by the square root.
-    halo: wider and translucent, so that it shows around another arrow at the same place.
+    start: (3,), m, world.
+    vector: (3,), m, world, from its start to its tip.
+    colour: RGB.
+    size: size of the robot, m. The width of the shaft grows with the square roots of `size` and of the arrow's length.
+    halo: whether it is wider and translucent, so that it is seen around another arrow at the same place.
     """
     vector, length = directed("an arrow", vector)
     width = arrow_width(length, size) * (1.8 if halo else 1.0)
@@ -82,13 +92,17 @@ def arrow(start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float 
 
 
 def arrow_width(length: float, size: float) -> float:
-    """Width of the shaft of an arrow so long, m, beside a robot of this size, m."""
+    """Width of an arrow's shaft, m. length: of the arrow, m. size: of the robot, m."""
     return min(ARROW_SLENDERNESS * math.sqrt(length * ARROW_LENGTH * size), 0.35 * length)
 
 
 def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str) -> Item:
-    """(28) The cone ‖f_tangent‖ ≤ μ f_normal, up to the normal force that `height` m stand for.
+    """(28) The cone ‖f_tangent‖ ≤ μ f_normal.
 
+    position: (3,), m, world, its tip.
+    normal: (3,), unit, world, out of the ground.
+    mu: friction coefficient μ.
+    height: m: the largest normal force that it shows, times the picture's scale.
     status: "idle" (no force), "inside", "active" or "outside", which gives the colour.
     """
     positive("mu of a friction cone", mu)
@@ -98,7 +112,7 @@ def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, hei
 
 
 def cone_colour(status: str) -> RGBA:
-    """The colour that a cone of this status is drawn with."""
+    """The colour of a friction cone with a status, as `friction_cone` has it."""
     return with_alpha(CONE[status], CONE_ALPHA[status])
 
 
@@ -109,7 +123,13 @@ def friction_polyhedron(
     status: str,
     active: npt.ArrayLike = (),
 ) -> Picture:
-    """The polyhedron that stands in for the cone, as the cone of its rays; facets in `active` (numbers) light up."""
+    """The friction polyhedron that approximates a cone.
+
+    position: (3,), m, world, its tip.
+    polyhedron: the polyhedron.
+    height, status: as for `friction_cone`.
+    active: numbers of the facets that have the colour of a reached limit.
+    """
     positive("height of a friction polyhedron", height, "m")
     matrix = placed(position, _surface_frame(polyhedron.normal), height)
     key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside))
@@ -120,13 +140,16 @@ def friction_polyhedron(
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
-    """A disc on the ground where a contact is."""
+    """A disc at a contact. position: (3,), m, world. normal: (3,), unit, world. radius: m."""
     positive("radius of a contact patch", radius, "m")
     return Item(_unit_disc(PATCH), placed(position, _surface_frame(normal), (radius, radius, 0.12 * radius)))
 
 
 def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Picture:
-    """A ball at the centre of mass, its shadow point on the ground at height `ground`, and the line between."""
+    """A ball at the centre of mass, its projection on the ground, and the line between.
+
+    position: (3,), m, world. ground: height of the ground below it, m. size: of the robot, m.
+    """
     x, y, z = np.asarray(position, dtype=np.float64)
     radius = 0.04 * size
     foot = np.array([x, y, ground])
@@ -138,16 +161,30 @@ def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Pictu
 
 
 def label(position: npt.ArrayLike, text: str, height: float, colour: RGB = (0.13, 0.13, 0.13), plate: bool = True) -> Item:
-    """Text that faces the reader, letters `height` m high, centred on `position`."""
+    """Text that always faces the reader.
+
+    position: (3,), m, world, its centre.
+    text: the text; braces make a subscript: "f{c}".
+    height: height of its letters, m.
+    colour: RGB of the text.
+    plate: whether a plate lies behind it.
+    """
     return Item(_label(text, positive("height of a label's letters", height, "m"), plate, colour), placed(position))
 
 
 def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB) -> Picture:
-    """A bar along x on the ground, as long as a force of `force` N is drawn, and what it stands for."""
+    """A bar along x which shows how long a force is drawn.
+
+    position: (3,), m, world, where it starts.
+    force: the force on its label, N.
+    length: how long this force is drawn, m.
+    size: of the robot, m.
+    colour: RGB.
+    """
     start = np.asarray(position, dtype=np.float64)
     along = geometry.frame_along([1.0, 0.0, 0.0])
     thick = 0.012 * size
-    text_at = start + np.array([length / 2, 0.17 * size, 0.03 * size])  # beside it: seen along, a bar is as short as its text
+    text_at = start + np.array([length / 2, 0.17 * size, 0.03 * size])  # beside it: from its end the bar is short
     picture = {"/bar": Item(_unit_rod(colour), placed(start, along, (thick / 2, thick / 2, length)))}
     for end, x in (("/start", 0.0), ("/end", length)):
         where = start + np.array([x, 0.0, 0.0])
@@ -155,14 +192,20 @@ def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float,
     return picture | {"/label": label(text_at, f"{force:g} N", 0.055 * size, colour)}
 
 
-def rod(start: npt.ArrayLike, turned: npt.ArrayLike, length: float, radius: float, colour: RGB) -> Item:
-    """A rod from `start` along the z axis of the rotation `turned`, shape (3, 3), m, world."""
+def rod(start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: float, colour: RGB) -> Item:
+    """A rod.
+
+    start: (3,), m, world.
+    rotation: (3, 3); the rod lies along its z axis.
+    length, radius: m.
+    colour: RGB.
+    """
     positive("length of a rod", length, "m")
-    return Item(_unit_rod(colour), placed(start, turned, (radius, radius, length)))
+    return Item(_unit_rod(colour), placed(start, rotation, (radius, radius, length)))
 
 
 def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
-    """A flat convex polygon with corners, shape (n, 3), m, seen from both sides."""
+    """A flat convex polygon, seen from both sides. corners: (n, 3), m. colour: RGB. opacity: from 0 to 1."""
     points = checked("corners of a polygon", corners, (None, 3), "m")
     if len(points) < 3:
         raise InputError(f"a polygon needs three corners or more, not {len(points)}.")
@@ -170,49 +213,49 @@ def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
 
 
 def ground(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
-    """Lines on the ground z = 0 every `step` m."""
+    """A square grid of lines on the plane z = 0. colour: RGB. step: m between lines. half: half its side, m."""
     return Item(_grid(colour, step, half), np.eye(4))
 
 
 def _surface_frame(normal: npt.ArrayLike) -> Array:
-    """Axes of a contact: the tangents that the friction rows use, and the normal."""
+    """Axes of a contact, (3, 3): the two tangents that the friction rows use, and the normal."""
     x, y, z = np.asarray(normal, dtype=np.float64).tolist()
     return _surface_frame_of(x, y, z)
 
 
 @lru_cache(maxsize=256)
 def _surface_frame_of(x: float, y: float, z: float) -> Array:
-    """`_surface_frame`, once for every normal: a ground has few."""
+    """`_surface_frame` of a normal. There are few normals, so each is computed once."""
     t1, t2 = tangents([x, y, z])
     return read_only(np.stack([t1, t2, np.cross(t1, t2)], axis=1))
 
 
 @lru_cache(maxsize=64)
 def _unit_arrow(colour: RGB, opacity: float) -> Shape:
-    """Along z."""
+    """An arrow along z, 1 long, its shaft of radius 1."""
     return lowering.mesh(*geometry.revolved(ARROW), colour, opacity=opacity)
 
 
 @lru_cache(maxsize=64)
 def _unit_rod(colour: RGB) -> Shape:
-    """Along z, 1 long, of radius 1."""
+    """A rod along z, 1 long, of radius 1."""
     return lowering.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14), colour)
 
 
 @lru_cache(maxsize=64)
 def _unit_disc(colour: RGB) -> Shape:
-    """A flat cylinder around z, of radius 1, its middle at 0."""
+    """A disc around z, of radius 1 and thickness 1, its middle at 0."""
     return lowering.mesh(*geometry.revolved([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32), colour)
 
 
 @lru_cache(maxsize=64)
-def _unit_ball(colour: RGB, through: bool = False) -> Shape:
-    return lowering.mesh(*geometry.ball(1.0), colour, through=through)
+def _unit_ball(colour: RGB, on_top: bool = False) -> Shape:
+    return lowering.mesh(*geometry.ball(1.0), colour, on_top=on_top)
 
 
 @lru_cache(maxsize=1)
 def _unit_cone() -> Shape:
-    """Point down at 0, 1 high, opening to radius 1."""
+    """A cone around z, its tip at 0, 1 high, its opening of radius 1."""
     return lowering.mesh(*geometry.revolved([(0.0, 0.0), (1.0, 1.0)], 48), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"])
 
 
@@ -243,7 +286,7 @@ def _polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float
 @lru_cache(maxsize=8)
 def _grid(colour: RGB, step: float, half: float) -> Shape:
     at = np.arange(-half, half + step / 2, step)
-    # in pieces of one step: software renderers lose lines that begin far behind the camera
+    # each line in pieces of one step: software renderers lose lines that begin far behind the camera
     start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
     along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
     points = np.vstack([along_x, along_x[:, ::-1]])

@@ -1,4 +1,4 @@
-"""Text as a picture: what labels in the scene are made of."""
+"""Text as a picture, for the labels in a scene."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ from PIL import Image, ImageDraw, ImageFont
 
 from floatbase.viewer.colours import RGB
 
-LETTER = 28  # pixels
-_LOWERED = 0.68  # size of a subscript
+LETTER = 28  # height of a letter, pixels
+_LOWERED = 0.68  # size of a subscript, over that of the text
 
 
 def text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
-    """Grey and alpha of a line of text, shape (height, width, 2); braces lower a part: "f{c}". plate: behind the text."""
-    # re.split with a group gives plain and lowered parts in turn
+    """Grey and alpha of a line of text, shape (height, width, 2), 0-255.
+
+    text: the text; braces make a subscript: "f{c}". plate: whether a plate lies behind it. colour: RGB.
+    """
+    # re.split with a group returns text and subscripts in turn
     parts = [(part, i % 2 == 1) for i, part in enumerate(re.split(r"\{([^}]*)\}", text)) if part]
     widths = [_font(lowered).getlength(part) for part, lowered in parts]
     margin = LETTER // 3
@@ -39,7 +42,7 @@ def text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
 
 @cache
 def _font(lowered: bool) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """matplotlib's DejaVu Sans, which has Greek and mathematics; Pillow's own letters without it."""
+    """matplotlib's DejaVu Sans, which has Greek letters and mathematical signs; without it, Pillow's font."""
     size = LETTER * (_LOWERED if lowered else 1.0)
     spec = find_spec("matplotlib")
     if spec is not None and spec.submodule_search_locations:

@@ -1,4 +1,4 @@
-"""`Viewer(robot)`: the picture of a state, its contacts, forces and friction cones, in the page; still or moving."""
+"""`Viewer(robot)`: draws a robot with its contacts, forces and friction cones in a web page, still or moving."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.robots import Robot, State
 from floatbase.viewer import page, recording, wire
-from floatbase.viewer.camera import PRESETS, View, eye_and_target
+from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, hexadecimal
 from floatbase.viewer.ground import STEEPEST, Plane
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
 UP = (0.0, 0.0, 1.0)
-# the browser finds out whether it reaches the live page; the signs in the kernel's environment may have missed something
+# The browser tests whether it reaches the live page: `kernel_is_remote` may be wrong.
 _PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
   const frame = document.querySelector('iframe[src="URL"]');
   if (frame) frame.srcdoc = "<p style='font-family: sans-serif'>The viewer that drew this is gone: its kernel was restarted " +
@@ -39,18 +39,23 @@ _PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
 
 
 class Viewer:
-    """A robot in a meshcat window of this process.
+    """Draws a robot in a web page that this process serves.
 
-    height: of the picture in a notebook, pixels. background: "white", "light" or "dark". scale: metres drawn for a newton,
-    shared by forces and cones; by default such that the robot's weight is about twice as long as its centre of mass is high.
-    facets: draw friction cones as polyhedra with so many facets; None for round cones. inside: see `FrictionPolyhedron`.
-    ground: (3,), world, normal of the ground, a plane through the origin; by default the plane that the contacts stand on, when
-    they share a normal, else level. port: of the window; a free one by default.
-    Raises `InputError` for arguments that cannot be, and `ViewerError` when the port is taken.
+    robot: the robot to draw.
+    height: height of the picture in a notebook, pixels.
+    background: "white", "light" or "dark".
+    scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's weight about twice as long as
+        its centre of mass is high.
+    facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
+    inside: whether the polyhedra lie inside the cones, as in `FrictionPolyhedron`.
+    ground: (3,), world, normal of the ground, a plane through the origin; None takes the plane that the contacts stand on
+        when they share a normal, else a level ground.
+    port: port of the page; 0 takes a free one.
+    Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
 
-    In a notebook a viewer as the last line of a cell shows itself: the live page, or, where the kernel is on another machine
-    and its page cannot be reached, the scene as it is now. Elsewhere open `viewer.url` in a browser. Displayed again further
-    down, a viewer is live there, and the picture above is kept as it was: an interactive part gets a `Viewer` of its own.
+    In a notebook, a viewer as the last line of a cell displays itself. Elsewhere, open `viewer.url` in a browser.
+    The newest display in a notebook is live; earlier ones keep their pictures. So give each interactive part its own
+    `Viewer`. Where the kernel runs on another machine whose page cannot be reached, the display is a still copy of the scene.
     """
 
     def __init__(
@@ -70,12 +75,12 @@ class Viewer:
         if background not in BACKGROUNDS:
             raise InputError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}.")
         if facets is not None:
-            FrictionPolyhedron(np.array(UP), 1.0, facets)  # says what is wrong with the number
+            FrictionPolyhedron(np.array(UP), 1.0, facets)  # raises InputError for a wrong number of facets
         self.robot, self.background = robot, background
         self.height = int(positive("height", height, "pixels"))
-        asked = None if scale is None else positive("scale", scale, "m/N")
+        requested = None if scale is None else positive("scale", scale, "m/N")
         paper, _, lines, text = BACKGROUNDS[background]
-        self.painter = Painter(robot, asked, facets, inside, _plane(ground), lines, text, paper)
+        self.painter = Painter(robot, requested, facets, inside, _plane(ground), lines, text, paper)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
         self._moving = False
@@ -85,12 +90,12 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Address of the live page, on the kernel's machine."""
+        """Address of the live page. It can be opened on the machine of this process only."""
         return self.window.web_url
 
     @property
     def scale(self) -> float:
-        """Metres drawn for a newton, for forces and cones alike."""
+        """Length of a drawn force, m/N, the same for forces and cones."""
         return self.painter.scale
 
     def show(
@@ -112,16 +117,25 @@ class Viewer:
         title: str | None = None,
         ghost_name: str = GHOST_NAME,
     ) -> Viewer:
-        """Draw this and nothing else; drawing the same again sends nothing.
+        """Draw the robot and what the arguments ask for, and remove everything else. Returns this viewer.
 
-        forces, planned: shape (3 n,) or (n, 3) for the n points of `contacts`, N, world-aligned, what the ground does to the
-        robot: measured, and as a controller plans them. Cones are judged by `forces`, else by `planned`.
-        com: the centre of mass and its projection on the ground. support: the region that the contact points span.
-        wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world; the moment's ring has the radius that the
-        force would have which makes it at a lever as long as the robot's half diagonal. push: frame and force, (3,), N, world.
-        ghost: another state of the robot, drawn as a veil; the legend calls it ghost_name. frames: names of frames to draw.
-        labels: names of the contacts. extra: more items by path, from `floatbase.viewer.shapes`, `marks` or `props`. title: a
-        line in the corner.
+        state: the state of the robot.
+        contacts: its contacts; each gets a patch and a friction cone.
+        forces: measured forces of the ground on the robot, shape (3 n,) or (n, 3) for the n points of `contacts`, N, world.
+        planned: the same as a controller plans them. A cone's colour says where its force lies, of `forces` if given, else of
+            `planned`.
+        com: whether to draw the centre of mass and its projection on the ground.
+        cones: whether to draw the friction cones.
+        support: whether to draw the convex hull of the contact points.
+        wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a ring around its axis; its
+            radius is that of a force which has this moment at a lever of half the diagonal of the robot's bounding box.
+        push: name of a frame, and the force that acts at its origin, shape (3,), N, world.
+        ghost: another state of the robot, drawn translucent.
+        frames: names of frames whose axes to draw.
+        labels: whether to write the names of the contact points.
+        extra: path -> item, more items from `floatbase.viewer.shapes`, `marks` or `props`.
+        title: a line in the corner.
+        ghost_name: what the legend calls the ghost.
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
         `ViewerError` when the window is closed.
         """
@@ -137,7 +151,7 @@ class Viewer:
         return self
 
     def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
-        """Draw a picture, from `painter.picture` or your own items, and nothing else."""
+        """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove everything else."""
         if self._moving:
             self.window.put(wire.end_animation())
             self._moving = False
@@ -160,12 +174,16 @@ class Viewer:
         title: str | None = None,
         ghost_name: str = GHOST_NAME,
     ) -> Viewer:
-        """Play a record in the page, over and over, with a slider to seek and a choice of speeds; this call returns at once.
+        """Play a rollout in the page, again and again, with a time slider and a choice of speeds. Returns at once.
 
-        A contact that the controller's stance does not have just then has no cone; what the physics measures there is drawn.
-        speed: 1 for real time, 0.25 for slow motion. rate: pictures a second of the record. planned: the planned forces
-        too. com, cones, support, ghost, ghost_name: as for `show`. follow: the camera goes with the robot. paused: wait for
-        the reader to press play. A page whose view the reader has turned is left so when a record is played again.
+        A foot that swings, which is not among the controller's contacts just then, has no cone; its measured force is drawn.
+        rollout: the record to play.
+        speed: 1 for real time, 0.25 for slow motion.
+        rate: pictures drawn for each second of the record.
+        planned: whether to draw the planned forces too.
+        com, cones, support, ghost, title, ghost_name: as for `show`.
+        follow: whether the camera moves with the robot.
+        paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
         if rollout.robot.name != self.robot.name:
@@ -193,7 +211,12 @@ class Viewer:
         self, times: npt.ArrayLike, pictures: Sequence[Picture], *, speed: float = 1.0, paused: bool = False,
         title: str | None = None, ghost_name: str = GHOST_NAME,
     ) -> Viewer:  # fmt: skip
-        """Play pictures, from `painter.picture` or your own items, picture i from times[i], s, on."""
+        """Play pictures, made by `painter.picture` or of your own items. Returns at once.
+
+        times: (n,), s; picture i is shown from times[i] on.
+        pictures: n pictures, path -> item each.
+        speed, paused, title, ghost_name: as for `play`.
+        """
         moving = recording.animate(times, pictures, ROOT, positive("speed", speed), paused)
         self.draw(moving.first, title)
         self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name)
@@ -204,8 +227,9 @@ class Viewer:
     def camera(self, view: str | View = "default", follow: bool = False) -> Viewer:
         """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`.
 
-        follow: go with the robot when it walks away. Every call moves the pages there, also those whose view the reader has
-        turned: what is called at every move of a slider should leave the camera alone. Raises `InputError` for another name.
+        follow: whether the camera moves with the robot when it walks away.
+        Every call undoes how the reader has turned the view, so do not call it each time a slider moves.
+        Raises `InputError` for another name.
         """
         if isinstance(view, str) and view in PRESETS:
             view = PRESETS[view]
@@ -215,19 +239,19 @@ class Viewer:
         return self
 
     def _looking(self, view: View, follow: bool) -> tuple[wire.Update, wire.Update]:
-        """The page's settings for a view of the robot where it is now."""
+        """The commands that set the camera to a view of the robot where it is now, and whether it follows the robot."""
         low, high = self.painter.feet_box if view.feet else self.painter.box
         moved = np.zeros(3)
         if self._last is not None:
             moved[:2] = self._last.com[:2] - self.painter.home.com[:2]
-        target, eye = eye_and_target(view, low + moved, high + moved)
+        target, eye = target_and_eye(view, low + moved, high + moved)
         base = f"{ROOT}robot/{self.robot.model.names[1]}" if follow and self.robot.is_floating else ""
         return wire.set_camera(eye, target, view.angle), wire.page_command("set_follow", node=base)
 
     def save(self, path: str | Path, title: str | None = None) -> Path:
-        """Write the scene, still or moving, as one HTML file that needs neither server nor network; return its path.
+        """Write the scene, still or moving, as one HTML file that needs neither server nor network. Returns its path.
 
-        Raises `ViewerError` when nothing is drawn yet, for a name that is not one of a web page, and when it cannot be written.
+        Raises `ViewerError` when nothing is drawn yet, when the name does not end in .html, and when it cannot be written.
         """
         target = Path(path)
         if self.window.scene.is_empty:
@@ -241,25 +265,31 @@ class Viewer:
         return target
 
     def static_html(self, title: str | None = None) -> str:
-        """The scene as it is now, as a page that needs neither server nor network."""
-        return page.file_page(self.window.scene.lasting(), title or self.robot.name)
+        """The scene as it is now, as one HTML page that needs neither server nor network."""
+        return page.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
     def slider(
         self, name: str, changed: Callable[[float], None], value: float, low: float, high: float, step: float = 0.01
     ) -> None:
-        """A slider in the page's own panel; `changed(value)` is called, in the window's thread, when it is moved."""
+        """Add a slider to the panel in the page.
+
+        name: its label.
+        changed: called with the new value when the reader moves it, in the window's thread.
+        value: where it stands at first.
+        low, high, step: its range and its smallest step.
+        """
         self._control(name, changed, value=float(value), min=float(low), max=float(high), step=float(step))
 
     def button(self, name: str, pressed: Callable[[], None]) -> None:
-        """A button in the page's own panel; `pressed()` is called, in the window's thread."""
+        """Add a button to the panel in the page; `pressed()` is called in the window's thread."""
         self._control(name, lambda _: pressed())
 
     def checkbox(self, name: str, changed: Callable[[bool], None], value: bool) -> None:
-        """A box to tick in the page's own panel; `changed(value)` is called, in the window's thread."""
+        """Add a check box to the panel in the page; `changed(value)` is called in the window's thread."""
         self._control(name, changed, value=bool(value))
 
     def close(self) -> None:
-        """Close the window: its thread ends and its port is free."""
+        """Close the page: its thread ends and its port is free."""
         self.window.close()
 
     def _repr_html_(self) -> str:
@@ -273,14 +303,14 @@ class Viewer:
     def __repr__(self) -> str:
         return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"
 
-    def _control(self, name: str, used: Callable[[Any], None], **range_of_values: float) -> None:
-        self._controls[name] = used
-        controls = self._controls  # not self: the window must not keep its viewer alive
+    def _control(self, name: str, callback: Callable[[Any], None], **range_of_values: float) -> None:
+        self._controls[name] = callback
+        controls = self._controls  # not self, so that the window does not keep its viewer alive
         self.window.on_control(lambda which, value: controls[which](value) if which in controls else None)
         self.window.put([wire.set_control(name, **range_of_values)])
 
     def _set_stage(self, background: str) -> None:
-        """Background; the page's own grid and axes go."""
+        """Set the background, and hide meshcat's own grid and axes."""
         top, bottom = BACKGROUNDS[background][:2]
         self.canvas.set(
             wire.set_property("/Background", "top_color", list(top)),
@@ -291,10 +321,10 @@ class Viewer:
         )
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
-        """Title, and what the colours in the picture mean."""
-        own = {"push": self.painter.text}
+        """Set the title, and the legend of the colours in the picture."""
+        colours = {"push": self.painter.text}
         items = [
-            [hexadecimal(own.get(kind, colour)), ghost_name if kind == "ghost" else text]
+            [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text]
             for kind, colour, text in LEGEND
             if kind in shown
         ]
@@ -302,10 +332,10 @@ class Viewer:
 
 
 def _plane(ground: npt.ArrayLike | None) -> Plane | None:
-    """The plane through the origin with this normal."""
+    """The plane through the origin with this normal; None for None."""
     if ground is None:
         return None
     x, y, z = (float(c) for c in unit_vector("ground", ground))
     if z < STEEPEST:
-        raise InputError(f"ground is {[x, y, z]}; the normal of the ground must point up, not along it or down.")
+        raise InputError(f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] does.")
     return Plane((x, y, z))

@@ -1,7 +1,7 @@
-"""A robot's own visuals, as its URDF names them: what the light meshes are made from, and what other robots are shown with.
+"""The visuals that a robot's URDF names. The light meshes are made from them, and robots without light meshes show them.
 
-meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with wrong triangles; so the
-files are read here by trimesh, material by material. Needs trimesh, and pycollada for .dae files.
+meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with wrong triangles. So
+trimesh reads the files here, material by material. Needs trimesh, and pycollada for .dae files.
 """
 
 from __future__ import annotations
@@ -23,12 +23,18 @@ if TYPE_CHECKING:
     import trimesh
 
 GREY = (0.62, 0.64, 0.67)
-DARK = (0.2, 0.2, 0.2)  # of a material whose texture cannot be found
+DARK = (0.2, 0.2, 0.2)  # colour of a material whose texture is missing
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One coloured piece of a robot: the joint that moves it, its RGB colour 0-1, its mesh in m in the joint's frame."""
+    """One piece of a robot.
+
+    joint: Pinocchio's number of the joint that moves it.
+    colour: (3,), RGB, 0-1.
+    mesh: its triangles, m, in the joint's frame.
+    source: name of its file.
+    """
 
     joint: int
     colour: npt.NDArray[np.float64]
@@ -37,8 +43,8 @@ class Piece:
 
 
 def urdf_visuals(robot: Robot) -> list[Piece]:
-    """Every coloured piece of the URDF's visuals. Raises `ImportError` without trimesh."""
-    import trimesh  # noqa: F401  before the slow part, so that its absence shows at once
+    """All pieces of the URDF's visuals, one for each material. Raises `ImportError` without trimesh."""
+    import trimesh  # noqa: F401  raises at once if it is missing
 
     folders = [str(folder) for folder in robot.package_dirs]
     with warnings.catch_warnings():
@@ -66,7 +72,7 @@ def _pieces(item: pin.GeometryObject) -> list[Piece]:
 
 
 def _scene(path: Path) -> trimesh.Scene:
-    """What a file holds. pycollada drops a whole mesh for one material whose texture it cannot find: then without textures."""
+    """The meshes in a file. If pycollada finds none because a texture is missing, the file is read without textures."""
     import trimesh
 
     scene = trimesh.load_scene(path)
@@ -76,7 +82,7 @@ def _scene(path: Path) -> trimesh.Scene:
 
 
 def _without_textures(path: Path) -> bytes:
-    """A .dae file with a dark colour in place of every texture."""
+    """A .dae file with a dark colour instead of each texture."""
     root = ElementTree.parse(path).getroot()
     space = root.tag.rpartition("}")[0] + "}"
     for parent in list(root.iter()):
@@ -101,7 +107,7 @@ def _primitive(shape: Any) -> trimesh.Trimesh:
 
 
 def _colour(item: pin.GeometryObject, mesh: trimesh.Trimesh) -> npt.NDArray[np.float64]:
-    """The material's colour where the file has one, else the URDF's, else grey."""
+    """The colour of the file's material if it has one, else of the URDF's, else grey."""
     material = getattr(mesh.visual, "material", None)
     if Path(item.meshPath).suffix.lower() in (".dae", ".obj") and material is not None:
         return np.asarray(material.main_color[:3]) / 255.0

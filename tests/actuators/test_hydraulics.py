@@ -42,7 +42,7 @@ def test_hyqs_cylinder_gives_the_145_newton_metres_that_are_published() -> None:
 def test_the_crank_sweeps_120_degrees_with_a_stroke_of_80_millimetres() -> None:
     """HyQ's published stroke and joint range, from our crank."""
     swept = np.deg2rad([-60.0, 60.0])
-    short, long = (float(one().at([angle]).length[0]) for angle in swept)
+    short, long = (float(one().pose([angle]).length[0]) for angle in swept)
     assert long - short == pytest.approx(0.080, rel=0.04)
 
 
@@ -54,28 +54,28 @@ def test_the_length_is_the_distance_between_the_two_pivots() -> None:
     for q in np.linspace(-4.0, 4.0, 33):
         gamma = np.arccos(HYQ.crank / HYQ.base) + q
         foot, rod = np.array([HYQ.base, 0.0]), HYQ.crank * np.array([np.cos(gamma), np.sin(gamma)])
-        assert cylinder.at([q]).length[0] == pytest.approx(np.linalg.norm(rod - foot), rel=1e-12)
+        assert cylinder.pose([q]).length[0] == pytest.approx(np.linalg.norm(rod - foot), rel=1e-12)
 
 
 def test_the_lever_is_the_derivative_of_the_length_so_that_power_is_the_same_on_both_sides() -> None:
     cylinder = one()
     for q in np.linspace(-4.0, 4.0, 33):
-        slope = (cylinder.at([q + 1e-6]).length - cylinder.at([q - 1e-6]).length) / 2e-6
-        assert np.allclose(cylinder.at([q]).lever, slope, atol=1e-9)
+        slope = (cylinder.pose([q + 1e-6]).length - cylinder.pose([q - 1e-6]).length) / 2e-6
+        assert np.allclose(cylinder.pose([q]).lever, slope, atol=1e-9)
 
 
 def test_the_lever_is_longest_at_the_centre_and_zero_where_crank_and_cylinder_line_up() -> None:
     cylinder = one()
-    levers = np.array([cylinder.at([q]).lever[0] for q in np.linspace(-np.pi, np.pi, 2001)])
+    levers = np.array([cylinder.pose([q]).lever[0] for q in np.linspace(-np.pi, np.pi, 2001)])
     assert levers.max() == pytest.approx(HYQ.crank, rel=1e-6)
-    assert cylinder.at([0.0]).lever[0] == pytest.approx(HYQ.crank, rel=1e-12)
-    assert cylinder.at([-np.arccos(HYQ.crank / HYQ.base)]).lever[0] == pytest.approx(0.0, abs=1e-12)
+    assert cylinder.pose([0.0]).lever[0] == pytest.approx(HYQ.crank, rel=1e-12)
+    assert cylinder.pose([-np.arccos(HYQ.crank / HYQ.base)]).lever[0] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_chambers_take_up_what_the_piston_leaves_and_never_vanish() -> None:
     cylinder = one()
     for q in np.linspace(-np.pi, np.pi, 50):
-        before, after = cylinder.at([q - 1e-6]), cylinder.at([q + 1e-6])
+        before, after = cylinder.pose([q - 1e-6]), cylinder.pose([q + 1e-6])
         moved = after.length - before.length
         assert np.allclose(after.volumes - before.volumes, cylinder.areas * np.array([[1.0], [-1.0]]) * moved, atol=1e-18)
         assert np.all(before.volumes >= HYQ.dead_volume * (1.0 - 1e-9))
@@ -117,7 +117,7 @@ def test_an_open_valve_fills_a_blocked_chamber_along_a_parabola() -> None:
     """√(p_s - p) falls evenly: √(p_s - p₀) - β K t / (2 V), until the laminar part near p_s."""
     actuators = joints(replace(HYQ, valve_bandwidth=1e5, loop_bandwidth=1e4, leakage=0.0))
     cylinders, start = actuators.cylinders, actuators.state.pressures[0]
-    volume, size = cylinders.at(cylinders.centre).volumes[0], actuators.cylinders.crank**3 / HYQ.crank**3
+    volume, size = cylinders.pose(cylinders.centre).volumes[0], actuators.cylinders.crank**3 / HYQ.crank**3
     fall = HYQ.bulk_modulus * HYQ.valve_gain * size / (2.0 * volume)
     wanted = 10.0 * judges.load("go2").torque_limits
     for i in range(1, 31):
@@ -132,7 +132,7 @@ def test_a_blocked_piston_comes_to_rest_where_valve_and_leakage_pass_the_same_fl
     """Both edges and the gap in a row: K x √(p_s - p_A) = c (p_A - p_B) = K x √(p_B - p_t)."""
     leaky = replace(HYQ, leakage=5e-12)
     cylinder, x = one(leaky), np.array([0.3])
-    pose, still = cylinder.at([0.0]), np.zeros(1)
+    pose, still = cylinder.pose([0.0]), np.zeros(1)
 
     def rates(t: float, p: np.ndarray) -> np.ndarray:
         return cylinder.pressure_rates(x, p.reshape(2, 1), pose, still).ravel()
@@ -148,7 +148,7 @@ def test_a_blocked_piston_comes_to_rest_where_valve_and_leakage_pass_the_same_fl
 def test_closed_chambers_are_a_spring_of_the_textbooks_frequency(q: float) -> None:
     """√(β (A_A²/V_A + A_B²/V_B) / m): a mass on the rod, valve shut, timed over 20 swings."""
     cylinder, mass = one(replace(HYQ, leakage=0.0)), 60.0
-    pose = cylinder.at([q])
+    pose = cylinder.pose([q])
     volume, area = pose.volumes[:, 0], HYQ.areas
     wanted = np.sqrt(HYQ.bulk_modulus * (area[0] ** 2 / volume[0] + area[1] ** 2 / volume[1]) / mass)
     balanced = np.array([60e5, 60e5 * area[0] / area[1]])
@@ -174,7 +174,7 @@ def test_the_pumps_power_is_work_and_heat_and_compressed_oil() -> None:
     for _ in range(200):
         cylinder = Cylinders(HYQ, rng.uniform(0.01, 3.0, 4), np.zeros(4))
         x, p = rng.uniform(-1.0, 1.0, 4), rng.uniform(0.0, 200e5, (2, 4))
-        pose, v = cylinder.at(rng.uniform(-3.0, 3.0, 4)), rng.normal(size=4)
+        pose, v = cylinder.pose(rng.uniform(-3.0, 3.0, 4)), rng.normal(size=4)
         power, flows = cylinder.power(x, p, pose, v), cylinder.flows(x, p)
         fed = np.where(x > 0.0, flows[0], flows[1])
         drained = np.where(x > 0.0, flows[1], flows[0])
@@ -194,7 +194,7 @@ def test_over_a_torque_step_the_pumps_work_is_heat_plus_the_oils_own_energy() ->
     """Blocked joints: the work of the pump less the heat is Δ(½ V p²/β) of both chambers."""
     actuators = joints()
     cylinders = actuators.cylinders
-    pose, still = cylinders.at(cylinders.centre), np.zeros(12)
+    pose, still = cylinders.pose(cylinders.centre), np.zeros(12)
     before, net, dt = actuators.state.pressures, np.zeros(12), 2e-5
 
     def rest() -> np.ndarray:
@@ -264,7 +264,7 @@ def test_the_integrator_agrees_with_a_tight_one() -> None:
         assert abs(found[-1, 0] - exact[-1]) < 5e-4 * limit
 
 
-@pytest.mark.parametrize("bandwidth", [10.0, 50.0, 100.0])
+@pytest.mark.parametrize("bandwidth", [10.0, 100.0])
 def test_a_torque_step_is_followed_as_fast_as_the_bandwidth_says_and_exactly_in_the_end(bandwidth: float) -> None:
     """10 to 90 % within 0.35 / bandwidth, as a first-order lag would; less than 10 % too much; no error that stays."""
     actuators = joints(replace(HYQ, loop_bandwidth=bandwidth))
@@ -317,7 +317,7 @@ def test_a_joint_that_is_swung_keeps_its_torque_because_velocity_is_fed_forward(
         ramp = min(1.0, i / 100.0)  # set off gently
         q, v = cylinders.centre + ramp * (q - cylinders.centre), ramp * v
         worst = np.maximum(worst, np.abs(actuators.step(tau, q, v, dt) - tau) / robot.torque_limits)
-    spring = 0.3 * cylinders.crank**2 * cylinders.at(cylinders.centre).stiffness / robot.torque_limits
+    spring = 0.3 * cylinders.crank**2 * cylinders.pose(cylinders.centre).stiffness / robot.torque_limits
     assert np.max(worst) < 0.06
     assert np.min(spring / worst) > 100.0
 
@@ -340,7 +340,7 @@ def test_torque_saturates_where_the_pressure_says_and_never_beyond(turn: float) 
     actuators = joints(replace(HYQ, leakage=0.0))
     q, still = actuators.cylinders.centre + turn, np.zeros(12)
     limits = actuators.torque_limits(q)
-    h, pose = HYQ, actuators.cylinders.at(q)
+    h, pose = HYQ, actuators.cylinders.pose(q)
     A, B = actuators.cylinders.areas
     assert np.allclose(limits[1], pose.lever * (A * h.supply_pressure - B * h.tank_pressure))
     for sign, limit in zip((-1.0, 1.0), limits, strict=True):
@@ -378,7 +378,7 @@ def test_oil_that_is_pulled_apart_boils_instead_of_pulling() -> None:
 # memory
 
 
-def test_a_reset_puts_the_oil_under_the_torques_asked_for_and_forgets_the_rest() -> None:
+def test_a_reset_puts_the_oil_under_the_desired_torques_and_forgets_the_rest() -> None:
     robot, actuators = judges.load("go2"), joints()
     run(actuators, robot.torque_limits, 0.02)
     tau, q = 0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12), actuators.cylinders.centre + 0.3

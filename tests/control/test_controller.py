@@ -28,12 +28,14 @@ def cases(name: str, n: int) -> list[State]:
 
 
 @pytest.mark.parametrize(("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS])
-def test_daqp_gives_the_torques_that_cvxpy_gives(name: str, n: int) -> None:
+def test_daqp_finds_the_optimum_that_cvxpy_finds(name: str, n: int) -> None:
     controller, pushed = controller_of(name), 0
     for state in cases(name, n):
         qp = controller.qp(state)
         found, judge = solve(qp), solve(qp, "cvxpy")
-        assert np.max(np.abs(found["tau"] - judge["tau"])) < 1e-4
+        prices = float(np.sum(judge.inequality_multipliers) + np.sum(np.abs(judge.equality_multipliers)))
+        worth = max(judge.residuals.inequality, judge.residuals.equality) * prices + judge.residuals.complementarity * len(qp.G)
+        assert abs(found.objective - judge.objective) < 1e-9 * (1.0 + abs(judge.objective)) + 2.0 * worth
         pushed += bool(found.active)
         for solution in (found, judge):
             r = solution.residuals
@@ -199,13 +201,13 @@ def test_normal_forces_are_along_the_normals_of_tilted_ground() -> None:
 
 
 def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
-    state = judges.states("go2", 1, 0.3)[0]
+    state = judges.states("go2", 1, 0.1)[0]
     robot = state.robot
     assert np.array_equal(controller_of("go2").limits.torque_limits, robot.torque_limits)
-    assert np.max(np.abs(controller_of("go2", torque_limits=12.0)(state.q, state.v).tau)) <= 12.0 + 1e-6
     free = controller_of("go2", torque_limits=np.inf)
     assert not any(name.startswith("torque") for name in free.qp(state).inequality_names)
-    assert np.max(np.abs(free(state.q, state.v).tau)) > 12.0
+    less = 0.9 * float(np.max(np.abs(free(state.q, state.v).tau)))
+    assert np.max(np.abs(controller_of("go2", torque_limits=less)(state.q, state.v).tau)) <= less * (1.0 + 1e-9)
     some = np.full(12, np.inf)
     some[3] = 1.0
     one = controller_of("go2", torque_limits=some)

@@ -19,8 +19,6 @@ ALL = fb.Contacts.points(GO2)
 @pytest.mark.parametrize(
     ("make", "kind", "text"),
     [
-        (lambda: fb.Contacts([]), InputError, r"no contacts given; use fb\.Contacts\.none\(\) when the robot really touches"),
-        (lambda: ALL.only(), InputError, r"no contacts given; use fb\.Contacts\.none\(\)"),
         (lambda: fb.Contacts.points(UR5), InputError, r'ur5 has no feet; name the frames that touch: frames=\["…"\]'),
         (lambda: fb.Contacts.points(GO2, mu=0.0), InputError, "coefficient mu of FL_foot is 0; it must be > 0"),
         (lambda: fb.Contacts.points(GO2, mu=-0.5), InputError, "coefficient mu of FL_foot is -0.5; it must be > 0"),
@@ -58,6 +56,7 @@ ALL = fb.Contacts.points(GO2)
         (lambda: ALL.force_slice("FL"), UnknownNameError, "unknown contact 'FL'"),
         (lambda: PointContact("toe", radius=-1.0), InputError, "radius of toe is -1; it must be ≥ 0 m"),
         (lambda: FlatFootContact("toe", np.zeros(3)), InputError, r"corners of toe has shape \(3,\); .*\(any, 3\) \(m\)"),
+        (lambda: FlatFootContact("toe", [[1, 0, 0], [0, 0, 0], [2, 0, 0]]), InputError, "corners of toe span no area"),
         (lambda: fb.equations_of_motion(GO2, ALL), InputError, "needs a State first, not Robot"),
         (lambda: fb.equations_of_motion(GO2.standing(), [1]), InputError, r"Contacts second, as fb\.Contacts\.points\(robot\)"),
         (lambda: fb.equations_of_motion(SOLO.standing(), ALL), UnknownNameError, "unknown frame of solo12 'FL_foot'"),

@@ -91,7 +91,7 @@ def test_what_cannot_be_used_is_an_error_of_the_package_that_names_the_argument(
 
 
 def test_all_errors_of_the_package_can_be_caught_by_one_name() -> None:
-    for make in (lambda: fb.load("go3"), lambda: fb.State(GO2, Q[:5]), lambda: fb.Contacts([])):
+    for make in (lambda: fb.load("go3"), lambda: fb.State(GO2, Q[:5]), lambda: fb.Contacts([1])):
         with pytest.raises(fb.FloatbaseError):
             make()
     with pytest.raises(KeyError, match="^unknown robot 'go3'"):  # the message itself, not its repr

@@ -133,7 +133,7 @@ def test_joint_transforms_are_where_mujoco_has_the_joints(name: str) -> None:
 
 def test_a_state_does_not_change() -> None:
     state = judges.load("go2").standing()
-    with pytest.raises(fb.FloatbaseError, match=r"a State does not change; state\.replace\(q=…\) makes a new one"):
+    with pytest.raises(AttributeError, match="cannot assign to field 'q'"):
         state.q = state.q
     with pytest.raises(ValueError, match="read-only"):
         state.q[0] = 1.0

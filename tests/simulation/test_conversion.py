@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import judges
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -24,13 +23,6 @@ def test_a_state_survives_the_way_to_mujoco_and_back(seed: int, name: str) -> No
     qpos, qvel = convert.to_mujoco(state.q, state.v)
     assert np.allclose(convert.q(qpos), state.q, atol=1e-12)
     assert np.allclose(convert.v(qpos, qvel), state.v, atol=1e-12)
-
-
-@given(seed=seeds, name=any_robot)
-def test_the_velocity_map_is_the_conversion_of_velocities(seed: int, name: str) -> None:
-    state, convert = judges.load(name).random_state(seed, 0.7), judges.mujoco_of(name).convert
-    qpos, qvel = convert.to_mujoco(state.q, state.v)
-    assert np.allclose(convert.velocity_map(qpos) @ state.v, qvel, atol=1e-12)
 
 
 @given(seed=seeds, name=st.sampled_from(judges.FLOATING))
@@ -82,13 +74,12 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and
     sim, state = fb.Simulation(loose), loose.random_state(0)
     sim.reset(state)
     assert np.allclose(sim.q, state.q)
-    T, M = sim._convert.velocity_map(sim.data.qpos), np.zeros((12, 12))
-    mujoco.mj_fullM(sim.model, sim.data, M)
-    assert np.allclose(T.T @ M @ T, state.M, atol=1e-9)
+    assert np.allclose(judges.Mujoco(loose).at(state).M, state.M, atol=1e-9)
     lift = fb.Push([0.0, 0.0, 2.0 * loose.weight], duration=1.0)  # it falls upwards with g
-    for _ in range(100):
-        sim.step(np.ones(6), (lift,))
-    assert sim.state.com_velocity[2] - state.com_velocity[2] == pytest.approx(0.1 * loose.gravity, rel=0.01)
+    sim.reset(state.replace(v=np.zeros(12)))
+    for _ in range(20):
+        sim.step(np.zeros(6), (lift,))
+    assert sim.state.com_velocity[2] == pytest.approx(0.02 * loose.gravity, rel=0.01)
 
 
 def test_a_foot_without_a_possible_inertia_is_joined_to_the_leg_that_carries_it() -> None:

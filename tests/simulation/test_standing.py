@@ -21,7 +21,7 @@ def stood(name: str, duration: float, push: bool = False) -> fb.Rollout:
     return fb.rollout(fb.Simulation(robot), controller, duration, pushes)
 
 
-LONG = [("go2", 10.0), ("solo12", 10.0)]
+LONG = [("go2", 5.0), ("solo12", 5.0)]
 SHORT = [(name, 1.5) for name in judges.FLOATING if name not in dict(LONG)]
 
 
@@ -61,7 +61,7 @@ def test_torques_and_forces_settle(record: fb.Rollout) -> None:
 
 
 def test_after_a_push_of_30_newtons_go2_comes_back() -> None:
-    record, start = stood("go2", 3.0, push=True), judges.load("go2").standing()
+    record, start = stood("go2", 2.0, push=True), judges.load("go2").standing()
     strayed = np.linalg.norm(record.com - start.com, axis=1)
     assert record.outcome == "completed"
     assert strayed.max() > 3e-3, "the push moved nothing"
@@ -71,23 +71,22 @@ def test_after_a_push_of_30_newtons_go2_comes_back() -> None:
 
 
 def test_under_the_push_the_ground_pushes_back() -> None:
-    record = stood("go2", 3.0, push=True)
+    record = stood("go2", 2.0, push=True)
     sideways = record.measured.reshape(len(record), 4, 3).sum(axis=1)[:, :2]
     before, during = (record.time > 0.2) & (record.time < 0.49), (record.time > 0.53) & (record.time < 0.59)
     assert np.abs(sideways[before]).max() < 1.0
     assert np.all(sideways[during] @ [0.5, 0.87] < -5.0)
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_solo8_pushed_out_of_its_singular_stance_stands_on(path: str) -> None:
-    """Beside the symmetric stance J has singular values that are small and of no use, and rows that contradict each other by
-    the noise of q and v. It does not come back: once it leans, its contacts hold the lean (J has one rank more)."""
-    if path == "compiled":
-        pytest.importorskip("numba")
+@pytest.mark.parametrize(("path", "period"), [("compiled", 0.001), ("readable", 0.005)])
+def test_solo8_pushed_out_of_its_singular_stance_stands_on(path: str, period: float) -> None:
+    """Beside the symmetric stance J has singular values that are small and of no use, and rows that are inconsistent by the
+    noise of q and v. It does not come back: once it leans, its contacts hold the lean (J has one rank more)."""
     robot = judges.load("solo8")
     standing = robot.standing()
     controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(standing), path=path)
-    record = fb.rollout(fb.Simulation(robot), controller, 1.5, [fb.Push([0.0, 5.0, 0.0], start=0.1, duration=0.1)])
+    push = fb.Push([0.0, 5.0, 0.0], start=0.1, duration=0.1)
+    record = fb.rollout(fb.Simulation(robot), controller, 1.5, [push], control_period=period)
     away = np.linalg.norm(record.com - standing.com, axis=1)
     assert record.outcome == "completed"
     assert 5e-3 < away.max() < 15e-3

@@ -1,8 +1,9 @@
-"""Robots and windows for the viewer's tests, and a real browser where there is one."""
+"""Robots and windows for the viewer's tests, and a page of a real browser where there is one."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from browsers import launched
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
 from floatbase.viewer import Viewer, Window
+
+from .looks import CONTEXTS, SIZE, Screen
 
 
 @pytest.fixture(scope="session")
@@ -49,18 +52,38 @@ def viewer(go2: Robot) -> Iterator[Viewer]:
     view.close()
 
 
-@pytest.fixture(scope="module")
-def browser():
-    yield from launched()
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Any]:
+    yield from launched(f"--max-active-webgl-contexts={CONTEXTS}")
+
+
+@pytest.fixture(scope="package")
+def tab(browser) -> Iterator[Any]:
+    """One page for all tests: a new one costs three times as much as another address in the same one."""
+    opened = browser.new_page()
+    yield opened
+    opened.close()
 
 
 @pytest.fixture
-def page(browser):
-    """A page that fails the test when its script fails."""
-    opened = browser.new_page(viewport={"width": 900, "height": 600})
+def page(tab) -> Iterator[Any]:
+    """The page, which fails the test when its script fails."""
     errors: list[str] = []
-    opened.on("pageerror", lambda error: errors.append(str(error)))
-    opened.on("console", lambda line: errors.append(line.text) if line.text.startswith("floatbase") else None)
-    yield opened
-    opened.close()
+    hears = {
+        "pageerror": lambda error: errors.append(str(error)),
+        "console": lambda line: errors.append(line.text) if line.text.startswith("floatbase") else None,
+    }
+    tab.set_viewport_size(SIZE)
+    for event, hear in hears.items():
+        tab.on(event, hear)
+    yield tab
+    for event, hear in hears.items():
+        tab.remove_listener(event, hear)
+    tab.goto("about:blank")
     assert errors == []
+
+
+@pytest.fixture
+def screen(page, window: Window) -> Screen:
+    """A page that shows, without being loaded anew, what any viewer has drawn."""
+    return Screen(page, window)

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import io
+import time
+from collections.abc import Callable
 
 import numpy as np
 from browsers import SCREENSHOTS
 from PIL import Image
 
-from floatbase.viewer import Viewer
+from floatbase.viewer import Viewer, Window, wire
+
+SIZE = {"width": 900, "height": 600}
+SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
+CONTEXTS = 4  # WebGL contexts of the tests' browser: an ordinary one has 16, which take many displays to use up
 
 # world position of a node, in our coordinates
 WHERE = """(path) => {
@@ -16,12 +22,41 @@ WHERE = """(path) => {
   node.getWorldPosition(at);
   return [at.x, -at.z, at.y];
 }"""
+EYE = "viewer.camera.position.toArray()"
+DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render"
+
+PATIENCE = 60.0  # s for what takes a moment on an idle machine: no test may fail because others keep the machine busy
 
 
-def settle(page, viewer: Viewer, frames: int = 1) -> None:
-    """Wait until the page has drawn."""
-    page.wait_for_function(f"window.viewer && viewer.num_messages_received >= {frames}")
-    page.wait_for_function("!viewer.needs_render")
+def until(true: Callable[[], bool]) -> None:
+    """Wait until it is true."""
+    deadline = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < deadline, "it has not come true"
+        time.sleep(0.01)
+
+
+def settle(page, title: str | None = None) -> None:
+    """Wait until the page has drawn, with this title if there is one."""
+    titled = "" if title is None else f" && document.getElementById('title').textContent == '{title}'"
+    page.wait_for_function(DRAWN + titled)
+
+
+class Screen:
+    """A page on a window of its own. The scenes of other viewers are copied into it."""
+
+    def __init__(self, page, window: Window):
+        self.page, self.window = page, window
+        window.put([wire.page_command("set_title", text="")])
+        page.goto(window.web_url)
+        settle(page)
+
+    def show(self, viewer: Viewer) -> None:
+        """Show what a viewer has drawn, and nothing else."""
+        commands = [wire.encode(command) for command in viewer.window.scene.commands().values()]
+        handled = self.page.evaluate("viewer.num_messages_received")
+        self.window.put([wire.delete("/meshcat"), *commands])
+        self.page.wait_for_function(f"viewer.num_messages_received > {handled} && !viewer.needs_render")
 
 
 def picture(page, name: str) -> np.ndarray:
@@ -33,8 +68,8 @@ def picture(page, name: str) -> np.ndarray:
 
 def hue_pixels(image: np.ndarray, colour: tuple[float, float, float]) -> int:
     """How many pixels have the colour's hue, whatever the light."""
-    wanted = np.array(colour) - np.mean(colour)
+    expected = np.array(colour) - np.mean(colour)
     have = image - image.mean(axis=2, keepdims=True)
     length = np.linalg.norm(have, axis=2)
-    aligned = (have @ wanted) / np.maximum(length * np.linalg.norm(wanted), 1e-9)
+    aligned = (have @ expected) / np.maximum(length * np.linalg.norm(expected), 1e-9)
     return int(np.sum((aligned > 0.97) & (length > 25)))

@@ -6,14 +6,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 import numpy as np
 import pytest
 
 from floatbase import Contacts, Simulation, WholeBodyController, standing_tasks
-from floatbase.__main__ import PERIODS, Pace, Playground, control_period, main
+from floatbase.__main__ import main
+from floatbase.playground import PERIODS, Pace, Playground, control_period
 from floatbase.robots import Robot, catalogue, load
 
 from .looks import picture
@@ -51,43 +52,41 @@ def playground(go2: Robot) -> Iterator[Playground]:
     started.close()
 
 
+def until(condition: Callable[[], bool], wait: Callable[[], object] = lambda: time.sleep(0.02), seconds: float = 30.0) -> None:
+    """Wait until a condition holds; with a page, `wait` must let it work."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        wait()
+
+
 def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) -> None:
+    def work() -> None:
+        page.wait_for_timeout(20)
+
+    def control(name: str, call: str) -> None:
+        page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
+
+    def drawn() -> set[str]:
+        return {path for path in playground.view.canvas.picture if path.startswith("measured/")}
+
     page.goto(playground.view.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-
-    def moved(axis: int, target: float) -> bool:
-        """Whether the centre of mass comes within 1 cm of where it should."""
-        wanted = go2.standing().com[axis] + target
-        for _ in range(200):
-            page.wait_for_timeout(100)
-            if abs(playground.sim.state.com[axis] - wanted) < 0.01:
-                return True
-        return False
-
-    page.evaluate("viewer.gui_controllers['CoM x [m]'].setValue(0.04)")
-    assert moved(0, 0.04)
-    page.evaluate("viewer.gui_controllers['facets'].setValue(6)")
-    page.evaluate("viewer.gui_controllers['friction believed'].setValue(0.3)")
-    page.wait_for_timeout(500)
+    control("CoM x [m]", "setValue(0.04)")
+    until(lambda: abs(playground.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work)
+    control("facets", "setValue(6)")
+    control("friction believed", "setValue(0.3)")
+    until(lambda: abs(playground.mu - 0.3) < 1e-9, work)
     assert (playground.facets, playground.view.painter.facets) == (6, 6)
-    assert playground.mu == pytest.approx(0.3)
     picture(page, "bare_page")
-    page.evaluate("viewer.gui_controllers['pause'].fire()")
-    for _ in range(50):
-        page.wait_for_timeout(20)
-        if playground.run.status == "paused":
-            break
+    control("pause", "fire()")
+    until(lambda: playground.run.status == "paused", work)
+    playground.run.close()  # waits for the last slice
     stopped = playground.sim.time
-    page.wait_for_timeout(300)
-    assert playground.sim.time - stopped < 0.1
-    page.evaluate("viewer.gui_controllers['on FL_foot'].setValue(false)")
-    page.evaluate("viewer.gui_controllers['run'].fire()")
-    for _ in range(100):
-        page.wait_for_timeout(20)
-        if "measured/FL_foot" not in playground.view.canvas.picture:
-            break
-    assert "measured/FR_foot" in playground.view.canvas.picture
-    assert "measured/FL_foot" not in playground.view.canvas.picture
+    control("on FL_foot", "setValue(false)")
+    control("run", "fire()")
+    until(lambda: playground.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
+    assert "measured/FR_foot" in drawn()
 
 
 def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
@@ -120,12 +119,9 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
 
 @pytest.mark.filterwarnings("error")  # as an exception in the run's thread would be
 def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> None:
-    until = time.monotonic() + 20.0
-    while playground.last is None and time.monotonic() < until:
-        time.sleep(0.02)
+    until(lambda: playground.last is not None)
     playground.view.close()
-    while playground.run.status == "running" and time.monotonic() < until:
-        time.sleep(0.02)
+    until(lambda: playground.run.status != "running")
     assert "window is closed" in playground.run.status
     playground.run.close()
 
@@ -135,14 +131,14 @@ def test_the_pace_is_simulated_time_over_time() -> None:
     pace = Pace(lambda: now[0])
     for i in range(101):
         now[0] = 0.03 * i
-        told = pace.at(0.5 * now[0])
-        assert (told is None) == (now[0] <= 0.5)
-    assert told == pytest.approx(0.5)
+        found = pace.update(0.5 * now[0])
+        assert (found is None) == (now[0] <= 0.5)
+    assert found == pytest.approx(0.5)
     now[0] += 60.0  # a pause
-    assert pace.at(2.0) is None
+    assert pace.update(2.0) is None
     now[0] += 0.6
-    assert pace.at(2.6) == pytest.approx(1.0)
-    assert pace.at(0.0) is None  # a reset
+    assert pace.update(2.6) == pytest.approx(1.0)
+    assert pace.update(0.0) is None  # a reset
 
 
 def test_the_control_period_leaves_room_and_the_robot_where_it_stood(go2: Robot) -> None:
@@ -158,9 +154,6 @@ def test_the_control_period_leaves_room_and_the_robot_where_it_stood(go2: Robot)
 def test_robots_without_point_feet_run_too(name: str) -> None:
     playground = Playground(load(name))
     playground.start()
-    deadline = time.monotonic() + 30
-    while playground.sim.time < 0.05 and time.monotonic() < deadline:
-        time.sleep(0.02)
+    until(lambda: playground.sim.time >= 0.05)
     assert playground.run.status == "running"
-    assert playground.sim.time >= 0.05
     playground.close()

@@ -10,59 +10,54 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from floatbase._assets import assets_root
 from floatbase.dynamics import Contacts
 from floatbase.robots import catalogue, load, load_urdf
-from floatbase.viewer import robot_meshes
+from floatbase.viewer import robot_meshes, urdf_visuals
+
+BOX = 0.006  # m: by which decimation may move an outermost vertex; two pixels in a picture of a whole robot
+REACH = 0.03  # m from a contact to the nearest vertex: a foot's ball has a radius of 2 cm, and a sole few vertices
+
+ASSETS = Path(__file__).parents[2] / "assets"
+
+
+def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
+    for name in catalogue():
+        assert (ASSETS / "meshes" / f"{name}.npz").stat().st_size < 400_000, name
+        for mesh in robot_meshes(load(name)):
+            assert mesh.faces.max() < len(mesh.vertices) == len(mesh.colours), name
+            assert np.all(np.isfinite(mesh.vertices)), name
 
 
 @pytest.mark.parametrize("name", catalogue())
-def test_light_meshes_are_under_400_kb_and_good_triangles(name: str) -> None:
-    assert (assets_root() / "meshes" / f"{name}.npz").stat().st_size < 400_000
-    for mesh in robot_meshes(load(name)):
-        assert mesh.faces.max() < len(mesh.vertices) == len(mesh.colours)
-        assert np.all(np.isfinite(mesh.vertices))
-
-
-@pytest.mark.parametrize("name", catalogue())
-def test_light_meshes_fill_the_same_box_as_the_originals(name: str) -> None:
+def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(name: str) -> None:
     pytest.importorskip("trimesh", reason="the originals are read with trimesh")
     pytest.importorskip("collada", reason="the originals are read with pycollada")
-    from floatbase.viewer import urdf_visuals
-
     robot = load(name)
+    folders = [str(folder) for folder in robot.package_dirs]
+    visuals = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.VISUAL, package_dirs=folders).geometryObjects
     pieces = urdf_visuals(robot)
+    assert {(piece.joint, piece.source) for piece in pieces} == {
+        (visual.parentJoint, Path(visual.meshPath).stem) for visual in visuals
+    }
     light = robot_meshes(robot)
     assert {mesh.joint for mesh in light} == {piece.joint for piece in pieces}
     for mesh in light:
         own = np.vstack([piece.mesh.vertices for piece in pieces if piece.joint == mesh.joint])
-        np.testing.assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=0.006)
-        np.testing.assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=0.006)
+        np.testing.assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=BOX)
+        np.testing.assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=BOX)
 
 
-@pytest.mark.parametrize("name", catalogue())
-def test_every_visual_of_the_original_is_read(name: str) -> None:
-    pytest.importorskip("trimesh", reason="the originals are read with trimesh")
-    pytest.importorskip("collada", reason="the originals are read with pycollada")
-    from floatbase.viewer import urdf_visuals
-
-    robot = load(name)
-    folders = [str(folder) for folder in robot.package_dirs]
-    visuals = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.VISUAL, package_dirs=folders).geometryObjects
-    assert {(piece.joint, piece.source) for piece in urdf_visuals(robot)} == {
-        (visual.parentJoint, Path(visual.meshPath).stem) for visual in visuals
-    }
-
-
-@pytest.mark.parametrize("name", [name for name in catalogue() if load(name).feet])
-def test_light_meshes_reach_down_to_the_contacts(name: str) -> None:
-    robot = load(name)
-    state = robot.standing()
-    contacts = (Contacts.flat_feet if robot.feet[0].is_flat else Contacts.points)(robot)
-    poses = state.joint_transforms
-    points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in robot_meshes(robot)]
-    for position in contacts.positions(state):
-        assert np.linalg.norm(np.vstack(points) - position, axis=1).min() < 0.03
+def test_light_meshes_reach_down_to_the_contacts() -> None:
+    for name in catalogue():
+        robot = load(name)
+        if not robot.feet:
+            continue
+        state = robot.standing()
+        contacts = (Contacts.flat_feet if robot.feet[0].is_flat else Contacts.points)(robot)
+        poses = state.joint_transforms
+        points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in robot_meshes(robot)]
+        for position in contacts.positions(state):
+            assert np.linalg.norm(np.vstack(points) - position, axis=1).min() < REACH, name
 
 
 def test_a_robot_outside_the_catalogue_shows_its_own_meshes() -> None:
@@ -78,7 +73,7 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
     assert [mesh.joint for mesh in meshes] == list(range(1, robot.model.njoints))
     calf = meshes[-1].vertices
     foot = robot.model.frames[robot.model.getFrameId("RR_foot")].placement.translation
-    assert np.linalg.norm(calf - foot, axis=1).min() < 0.03
+    assert np.linalg.norm(calf - foot, axis=1).min() < REACH
 
 
 def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut(tmp_path: Path) -> None:

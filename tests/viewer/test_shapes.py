@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import umsgpack
 
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
@@ -17,20 +18,16 @@ from floatbase.viewer import (
     LEGEND,
     MEASURED,
     PLANNED,
-    Canvas,
     View,
     Viewer,
-    Window,
     below,
     geometry,
     marks,
-    nice,
     props,
     shapes,
-    text_picture,
 )
 
-from .looks import picture, settle
+from .looks import SMALL, Screen, picture, settle
 
 
 @pytest.mark.parametrize(
@@ -131,13 +128,9 @@ def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> Non
     assert middle(0.45) - middle(0.40) == pytest.approx(0.05)
 
 
-@pytest.mark.parametrize(("value", "wanted"), [(1.0, 1.0), (3.0, 2.0), (3.3, 5.0), (0.0044, 0.005), (800, 1000.0)])
-def test_nice_numbers_are_one_two_or_five(value: float, wanted: float) -> None:
-    assert nice(value) == pytest.approx(wanted)
-
-
 def test_braces_lower_a_part_of_a_label() -> None:
-    plain, lowered = (text_picture(text, False, (0, 0, 0)) for text in ("fc", "f{c}"))
+    images = [shapes.label([0, 0, 0], text, 0.1, plate=False).shape.lowered["images"][0]["url"] for text in ("fc", "f{c}")]
+    plain, lowered = (np.frombuffer(i["data"].data, np.uint8).reshape(i["height"], i["width"], 2)[::-1] for i in images)
     assert lowered.shape[1] < plain.shape[1]
     rows = [np.flatnonzero(image[:, :, 1].any(axis=1)).max() for image in (plain, lowered)]
     assert rows[1] > rows[0]
@@ -155,24 +148,22 @@ DEFICIENCIES = {
 }
 
 
-@pytest.mark.parametrize("name", DEFICIENCIES)
-def test_the_colour_code_is_readable_for_the_colour_blind(name: str) -> None:
-    for one, other in [(MEASURED, PLANNED), (CONE["inside"], CONE["active"]), (CONE["inside"], CONE["outside"]),
-                       (CONE["active"], CONE["outside"])]:  # fmt: skip
-        difference = _simulated(one, DEFICIENCIES[name]) - _simulated(other, DEFICIENCIES[name])
-        assert np.linalg.norm(difference) > 0.2
+def test_the_colour_code_is_readable_for_the_colour_blind() -> None:
+    for name, deficiency in DEFICIENCIES.items():
+        for one, other in [(MEASURED, PLANNED), (CONE["inside"], CONE["active"]), (CONE["inside"], CONE["outside"]),
+                           (CONE["active"], CONE["outside"])]:  # fmt: skip
+            assert np.linalg.norm(_simulated(one, deficiency) - _simulated(other, deficiency)) > 0.2, name
 
 
-@pytest.mark.parametrize("background", BACKGROUNDS)
-@pytest.mark.parametrize("name", DEFICIENCIES)
-def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_the_push(name: str, background: str) -> None:
-    paper, text = BACKGROUNDS[background][0], BACKGROUNDS[background][3]
-    outlined = marks.push([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 1.0, text, paper).shape.lowered
-    data = outlined["geometries"][0]["data"]["attributes"]["color"]["array"].data
-    first, *_, last = np.frombuffer(data, np.uint8).reshape(-1, 3) / 255  # painted in this order
-    for have, wanted in ((first, paper), (last, text)):
-        np.testing.assert_allclose(have, wanted, atol=1e-2)
-    assert np.linalg.norm(_simulated(tuple(first), DEFICIENCIES[name]) - _simulated(tuple(last), DEFICIENCIES[name])) > 0.8
+def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_the_push() -> None:
+    for paper, _, _, text in BACKGROUNDS.values():
+        outlined = marks.push([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 1.0, text, paper).shape.lowered
+        data = outlined["geometries"][0]["data"]["attributes"]["color"]["array"].data
+        first, *_, last = np.frombuffer(data, np.uint8).reshape(-1, 3) / 255  # painted in this order
+        for painted, colour in ((first, paper), (last, text)):
+            np.testing.assert_allclose(painted, colour, atol=1e-2)
+        for name, deficiency in DEFICIENCIES.items():
+            assert np.linalg.norm(_simulated(tuple(first), deficiency) - _simulated(tuple(last), deficiency)) > 0.8, name
 
 
 def test_a_pushs_outline_is_as_wide_at_its_ends_as_along_it() -> None:
@@ -195,14 +186,14 @@ def test_every_background_has_readable_text() -> None:
     assert len(LEGEND) == len({text for *_, text in LEGEND})
 
 
-@pytest.mark.parametrize("name", FIGURES)
-def test_figures(page, name: str) -> None:
-    viewer = FIGURES[name]()
-    page.goto(viewer.url)
-    settle(page, viewer)
-    image = picture(page, name)
-    assert (np.abs(image - image[300, 5]).sum(axis=2) > 60).mean() > 0.03
-    viewer.close()
+def test_figures(screen: Screen) -> None:
+    screen.page.set_viewport_size(SMALL)
+    for name, figure in FIGURES.items():
+        viewer = figure()
+        screen.show(viewer)
+        viewer.close()
+        image = picture(screen.page, name)
+        assert (np.abs(image - image[150, 2]).sum(axis=2) > 60).mean() > 0.03, name
 
 
 def test_figure_1_adds_up() -> None:
@@ -231,7 +222,7 @@ def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, st
     )  # fmt: skip
     viewer.camera(View(40.0, 25.0, 1.7))
     page.goto(viewer.url)
-    settle(page, viewer)
+    settle(page)
     drawn = page.evaluate(
         "(() => { let n = 0; viewer.scene_tree.children.meshcat.object.traverse((o) => { n += o.name == 'shape'; });"
         " return n; })()"
@@ -250,10 +241,10 @@ def test_no_path_of_a_picture_lies_below_another(viewer: Viewer, go2: Robot, sta
     assert not [(a, b) for a in paths for b in paths if b.startswith(a + "/")]
 
 
-def test_a_canvas_redraws_what_has_another_shape() -> None:
-    with Window() as window:
-        canvas = Canvas(window)
-        one, other = (shapes.Item(shapes.arrow([0, 0, 0], [0, 0, 1.0], c).shape, np.eye(4)) for c in (MEASURED, PLANNED))
-        assert canvas.draw({"a": one}) == 2
-        assert canvas.draw({"a": other}) == 1
-        assert canvas.draw({}) == 1
+def test_a_drawing_redraws_what_has_another_shape(viewer: Viewer) -> None:
+    one, other = (shapes.Item(shapes.arrow([0, 0, 0], [0, 0, 1.0], c).shape, np.eye(4)) for c in (MEASURED, PLANNED))
+    for picture_of, kinds in (({"a": one}, ["set_object", "set_transform"]), ({"a": other}, ["set_object"]), ({}, ["delete"])):
+        newest = viewer.window.scene.newest
+        viewer.draw(picture_of)
+        sent = [umsgpack.unpackb(command) for command in viewer.window.scene.since(newest)[1]]
+        assert [command["type"] for command in sent if command["path"] == "/meshcat/a"] == kinds

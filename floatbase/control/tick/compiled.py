@@ -1,6 +1,6 @@
-"""The compiled path of `WholeBodyController`: whether the kernel can be had, and the tick by it.
+"""The compiled tick as the controller calls it: whether it can run a problem, and the class that runs it.
 
-`kernel_obstacle` says in words why nothing can be compiled. `kernel.py` is loaded when it is needed: numba takes a while.
+numba takes a while to load, so the files that need it are imported when the first problem is compiled.
 """
 
 from __future__ import annotations
@@ -8,20 +8,32 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
+from dataclasses import replace
+from functools import lru_cache
+from math import prod
 from pickle import UnpicklingError
 from threading import Timer
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from floatbase._arrays import Array
-from floatbase.control.tick.tables import Answer, Dynamics, Program
+from floatbase.control.tick.tables import CONTACT_KINDS, TASK_KINDS, dynamics_of, tables_of
+from floatbase.errors import InputError
+from floatbase.objectives import Task, nearest_rotation
+from floatbase.robots import Robot
+
+if TYPE_CHECKING:
+    from floatbase.control.problem import Problem
+
+# joints whose axes stand still in their own frame
+_JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
+_UNIT = 1e-6  # part by which (cos, sin) in a posture may miss length 1, as for `State`
 
 
 @contextmanager
-def told_when_slow(text: str, after: float = 6.0) -> Iterator[None]:
-    """Say on the error stream why it takes so long when the work inside takes more than `after` s."""
+def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
+    """Print a text on the error stream when the work inside takes more than `after` s."""
     timer = Timer(after, lambda: print(text, file=sys.stderr, flush=True))
     timer.daemon = True
     timer.start()
@@ -31,64 +43,138 @@ def told_when_slow(text: str, after: float = 6.0) -> Iterator[None]:
         timer.cancel()
 
 
-def kernel_obstacle() -> str:
-    """Why the kernel cannot be had at all: numba is not there, or does not fit the packages beside it."""
-    if find_spec("numba") is None:
-        return "numba is not installed (pip install numba)"
+def cache_warning() -> str:
+    """What to do where no folder can be written to for compiled code, or ""."""
+    from floatbase.control.tick import jit
+
+    return "" if jit.cache_on_disk else "what is compiled cannot be kept here: set NUMBA_CACHE_DIR to a folder to write to"
+
+
+def obstacle(problem: Problem, solver: str) -> str:
+    """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP back end."""
+    if solver != "daqp":
+        return f"solver {solver!r} was requested, and the compiled tick has its own"
+    for contact in problem.contacts:
+        if type(contact) not in CONTACT_KINDS:
+            return f"contact {contact.name!r} is a {type(contact).__name__}; the compiled tick takes points and flat feet"
+    for task in problem.tasks:
+        if type(task) not in TASK_KINDS:
+            return f"task {task.name!r} is a {type(task).__name__}; the compiled tick takes the tasks of the package"
+    return _numba_obstacle() or _robot_obstacle(problem.robot)
+
+
+def _numba_obstacle() -> str:
     try:
-        import floatbase.control.tick.kernel  # noqa: F401
+        import floatbase.control.tick.tick  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
-        return f"numba is installed and cannot be loaded ({error})"
+        return f"numba cannot be loaded ({error}); pip install numba may mend it"
     return ""
 
 
-def unkept() -> str:
-    """What to do where nothing that is compiled can be kept, or ""."""
-    from floatbase.control.tick import kernel
+@lru_cache(maxsize=16)
+def _robot_obstacle(robot: Robot) -> str:
+    if robot.d == 0:
+        return f"{robot.name} has no joints to drive"
+    if robot.nv == 1:  # Pinocchio drops one dimension of its Jacobians
+        return f"{robot.name} has a single joint and no base: the compiled tick takes two velocities or more"
+    for i, joint in enumerate(robot.model.joints):
+        kind = joint.shortname()
+        if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
+            return f"joint {robot.model.names[i]!r} is a {kind}; the compiled tick takes revolute and prismatic joints"
+    return "" if dynamics_of(robot).fits else "this Pinocchio lays its results out in another way in memory"
 
-    if kernel.kept:
-        return ""
-    return "what is compiled cannot be kept here: set NUMBA_CACHE_DIR to a folder that can be written to"
 
+class Compiled:
+    """The compiled tick of one problem, for which `obstacle` is "".
 
-class Compiled(Program):
-    """The tick by the kernel."""
+    A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the readable path must decide, else
+    the array of numbers that `tick.tick` fills, how many rows are active, and the targets at t.
 
-    path = "compiled"
+    qdd, tau, forces: where these are among the numbers.
+    arguments: what `tick.tick` takes after q, v and the targets, but for the answer and the parts to run.
+    targets: those that stand still.
+    workspace: real and whole numbers, memory of the tick.
+    fits: False where a target has the wrong shape.
 
-    def _prepare(self, contact_tables: tuple[Any, ...], task_tables: tuple[Any, ...], bounds: tuple[Array, float]) -> None:
-        from floatbase.control.tick import kernel
+    Raises `UnknownNameError` for a frame that does not exist.
+    """
 
-        self.kernel, self.parts = kernel.tick, kernel.PARTS
-        tables = packed(self.dynamics, contact_tables, task_tables, bounds)
-        real, whole = kernel.room_sizes(tables[0], self.motion_rows)
-        room = np.empty(real), np.empty(whole, np.int64)  # of one tick at a time: the dynamics' lock sees to it
-        self.arrays = *self.dynamics.views, *tables, *room
+    def __init__(self, problem: Problem):
+        from floatbase.control.tick import tick
 
-    def warm_up(self) -> None:
-        try:
-            super().warm_up()
-        except (EOFError, UnpicklingError):  # the file that numba kept ends too early
-            from floatbase.control.tick import kernel
+        robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
+        self._problem, self.dynamics, self._tables = problem, dynamics_of(robot), tables_of(problem)
+        self.fits, self.targets = not self._tables.misfits, self._tables.targets
+        self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
+        self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
+        tables = self._tables.sizes, self._tables.indices, self._tables.numbers
+        n_motion_rows = sum(len(contact.row_names) for contact in problem.contacts)
+        n_floats, n_ints = tick.workspace_sizes(tables[0], n_motion_rows)
+        self.workspace = np.empty(n_floats), np.empty(n_ints, np.int64)  # of one tick at a time: the dynamics' lock sees to it
+        self.arguments = *self.dynamics.views, *tables, *self.workspace
+        self._tick, self._parts = tick.tick, tick.PARTS
 
-            kernel.compile_anew()
-            super().warm_up()
-
-    def _answer(self, q: Array, v: Array, targets: Array) -> Answer | None:
-        dynamics, answer = self.dynamics, np.empty(self.size + 2 * self.entries)
+    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, Array] | None:
+        if q.shape != self._q_shape or v.shape != self._v_shape:
+            return None
+        targets = self._targets_at(t) if self._tables.moving else self.targets
+        if targets is None:
+            return None
+        dynamics, answer = self.dynamics, self.empty_answer()
         with dynamics.lock:
             dynamics.update(q, v)
-            held = self.kernel(q, v, targets, *self.arrays, answer, self.parts)
-        return (answer, held) if held >= 0 else None
+            n_active = self._tick(q, v, targets, *self.arguments, answer, self._parts)
+        return (answer, n_active, targets) if n_active >= 0 else None
 
+    def warm_up(self) -> None:
+        """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it."""
+        from floatbase.control.tick.jit import remove_old_files
 
-def packed(
-    dynamics: Dynamics, contact_tables: tuple[Any, ...], task_tables: tuple[Any, ...], bounds: tuple[Array, float]
-) -> tuple[Any, Any, Array]:
-    """sizes, indices, numbers: all tables in three arrays, as `kernel.unpacked` takes them apart."""
-    contacts, frames, points, cones, lengths = contact_tables
-    tasks, gains, poses = task_tables
-    sizes = (len(dynamics.tree), len(contacts), len(points), cones.shape[1], len(tasks), len(bounds[0]))
-    indices = np.concatenate([np.ravel(table) for table in (dynamics.tree, contacts, tasks)])
-    real = (dynamics.links, frames, points, cones, lengths, gains, poses, *bounds)
-    return np.array(sizes, np.int64), indices, np.concatenate([np.ravel(table) for table in real])
+        standing = self._problem.robot.standing()
+        q, v = np.array(standing.q), np.array(standing.v)
+        try:
+            self(q, v, 0.0)
+        except (EOFError, UnpicklingError):  # a power cut left half a file on disk: forget it, and compile again
+            self._tick.recompile()
+            self(q, v, 0.0)
+        remove_old_files(self._tick)
+
+    def empty_answer(self) -> Array:
+        """An array for the numbers of one tick."""
+        return np.empty(self.forces.stop + 2 * self._n_multipliers)
+
+    def tasks(self, targets: Array) -> tuple[Task, ...]:
+        """The tasks with the targets of one tick, as a call returned them: functions may return others when called again."""
+        values: dict[int, dict[str, Any]] = {}
+        for task, first, shape, name, _ in self._tables.moving:
+            values.setdefault(task, {})[name] = targets[first : first + prod(shape)].reshape(shape)
+        return tuple(replace(cast(Any, task), **values.get(i, {})) for i, task in enumerate(self._problem.tasks))
+
+    def multipliers(self, numbers: Array, n_active: int) -> Array:
+        """Multipliers of all inequality rows of the readable QP, from what a call returned."""
+        has_row = np.tile(np.isfinite(self._problem.limits.torque_limits), 2)  # the readable QP has rows for these limits only
+        n_force_rows = self._problem.contacts.n_points * (self._problem.limits.facets + 1)
+        mu, active = numbers[self.forces.stop :].reshape(2, -1)[:, :n_active]
+        multipliers = np.zeros(n_force_rows + has_row.size)
+        multipliers[active.astype(np.int64)] = np.maximum(mu, 0.0)
+        return multipliers[np.concatenate([np.full(n_force_rows, True), has_row])]
+
+    def _targets_at(self, t: float) -> Array | None:
+        """All targets at time t, in an array of their own, as other threads may run ticks too. None for a bad target."""
+        targets = self.targets.copy()
+        for _, first, shape, name, function in self._tables.moving:
+            try:
+                value: Array = np.asarray(function(t), dtype=np.float64)
+                if name == "rotation" and value.shape == shape:
+                    value = nearest_rotation(name, value)
+            except (TypeError, ValueError, InputError):
+                return None
+            if value.shape != shape or (name == "q" and not self._has_unit_turns(value)):
+                return None
+            targets[first : first + value.size] = value.ravel()
+        return targets
+
+    def _has_unit_turns(self, q: Array) -> bool:
+        """Whether (cos, sin) of joints without limits have length 1."""
+        turns = [first for _, _, _, first, count in self.dynamics.tree[1:] if count == 2]
+        return all(abs(np.hypot(q[first], q[first + 1]) - 1.0) <= _UNIT for first in turns)

@@ -1,7 +1,5 @@
-"""Lesson 00: its pictures, helpers and exercises."""
+"""Lesson 00, Start here."""
 
 from floatbase.lessons.lesson00.exercises import EXERCISES
 
-__all__ = [
-    "EXERCISES",
-]
+__all__ = ["EXERCISES"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import floatbase as fb
-from floatbase.lessons import Exercise, Numeric
+from floatbase.lessons.exercises import Exercise, Numeric
 from floatbase.robots import Robot
 
 

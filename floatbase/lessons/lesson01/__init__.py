@@ -1,45 +1,19 @@
-"""Lesson 01: its pictures, helpers and exercises."""
+"""Lesson 01, What is a floating base?"""
 
+from floatbase.lessons.lesson01.exercises import EXERCISES
+from floatbase.lessons.lesson01.helpers import base_turn, turn, wave, weightless
 from floatbase.lessons.lesson01.pictures import (
-    EXERCISES,
-    PLATE,
     PRESSING,
-    PRESSING_VIEW,
-    Torques,
-    base_turn,
-    joint_servo,
-    momentum,
-    momentum_rate,
     play_floating,
     play_pressing,
     pressing_panel,
     show_arm,
     stance_panel,
     thruster_panel,
-    turn,
-    unbolted,
-    wave,
-    weightless,
 )
 
 __all__ = [
-    "EXERCISES",
-    "PLATE",
-    "PRESSING",
-    "PRESSING_VIEW",
-    "Torques",
-    "base_turn",
-    "joint_servo",
-    "momentum",
-    "momentum_rate",
-    "play_floating",
-    "play_pressing",
-    "pressing_panel",
-    "show_arm",
-    "stance_panel",
-    "thruster_panel",
-    "turn",
-    "unbolted",
-    "wave",
+    "EXERCISES", "PRESSING", "base_turn", "play_floating",
+    "play_pressing", "pressing_panel", "show_arm", "stance_panel", "thruster_panel", "turn", "wave",
     "weightless",
-]
+]  # fmt: skip

@@ -1,35 +1,10 @@
-"""Lesson 03: its pictures, helpers and exercises."""
+"""Lesson 03, The space of possible motions."""
 
-from floatbase.lessons.lesson03.pictures import (
-    EXERCISES,
-    FULL,
-    GHOST_TIME,
-    ConstantTorques,
-    bars,
-    direction,
-    matrix_picture,
-    show_beta,
-    show_knee,
-    space_of,
-    standing_go2,
-    standing_still,
-    tilted_squeeze,
-    upright,
-)
+from floatbase.lessons.lesson03.exercises import EXERCISES
+from floatbase.lessons.lesson03.helpers import direction, space_of, standing_go2, standing_still, tilted_squeeze, upright
+from floatbase.lessons.lesson03.pictures import bars, matrix_picture, show_beta, show_knee
 
 __all__ = [
-    "EXERCISES",
-    "FULL",
-    "GHOST_TIME",
-    "ConstantTorques",
-    "bars",
-    "direction",
-    "matrix_picture",
-    "show_beta",
-    "show_knee",
-    "space_of",
-    "standing_go2",
-    "standing_still",
-    "tilted_squeeze",
-    "upright",
-]
+    "EXERCISES", "bars", "direction", "matrix_picture", "show_beta", "show_knee", "space_of", "standing_go2",
+    "standing_still", "tilted_squeeze", "upright",
+]  # fmt: skip

@@ -1,35 +1,10 @@
-"""Lesson 04: its pictures, helpers and exercises."""
+"""Lesson 04, One cost, many spaces."""
 
-from floatbase.lessons.lesson04.pictures import (
-    ARROW,
-    EXERCISES,
-    LEVELS,
-    RISE_TIME,
-    VALLEY,
-    WANTED,
-    LeastCost,
-    counted_in,
-    effort_picture,
-    level_curves,
-    measured_acceleration,
-    show_torques,
-    slices,
-    tilted,
-)
+from floatbase.lessons.lesson04.exercises import EXERCISES
+from floatbase.lessons.lesson04.helpers import DESIRED, LeastCost, counted_in, measured_acceleration, tilted
+from floatbase.lessons.lesson04.pictures import effort_picture, level_curves, show_torques, slices
 
 __all__ = [
-    "ARROW",
-    "EXERCISES",
-    "LEVELS",
-    "RISE_TIME",
-    "VALLEY",
-    "WANTED",
-    "LeastCost",
-    "counted_in",
-    "effort_picture",
-    "level_curves",
-    "measured_acceleration",
-    "show_torques",
-    "slices",
-    "tilted",
-]
+    "DESIRED", "EXERCISES", "LeastCost", "counted_in", "effort_picture", "level_curves", "measured_acceleration",
+    "show_torques", "slices", "tilted",
+]  # fmt: skip

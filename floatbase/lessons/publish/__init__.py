@@ -1,15 +1,24 @@
-"""What runs, stores, maps and publishes the lessons."""
+"""What runs, stores, maps and publishes the lessons: `python -m floatbase.lessons.publish`."""
 
-from floatbase.lessons.publish.notebooks import FOLDER, execute, read, run, solved, without_outputs
-from floatbase.lessons.publish.workspace import MINE, prepare
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from floatbase.lessons.publish.contents import README, lesson_table, readme_with_table, title_of
+from floatbase.lessons.publish.notebooks import execute, read, run, solved
+from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare, without_outputs
+
+if TYPE_CHECKING:
+    from floatbase.lessons.publish import conventions, equations, pages, prose
+
+_PARTS = ("conventions", "equations", "pages", "prose")  # imported at first use; the last two need the extra `pages`
 
 __all__ = [
-    "FOLDER",
-    "MINE",
-    "execute",
-    "prepare",
-    "read",
-    "run",
-    "solved",
-    "without_outputs",
-]
+    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "lesson_table", "pages", "prepare", "prose", "read",
+    "readme_with_table", "run", "solved", "title_of", "without_outputs",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PARTS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module(f"{__name__}.{name}")

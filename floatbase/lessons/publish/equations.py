@@ -1,7 +1,7 @@
 """The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; never written by hand.
 
 A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as in "App. A: …", stands for
-them. A test counts where it names that function. `python -m floatbase.lessons.publish.equations` writes notebooks/equations.md.
+them. Public is what a room exports. A test counts where it names that function.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 import floatbase
-from floatbase.lessons.publish.notebooks import FOLDER, read
+from floatbase.lessons.publish.contents import texts_of
+from floatbase.lessons.publish.workspace import FOLDER
 
 TITLES = {
     "(1)": "fixed-base equations of motion",
@@ -41,10 +41,10 @@ TITLES = {
     "(19)": "a cost on β, seen from one of them",
     "(20)": "net force, G_f",
     "(21)": "net moment, G_τ",
-    "(22)": "wanted wrench as a cost",
+    "(22)": "desired wrench as a cost",
     "(23)": "preference among contact forces",
     "(24)": "torques and forces as two maps",
-    "(25)": "smallest torques for wanted forces",
+    "(25)": "smallest torques for desired forces",
     "(26)": "control as a QP: objective",
     "(27)": "control as a QP: constraints",
     "(28)": "friction cone",
@@ -53,21 +53,22 @@ TITLES = {
     "App. C": "quadratic programming",
 }
 _START = re.compile(r"\s*((?:\(\d+\))+|App\. [ABC])")
+_NUMBER = re.compile(r"\(\d+\)|App\. [ABC]")
 _TESTS = Path(floatbase.__file__).parents[1] / "tests"
+_WITHOUT_EQUATIONS = ("viewer", "lessons", "playground")  # rooms that show and teach them
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One public thing that implements equations: its import path, the equations, and the tests that name it."""
+    """One public thing that implements equations.
+
+    path: as users import it, room and name, such as "dynamics.forces_from_torques". equations: their numbers, such as "(9)".
+    tests: those that name it, as "file::test".
+    """
 
     path: str
     equations: tuple[str, ...]
     tests: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        """The last part of its path."""
-        return self.path.rsplit(".", 1)[1]
 
 
 def entries() -> list[Entry]:
@@ -80,68 +81,57 @@ def entries() -> list[Entry]:
     for path, docstring, makers in _public():
         start = _START.match(docstring)
         if start:
-            owner, name = path.rsplit(".", 2)[1:]
             tests = set().union(*(named.get(maker, set()) for maker in makers))
-            if owner[0].isupper():
-                tests &= named.get(name, set())
-            found.append(Entry(path, tuple(re.findall(r"\(\d+\)|App\. [ABC]", start.group(1))), tuple(sorted(tests))))
-    return found
-
-
-def lessons_of(equation: str) -> list[str]:
-    """Names of the lessons whose text mentions an equation."""
-    found = []
-    for path in sorted(FOLDER.glob("*.ipynb")):
-        text = "\n".join(cell.source for cell in read(path).cells if cell.cell_type == "markdown")
-        if equation in text or equation.replace("App.", "Appendix") in text:
-            found.append(path.name)
+            if path.count(".") > 1:  # room.Class.member
+                tests &= named.get(path.rsplit(".", 1)[1], set())
+            found.append(Entry(path, tuple(_NUMBER.findall(start[1])), tuple(sorted(tests))))
     return found
 
 
 def table() -> str:
     """The map as a page of Markdown."""
     found = entries()
+    texts = {path.name: "\n".join(texts_of(path)) for path in sorted(FOLDER.glob("*.ipynb"))}
     lines = [
         "# The map: equation → function → test → lesson",
         "",
-        "Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish.equations`; do not edit.",
+        "Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish map`; do not edit. A function such as",
+        "`dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
         "",
         "| equation | what it says | functions | tests that use them | lessons |",
         "|---|---|---|---|---|",
     ]
     for equation, title in TITLES.items():
         here = [entry for entry in found if equation in entry.equations]
-        functions = "<br>".join(f"`{entry.path.removeprefix('floatbase.')}`" for entry in here)
+        functions = "<br>".join(f"`{entry.path}`" for entry in here)
         tests = sorted({test.split("::")[0] for entry in here for test in entry.tests})
-        lessons = ", ".join(f"[{name.split('_')[0]}]({name})" for name in lessons_of(equation))
+        names = [name for name, text in texts.items() if equation in text or equation.replace("App.", "Appendix") in text]
+        lessons = ", ".join(f"[{name.split('_')[0]}]({name})" for name in names)
         lines.append(f"| {equation} | {title} | {functions} | {', '.join(tests)} | {lessons} |")
     return "\n".join(lines) + "\n"
 
 
 def _public() -> Iterator[tuple[str, str, list[str]]]:
-    """Import path, docstring and the names that make it, of every public function, class, method and property."""
-    names = [found.name for found in pkgutil.walk_packages(floatbase.__path__, "floatbase.") if _counts(found.name)]
-    modules = [import_module(name) for name in names]
-    own = [(m.__name__, name, value) for m in modules for name, value in vars(m).items() if _is_own(m, name)]
-    for module, name, value in own:
+    """Path, docstring and the names that make it, of every public function, class, method and property, each once."""
+    own = list(_exported())
+    for room, name, value in own:
         makers = [name] + [maker for _, maker, made in own if _returns(made) == name]
-        yield f"{module}.{name}", inspect.getdoc(value) or "", makers
+        yield f"{room}.{name}", inspect.getdoc(value) or "", makers
         for member, thing in vars(value).items() if inspect.isclass(value) and not _is_protocol(value) else ():
             if not member.startswith("_"):
-                yield f"{module}.{name}.{member}", inspect.getdoc(thing) or "", makers
+                yield f"{room}.{name}.{member}", inspect.getdoc(thing) or "", makers
 
 
-def _counts(module: str) -> bool:
-    """Whether a module can hold equations: pictures, lessons and what starts with an underscore do not.
-
-    Nor do the controller's fast paths, which are held to the readable one as a whole.
-    """
-    return not re.search(r"\._|\.viewer|\.lessons|\.kernel|\.reduced", module)
-
-
-def _is_own(module: ModuleType, name: str) -> bool:
-    """Whether a public name was defined in the module, not imported into it."""
-    return not name.startswith("_") and getattr(vars(module)[name], "__module__", None) == module.__name__
+def _exported() -> Iterator[tuple[str, str, object]]:
+    """Room, name and value of every function and class that a room exports and defines itself."""
+    for found in pkgutil.iter_modules(floatbase.__path__):
+        if found.name.startswith("_") or found.name in _WITHOUT_EQUATIONS:
+            continue
+        room = import_module(f"floatbase.{found.name}")
+        for name in getattr(room, "__all__", vars(room)):
+            value, home = getattr(room, name), f"{room.__name__}."
+            if not name.startswith("_") and f"{getattr(value, '__module__', None)}.".startswith(home):
+                yield found.name, name, value
 
 
 def _is_protocol(value: type) -> bool:
@@ -175,7 +165,3 @@ def _names(node: ast.AST) -> set[str]:
     """All names and attributes below a node."""
     names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
     return names | {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}
-
-
-if __name__ == "__main__":
-    (FOLDER / "equations.md").write_text(table(), encoding="utf-8")

@@ -1,35 +1,22 @@
-"""The lessons as files: run them and keep their outputs, without pictures; put solutions in place of stubs.
-
-`python -m floatbase.lessons.publish.notebooks` runs every lesson and stores what it printed (for those who write lessons).
-"""
+"""The lessons as files: run them and store what they print, without pictures; put solutions in place of stubs."""
 
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
-import nbformat
+from floatbase.lessons.exercises import all_exercises
 
-from floatbase.lessons import all_exercises
-
-FOLDER = Path(__file__).parents[3] / "notebooks"
+# nbformat and nbclient are imported where they are used: `make lab` needs neither
 
 
 def read(path: Path) -> Any:
     """A notebook."""
+    import nbformat
+
     return nbformat.read(path, as_version=4)
-
-
-def without_outputs(notebook: Any) -> Any:
-    """The notebook as if it had never been run. Changes it in place."""
-    for cell in notebook.cells:
-        if cell.cell_type == "code":
-            cell.outputs, cell.execution_count = [], None
-    notebook.metadata.pop("widgets", None)
-    return notebook
 
 
 def solved(notebook: Any) -> Any:
@@ -45,8 +32,8 @@ def solved(notebook: Any) -> Any:
 def execute(notebook: Any, folder: Path, **settings: str) -> Any:
     """Run all cells in a fresh kernel in `folder`, in place; an error in a cell is raised.
 
-    The kernel has a home of its own, so that what the notebook answers is not counted as a learner's progress.
-    settings: more of the kernel's environment.
+    settings: more of the kernel's environment. FLOATBASE_HOME is a new folder, so that what the notebook answers is not
+    counted as a learner's progress.
     """
     from nbclient import NotebookClient
 
@@ -59,6 +46,8 @@ def execute(notebook: Any, folder: Path, **settings: str) -> Any:
 
 def run(path: Path) -> None:
     """Run a lesson and store its printed outputs; pictures are drawn anew by whoever opens it, so they are not stored."""
+    import nbformat
+
     notebook = execute(read(path), path.parent)
     for cell in notebook.cells:
         if cell.cell_type != "code":
@@ -69,9 +58,3 @@ def run(path: Path) -> None:
         cell.outputs = [] if picture else [output for output in cell.outputs if output.get("name") != "stderr"]
     notebook.metadata.pop("widgets", None)
     nbformat.write(notebook, path)
-
-
-if __name__ == "__main__":
-    for lesson in sorted(FOLDER.glob("*.ipynb")) if len(sys.argv) == 1 else map(Path, sys.argv[1:]):
-        print(lesson.name)
-        run(lesson)

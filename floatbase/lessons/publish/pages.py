@@ -1,12 +1,10 @@
 """Lessons as pages to read without a kernel: each one HTML file with its formulas, figures and 3-D pictures.
 
-`python -m floatbase.lessons.publish.pages [NOTEBOOK …] [--to FOLDER]` writes pages of lessons; `make pages` does it.
-It needs the extra `pages`.
+`make pages` writes them. This needs the extra `pages`.
 """
 
 from __future__ import annotations
 
-import argparse
 import html
 import re
 from collections.abc import Sequence
@@ -16,11 +14,12 @@ from typing import Any
 from nbformat.v4 import new_code_cell
 
 from floatbase.errors import InputError
-from floatbase.lessons.publish.notebooks import FOLDER, execute, read
+from floatbase.lessons.publish.contents import title_of
+from floatbase.lessons.publish.notebooks import execute, read
 from floatbase.lessons.publish.pictures import Pictures
 from floatbase.lessons.publish.prose import code_style, coloured, formula_font, to_html
+from floatbase.lessons.publish.workspace import FOLDER
 
-TARGET = Path("build/pages")
 _SHARP = "%config InlineBackend.figure_format = 'retina'"
 _INLINE = "module://matplotlib_inline.backend_inline"
 _NOTICE = (
@@ -35,7 +34,7 @@ _TERMINAL = re.compile(r"\x1b\[[0-9;]*m")
 def build(source: Path, folder: Path) -> Path:
     """Write the page of a lesson, or of a text in Markdown, into `folder`, which is made; the page's path.
 
-    A lesson is run for it. Raises `InputError` when there is no such file.
+    source: a notebook, which is run, or a .md file. Raises `InputError` when there is no such file.
     """
     if not source.is_file():
         raise InputError(f"there is no lesson {source}; the course's lessons are in {FOLDER}.")
@@ -47,13 +46,6 @@ def build(source: Path, folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     target.write_text(_page(source, body, pictures.held()), encoding="utf-8")
     return target
-
-
-def title_of(source: Path) -> str:
-    """The first heading of a lesson or text."""
-    text = read(source).cells[0].source if source.suffix == ".ipynb" else source.read_text(encoding="utf-8")
-    heading = re.search(r"^# (.+)$", text, re.MULTILINE)
-    return heading[1] if heading else source.stem
 
 
 def _lesson(source: Path, pictures: Pictures) -> str:
@@ -134,21 +126,3 @@ def _way(source: Path) -> str:
 
 def _own(name: str) -> str:
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(prog="python -m floatbase.lessons.publish.pages", description="Lessons as HTML pages.")
-    parser.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course, and its map, by default")
-    parser.add_argument("--to", type=Path, default=TARGET, metavar="FOLDER", help=f"where to write, {TARGET} by default")
-    asked = parser.parse_args(arguments)
-    for source in asked.lessons or [*sorted(FOLDER.glob("*.ipynb")), FOLDER / "equations.md"]:
-        try:
-            page = build(source.resolve(), asked.to)
-        except InputError as error:
-            parser.error(str(error))
-        print(f"{page}: {page.stat().st_size / 1e6:.1f} MB")
-
-
-if __name__ == "__main__":
-    main()

@@ -84,10 +84,10 @@ def formula_font(text: str) -> str:
     letters = {letter for formula in _MATHML.findall(text) for letter in html.unescape(re.sub("<[^>]*>", "", formula))}
     if not letters:
         return ""
-    asked = subset.Options(layout_features=["ssty"], notdef_outline=True)
-    cutter, packed = subset.Subsetter(asked), io.BytesIO()
+    options = subset.Options(layout_features=["ssty"], notdef_outline=True)
+    cutter, packed = subset.Subsetter(options), io.BytesIO()
     cutter.populate(unicodes=[ord(letter) for letter in letters | {_slanted(letter) for letter in letters}])
-    with subset.load_font(_font_file(), asked) as font:
+    with subset.load_font(_font_file(), options) as font:
         cutter.subset(font)
         font.flavor = "woff"
         font.save(packed)

@@ -1,6 +1,6 @@
 """The learner's own copy of the lessons: made once, never overwritten, kept when the course is updated.
 
-`python -m floatbase.lessons.publish.workspace` prepares notebooks/my; `make lab` does it before it opens the course there.
+`make lab` prepares it before it opens the course there. Notebooks are read as the JSON that they are, which is quick.
 """
 
 from __future__ import annotations
@@ -8,17 +8,15 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
-import nbformat
-
-from floatbase.lessons.publish.notebooks import FOLDER, read, without_outputs
-
+FOLDER = Path(__file__).parents[3] / "notebooks"  # of the course
 MINE = "my"
 _MEMORY = ".from.json"  # for each lesson, the digest of the course's text that the learner's copy started from
 
 
 def prepare(folder: Path = FOLDER) -> list[str]:
-    """Bring the learner's copies in folder/my up to date; what happened, a line for each lesson that changed.
+    """Bring the learner's copies in folder/my up to date; returns what happened, a line for each lesson that changed.
 
     A lesson that is not there is copied. One that the learner has not written in is replaced when the course has a newer
     text. One that the learner has written in stays as it is; the course's newer text is laid beside it as NAME.new.ipynb.
@@ -26,7 +24,7 @@ def prepare(folder: Path = FOLDER) -> list[str]:
     """
     mine = folder / MINE
     mine.mkdir(exist_ok=True)
-    memory = _remembered(mine / _MEMORY)
+    memory = _memory(mine / _MEMORY)
     said = []
     for lesson in sorted(folder.glob("*.ipynb")):
         copy, now = mine / lesson.name, _digest(lesson)
@@ -48,16 +46,26 @@ def prepare(folder: Path = FOLDER) -> list[str]:
     return said
 
 
+def without_outputs(notebook: Any) -> Any:
+    """The notebook as if it had never been run. Changes it in place."""
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            cell["outputs"], cell["execution_count"] = [], None
+    notebook["metadata"].pop("widgets", None)
+    return notebook
+
+
 def _copy(source: Path, target: Path) -> None:
     """A lesson is copied without its outputs: they would answer what the learner is asked to predict."""
     if source.suffix == ".ipynb":
-        nbformat.write(without_outputs(read(source)), target)
+        notebook = without_outputs(json.loads(source.read_text(encoding="utf-8")))
+        target.write_text(json.dumps(notebook, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
     else:
         target.write_bytes(source.read_bytes())
 
 
-def _remembered(path: Path) -> dict[str, str]:
-    """The digests kept from last time; none when there was no last time or the file was damaged."""
+def _memory(path: Path) -> dict[str, str]:
+    """The digests stored last time; none when there was no last time or the file was damaged."""
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -67,12 +75,8 @@ def _remembered(path: Path) -> dict[str, str]:
 def _digest(path: Path) -> str:
     """A digest of what is written in a notebook's cells, without outputs; of its bytes when it cannot be read."""
     try:
-        text = "\0".join(f"{cell.cell_type}\0{cell.source}" for cell in read(path).cells)
-    except Exception:  # a damaged notebook is still the learner's: it counts as written in
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        text = "\0".join(f"{cell['cell_type']}\0{''.join(cell['source'])}" for cell in cells)
+    except (ValueError, LookupError, TypeError):  # a damaged notebook is still the learner's: it counts as written in
         return hashlib.sha256(path.read_bytes()).hexdigest()
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-if __name__ == "__main__":
-    for line in prepare():
-        print(line)

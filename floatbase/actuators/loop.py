@@ -1,0 +1,148 @@
+"""App. B: the force loop that drives the cylinders, so that one layer up the torque can be taken for granted.
+
+That holds while the torque changes more slowly than the loop's bandwidth and stays within what the supply pressure gives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, checked, positive, read_only
+from floatbase.actuators.hydraulics import Cylinders, Hydraulics, Pose
+from floatbase.errors import InputError
+from floatbase.robots import Robot
+
+_LONGEST_STEP = 2e-4  # s, of the oil's integration: torques come out within 1 % of the limit at 0.2 ms
+_STEP_ROUNDING = 1e-9  # of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
+_INTEGRAL_PART = 0.05  # of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
+_DEAD_LEVER = 1e-9  # of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
+VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
+
+
+@dataclass(frozen=True, eq=False)
+class OilState:
+    """What d cylinders and their loops remember.
+
+    opening: (d,), of the valves, -1 to 1.
+    pressures: (2, d) Pa over the air outside, chambers A and B.
+    integral: (d,) N·s, the loops' sums of errors.
+    """
+
+    opening: Array
+    pressures: Array
+    integral: Array
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
+
+
+class HydraulicActuators:
+    """App. B: a hydraulic cylinder on every joint of a robot, each with a force loop. Usable as `actuators` in `rollout`.
+
+    The loop desires Ḟ = ω (e + ω_i ∫e dt) with e = F_desired - F, ω = 2π times the loop's bandwidth and ω_i a twentieth of
+    it, and gives the valve the opening for it (`Cylinders.opening_for`); the integral rests while the valve is all open. The
+    torque's amplitude follows to at least the stated bandwidth, as long as that lies below the valve's.
+
+    Sizes: each cylinder is HyQ's, scaled until the supply pressure gives the robot's torque limit at the lever's best angle
+    and in the weaker direction, rod going in. Going out it gives 1.7 times as much. Friction of the pistons is left out, as
+    joint friction is in (1)-(7). A load that pulls the rod out fast starves chamber A, as the valve's edges are alike and the
+    areas are not: its oil boils, and torque is missing until the chamber is full again.
+
+    robot: its torque limits are what the cylinders are made for.
+    hydraulics: the cylinder that is scaled; HyQ's by default.
+    centre: (d,) rad, the angles at which the levers are longest; the joints of `robot.standing()` by default.
+
+    `state` is the present `OilState`, `cylinders` the equations.
+    Source of the loop: Boaventura et al., Model-based hydraulic impedance control for dynamic robots, IEEE T-RO 31, 2015.
+    Raises `InputError` for a joint without a torque limit and for joints that slide.
+    """
+
+    def __init__(self, robot: Robot, hydraulics: Hydraulics | None = None, centre: npt.ArrayLike | None = None):
+        hydraulics = Hydraulics() if hydraulics is None else hydraulics
+        if not isinstance(hydraulics, Hydraulics):
+            raise InputError(f"hydraulics must be a Hydraulics, as Hydraulics(loop_bandwidth=20.0), not {hydraulics!r}.")
+        _check_joints(robot)
+        if centre is None:  # the difference to the neutral configuration holds the joints' angles, where q has cos and sin
+            centre = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
+        self.cylinders = Cylinders(hydraulics, robot.torque_limits / hydraulics.weakest_torque, centre)
+        self.reset()
+
+    def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
+        """Close the valves, with pressures that give the joints torques tau, as far as the supply goes.
+
+        tau: (d,) N·m, zero by default. q_joints: (d,) rad, the centre by default. A rollout does not reset actuators, so that
+        it can go on where another ended; a robot that is to stand from the start needs the torques that it stands with.
+        """
+        cylinders = self.cylinders
+        tau = checked("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
+        force = self._force_for(tau, cylinders.pose(cylinders.centre if q_joints is None else q_joints))
+        # a valve with equal edges holds a force with as much pressure missing at A as there is too much at B
+        lines = cylinders.hydraulics.supply_pressure + cylinders.hydraulics.tank_pressure
+        a = (force + cylinders.areas[1] * lines) / cylinders.areas.sum(axis=0)
+        self.state = OilState(np.zeros(cylinders.d), np.array([a, lines - a]), np.zeros(cylinders.d))
+
+    def torques(self, q_joints: npt.ArrayLike) -> Array:
+        """The torques that the oil makes at joint angles, shape (d,) rad: L F, shape (d,), N·m."""
+        return self.cylinders.pose(q_joints).lever * self.cylinders.force(self.state.pressures)
+
+    def torque_limits(self, q_joints: npt.ArrayLike) -> Array:
+        """The least and the largest torque that the supply pressure gives at joint angles, (d,) rad: shape (2, d), N·m."""
+        return read_only(np.sort(self.cylinders.pose(q_joints).lever * self.cylinders.force_limits(), axis=0))
+
+    def step(self, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike, dt: float) -> Array:
+        """Let time pass; the joints' torques at its end, shape (d,), N·m.
+
+        tau_desired: (d,) N·m.
+        q_joints, v_joints: (d,) rad and rad/s at the start. The oil's spring answers to them and acts on the next ones, which
+            neither adds energy nor takes any (symplectic Euler) as long as √(L² k / inertia) dt < 2. At 1 ms that is at most
+            1.7 in the catalogue, at the last wrist of anymal_kinova.
+        dt: s. The oil is integrated in equal steps of 0.2 ms at most: the spool exactly, the pressures by a linearly implicit
+            Euler step, stable however small the chambers and the drops of pressure are.
+        """
+        cylinders = self.cylinders
+        tau = checked("tau_desired", tau_desired, (cylinders.d,), "N·m")
+        v = checked("v_joints", v_joints, (cylinders.d,), "rad/s")
+        pose = cylinders.pose(q_joints)
+        steps = max(1, int(np.ceil(positive("dt", dt, "s") / _LONGEST_STEP - _STEP_ROUNDING)))
+        force = self._force_for(tau, pose)
+        for _ in range(steps):
+            self.state = self._advance(force, pose, v, dt / steps)
+        return pose.lever * cylinders.force(self.state.pressures)
+
+    def _force_for(self, tau: Array, pose: Pose) -> Array:
+        """The piston forces for joint torques, shape (d,), N, within what supply and tank allow."""
+        least_lever = _DEAD_LEVER * self.cylinders.crank
+        lever = np.where(np.abs(pose.lever) < least_lever, least_lever, pose.lever)
+        return np.clip(tau / lever, *self.cylinders.force_limits())
+
+    def _advance(self, force: Array, pose: Pose, v: Array, step: float) -> OilState:
+        """The state `step` s later when the loop desires `force`, (d,) N, at joint velocities v."""
+        cylinders, hydraulics, now = self.cylinders, self.cylinders.hydraulics, self.state
+        rate = 2.0 * np.pi * hydraulics.loop_bandwidth
+        error = force - cylinders.force(now.pressures)
+        force_rate = rate * (error + _INTEGRAL_PART * rate * now.integral)
+        u = cylinders.opening_for(force_rate, now.pressures, pose, v)
+        integral = now.integral + step * np.where(np.abs(u) < 1.0, error, 0.0)
+        u = np.clip(u, -1.0, 1.0)
+        opening = u + (now.opening - u) * np.exp(-2.0 * np.pi * hydraulics.valve_bandwidth * step)
+        halfway = 0.5 * (now.opening + opening)
+        change = step * cylinders.pressure_rates(halfway, now.pressures, pose, v)
+        change /= 1.0 + step * cylinders.pressure_decay(halfway, now.pressures, pose)
+        return OilState(opening, np.maximum(now.pressures + change, VACUUM), integral)
+
+
+def _check_joints(robot: Robot) -> None:
+    """Raise `InputError` for joints that no crank can turn and for joints without a torque limit."""
+    for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
+        kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
+        if not kind.startswith("JointModelR"):
+            raise InputError(f"{joint} of {robot.name} slides ({kind}); hydraulic actuators here turn joints by a crank.")
+        if not np.isfinite(limit):
+            raise InputError(
+                f"{joint} of {robot.name} has no torque limit, so its cylinder has no size: "
+                f'load the robot with one, fb.load("{robot.name}", torque_limits=…).'
+            )

@@ -1,0 +1,204 @@
+"""The tasks as one quadratic cost in β: (18)(26)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from floatbase.control.tick.elimination import Space, add_product
+from floatbase.control.tick.jit import jit
+from floatbase.control.tick.kinematics import (
+    Bodies,
+    angular_jacobian,
+    centre_of_mass,
+    frame_pose,
+    point_jacobian,
+    point_velocity,
+)
+from floatbase.control.tick.memory import clear, take_matrix, take_vector
+from floatbase.control.tick.tables import COM, FORCE, FRAME, ORIENTATION, POSTURE, TORQUE
+from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
+
+NO_ROTATION = 1e-10  # part by which a target's columns may miss length 1 and right angles: `nearest_rotation` leaves 1e-15
+
+
+class TaskTable(NamedTuple):
+    """N tasks."""
+
+    table: Any  # (N, 3), kind, joint, first number in targets
+    gains: Any  # (N, 3), weight, kp, kd
+    frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
+    targets: Any  # of all tasks, one after the other: position or rotation row by row, velocity, acceleration
+
+
+class Cost(NamedTuple):
+    """½ ‖R (β, 1)‖² + ½ Σ diagonal β² - linearᵀ β."""
+
+    R: Any  # (·, nb + 1), a multiple of four rows
+    diagonal: Any  # (nb,), from terms on single entries of (q̈, λ) that are a β
+    linear: Any  # (nb,), likewise
+
+
+@jit
+def rotation_error(R, target):
+    """e = log(R targetᵀ), world; and False where `target` is no rotation or the angle is too large."""
+    valid = dot(cross(target[0], target[1]), target[2]) > 0.0
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        valid &= abs(dot(target[a], target[a]) - 1.0) <= NO_ROTATION and abs(dot(target[a], target[b])) <= NO_ROTATION
+    e = times(0.5, plus(plus(cross(target[0], R[0]), cross(target[1], R[1])), cross(target[2], R[2])))
+    sine = np.sqrt(dot(e, e))
+    cosine = 0.5 * (dot(target[0], R[0]) + dot(target[1], R[1]) + dot(target[2], R[2]) - 1.0)
+    scale = 1.0 + sine * sine / 6.0 if sine < 1e-4 else np.arctan2(sine, cosine) / sine
+    return times(scale, e), valid and cosine > -0.9  # beyond, the sine no longer tells the axis
+
+
+@jit
+def motion_task(i, tasks: TaskTable, bodies: Bodies, Ag, links, rows):
+    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for a bad target.
+
+    Ag: (6, nv), centroidal momentum matrix: mass × the Jacobian of the CoM in its first three rows.
+    links: (n, 4), mass of each link and its position in the joint.
+    rows: (3, nv) receives the Jacobian.
+    """
+    clear(rows)
+    kind, joint, first, targets = tasks.table[i, 0], tasks.table[i, 1], tasks.table[i, 2], tasks.targets
+    target = targets.reshape(1, targets.size)
+    after, valid = first + (9 if kind == ORIENTATION else 3), True
+    if kind == COM:
+        p, e_dot, drift, mass = centre_of_mass(bodies, links)
+        e = minus(p, row_part(target, 0, first))
+        for r in range(3):
+            for c in range(rows.shape[1]):
+                rows[r, c] = Ag[r, c] / mass
+    else:
+        R, p = frame_pose(bodies, joint, tasks.frames, i)
+        if kind == ORIENTATION:
+            angular_jacobian(bodies, joint, rows, 0)
+            e_dot, drift = row_part(bodies.velocity, joint, 3), row_part(bodies.drift, joint, 3)
+            columns = targets[first:after].reshape(3, 3)
+            e, valid = rotation_error(R, (column_part(columns, 0, 0), column_part(columns, 0, 1), column_part(columns, 0, 2)))
+        else:
+            point_jacobian(bodies, joint, p, rows, 0)
+            e_dot, drift = point_velocity(bodies, joint, p)
+            e = minus(p, row_part(target, 0, first))
+    return e, minus(e_dot, row_part(target, 0, after)), minus(drift, row_part(target, 0, after + 3)), valid
+
+
+@jit
+def posture_error(tree, q, v, target, base, e, e_dot):
+    """e and ė (d,) of all joints from q and target (nq,) and v (nv,); joints without limits are (cos, sin) in q.
+
+    tree: as in `Bodies`. base: first joint's index in v.
+    """
+    for i in range(1, tree.shape[0]):
+        row, at = tree[i, 1] - base, tree[i, 3]
+        if row < 0:
+            continue
+        e_dot[row] = v[tree[i, 1]]
+        if tree[i, 4] == 1:
+            e[row] = q[at] - target[at]
+        else:
+            sine = q[at + 1] * target[at] - q[at] * target[at + 1]
+            e[row] = np.arctan2(sine, q[at] * target[at] + q[at + 1] * target[at + 1])
+
+
+@jit
+def task_costs(q, v, bodies: Bodies, Ag, links, tasks: TaskTable, space: Space, base, workspace, cost: Cost):
+    """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns the number of its rows in use, -1 for a bad target.
+
+    q, v: (nq,), (nv,), the state.
+    Ag, links: as for `motion_task`.
+    base: number of rows of (7) without a motor, 6 or 0.
+    cost: receives the result; the last of the rows in use, of which there are a multiple of four, may be zero.
+    """
+    R, nv, d, nb = cost.R, v.size, space.T.shape[0], cost.linear.size
+    k = space.V.shape[0] - nv
+    clear(R)
+    used, rows, e_joint, e_dot_joint = 0, take_matrix(workspace, 3, nv), take_vector(workspace, d), take_vector(workspace, d)
+    # of the terms (weight / 2) (x - desired)² on single entries x of (q̈, λ, τ), and weight × desired
+    weights, weighted = take_vector(workspace, nv + k + d), take_vector(workspace, nv + k + d)
+    clear(weights)
+    clear(weighted)
+    for i in range(tasks.table.shape[0]):
+        kind, at, w, kp, kd = tasks.table[i, 0], tasks.table[i, 2], tasks.gains[i, 0], tasks.gains[i, 1], tasks.gains[i, 2]
+        if kind <= FRAME:
+            e, e_dot, bias, valid = motion_task(i, tasks, bodies, Ag, links, rows)
+            if not valid:
+                return -1
+            root = np.sqrt(w)
+            for r in range(3):
+                for c in range(nv):
+                    rows[r, c] *= root
+            add_product(rows, space.V, space.beta_of, R, used)
+            constant = times(root, plus(bias, plus(times(kp, e), times(kd, e_dot))))
+            R[used, nb], R[used + 1, nb], R[used + 2, nb] = plus(column_part(R, used, nb), constant)
+            used += 3
+        else:
+            first = nv + k if kind == TORQUE else (nv if kind == FORCE else base)
+            if kind == POSTURE:
+                posture_error(bodies.tree, q, v, tasks.targets[at:], base, e_joint, e_dot_joint)
+            for j in range(k if kind == FORCE else d):
+                desired = -kp * e_joint[j] - kd * e_dot_joint[j] if kind == POSTURE else tasks.targets[at + j]
+                weights[first + j] += w
+                weighted[first + j] += w * desired
+    used = single_entry_costs(used, weights, weighted, space, cost)
+    return 4 * ((used + 3) // 4)
+
+
+@jit
+def single_entry_costs(used, weights, weighted, space: Space, cost: Cost):
+    """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ). Returns the number of rows of R in use.
+
+    used: number of rows of R in use before.
+    weights: (n + d,), of each entry.
+    weighted: (n + d,), weight × desired.
+    cost: updated; entries that are a β change the diagonal only, the others take a row of R.
+    """
+    V, beta_of, T = space
+    R, diagonal, linear = cost
+    n, nb = V.shape[0], V.shape[1] - 1
+    clear(diagonal)
+    clear(linear)
+    for i in range(n + T.shape[0]):
+        if i < n and beta_of[i] >= 0:
+            diagonal[beta_of[i]], linear[beta_of[i]] = weights[i], weighted[i]
+        elif weights[i] > 0.0:
+            row = V[i] if i < n else T[i - n]
+            root = np.sqrt(weights[i])
+            for c in range(nb + 1):
+                R[used, c] = root * row[c]
+            R[used, nb] -= weighted[i] / root
+            used += 1
+    return used
+
+
+@jit
+def hessian(cost: Cost, H, slope):
+    """Lower triangle of the Hessian in the first nb rows of H (nb + 1, nb + 1), and the slope (nb,) at β = 0."""
+    R, diagonal, linear = cost
+    nb = diagonal.size
+    clear(H)
+    for i in range(0, R.shape[0], 4):  # four rows at a time: each sum is loaded and stored once for all of them
+        for r in range(nb + 1):
+            a, b, c, d = R[i, r], R[i + 1, r], R[i + 2, r], R[i + 3, r]
+            for s in range(r + 1):
+                H[r, s] += a * R[i, s] + b * R[i + 1, s] + c * R[i + 2, s] + d * R[i + 3, s]
+    for r in range(nb):
+        H[r, r] += diagonal[r]
+        slope[r] = H[nb, r] - linear[r]
+
+
+@jit
+def gradient(cost: Cost, beta, slope):
+    """The slope (nb,) at β, residual by residual, which keeps the digits that the Hessian has lost."""
+    R, diagonal, linear = cost
+    nb = beta.size
+    for c in range(nb):
+        slope[c] = diagonal[c] * beta[c] - linear[c]
+    for i in range(R.shape[0]):
+        residual = R[i, nb]
+        for c in range(nb):
+            residual += R[i, c] * beta[c]
+        for c in range(nb):
+            slope[c] += residual * R[i, c]

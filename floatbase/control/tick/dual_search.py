@@ -1,0 +1,334 @@
+"""The optimum of (27) by the dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983), and its last digits.
+
+It starts at the optimum without inequalities and brings one violated row after the other to its bound; a row that is never
+violated is only looked at. Symbols: nb entries of β, H the Hessian, q the number of active rows, mu their multipliers.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from floatbase.control.tick.costs import Cost, gradient, hessian
+from floatbase.control.tick.elimination import Space
+from floatbase.control.tick.inequalities import Inequalities, row_in_beta, violated_row
+from floatbase.control.tick.jit import jit
+from floatbase.control.tick.memory import clear, largest, take_matrix, take_vector
+from floatbase.qp import FEASIBILITY_TOLERANCE
+
+INACCURATE, INFEASIBLE = -2, -3  # why there is no answer: it lacks digits, or there seems to be none
+FLAT_COST = 1e-13  # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
+PARALLEL = 1e-12  # part of a row, squared, outside the active rows: with less it depends on them
+NEWTON_STEPS = 3  # at most, each to half as many lost digits or better
+SETTLED = 1e-6  # part of β: what a step this small leaves is rounding
+UNSETTLED = 1e-4  # part of β that the last step may still move
+WRONG_SIGN = 1e-9  # part of the largest multiplier by which one may be negative through rounding
+
+
+class ActiveSet(NamedTuple):
+    """The active rows, of which q come first in each array, and their factors."""
+
+    numbers: Any  # (nb,), number of each row
+    mu: Any  # (nb,), its multiplier
+    bounds: Any  # (nb,), its bound in h
+    rows: Any  # (nb, nb), its row of G
+    W: Any  # (nb, nb), with W H Wᵀ = 1
+    U: Any  # (nb, nb), W rowsᵀ = U, upper triangular in its first q columns
+
+
+@jit
+def cholesky(H, L):
+    """L (nb, nb) with L Lᵀ = H, whose lower triangle is read. Returns False where a direction costs nothing."""
+    n = L.shape[0]
+    clear(L)
+    for j in range(n):
+        for i in range(j, n):
+            total = H[i, j]
+            for c in range(j):
+                total -= L[i, c] * L[j, c]
+            if i > j:
+                L[i, j] = total / L[j, j]
+            elif total <= FLAT_COST * H[j, j]:
+                return False
+            else:
+                L[j, j] = np.sqrt(total)
+    return True
+
+
+@jit
+def minimum(L, slope, x):
+    """x (nb,) = -(L Lᵀ)⁻¹ slope."""
+    n = slope.size
+    for i in range(n):
+        total = -slope[i]
+        for c in range(i):
+            total -= L[i, c] * x[c]
+        x[i] = total / L[i, i]
+    for i in range(n - 1, -1, -1):
+        x[i] /= L[i, i]
+        for c in range(i):
+            x[c] -= L[i, c] * x[i]
+
+
+@jit
+def inverse(L, W):
+    """W (nb, nb) = L⁻¹, lower triangular."""
+    n = L.shape[0]
+    clear(W)
+    for i in range(n):
+        for j in range(i):
+            for c in range(j + 1):
+                W[i, c] -= L[i, j] * W[j, c]
+        W[i, i] = 1.0
+        for c in range(i + 1):
+            W[i, c] /= L[i, i]
+
+
+@jit
+def add_row(W, U, d, z, q):
+    """Mirror rows q: of W so that d (nb,) = W row is zero after q, and make d column q of U.
+
+    W, U: as in `ActiveSet`.
+    d, z: (nb,), as from `directions`.
+    q: number of active rows.
+    """
+    n, length = d.size, 0.0
+    for j in range(q, n):
+        length += d[j] * d[j]
+    length = np.sqrt(length) if d[q] >= 0.0 else -np.sqrt(length)
+    scale = 1.0 / (length * (length + d[q]))
+    for c in range(n):
+        z[c] = length * W[q, c] - z[c]
+    for j in range(q, n):
+        factor = scale * (d[j] + length if j == q else d[j])
+        for c in range(n):
+            W[j, c] -= factor * z[c]
+    d[q] = -length
+    for i in range(q + 1):
+        U[i, q] = d[i]
+
+
+@jit
+def drop_row(active: ActiveSet, at, q):
+    """Take row `at` of the q active ones out of an `ActiveSet`, and turn W so that U stays upper triangular."""
+    numbers, mu, bounds, rows, W, U = active
+    for j in range(at, q - 1):
+        numbers[j], mu[j], bounds[j] = numbers[j + 1], mu[j + 1], bounds[j + 1]
+        for c in range(rows.shape[1]):
+            rows[j, c] = rows[j + 1, c]
+        for i in range(j + 2):
+            U[i, j] = U[i, j + 1]
+    for j in range(at, q - 1):
+        length = np.sqrt(U[j, j] * U[j, j] + U[j + 1, j] * U[j + 1, j])
+        if length == 0.0:
+            continue
+        c, s = U[j, j] / length, U[j + 1, j] / length
+        for i in range(j, q - 1):
+            a, b = U[j, i], U[j + 1, i]
+            U[j, i], U[j + 1, i] = c * a + s * b, c * b - s * a
+        for i in range(W.shape[1]):
+            a, b = W[j, i], W[j + 1, i]
+            W[j, i], W[j + 1, i] = c * a + s * b, c * b - s * a
+
+
+@jit
+def times_row(W, row, d):
+    """d (nb,) = W row; most rows have three entries or fewer, those of one force whose components are β."""
+    n, count, i, j, k = row.size, 0, 0, 0, 0
+    for c in range(n):
+        if row[c] != 0.0:
+            i, j, k = j, k, c
+            count += 1
+    if count > 3:
+        for r in range(n):
+            d[r] = 0.0
+            for c in range(n):
+                d[r] += W[r, c] * row[c]
+        return
+    a, b = row[i] if count > 2 else 0.0, row[j] if count > 1 else 0.0
+    for r in range(n):
+        d[r] = a * W[r, i] + b * W[r, j] + row[k] * W[r, k]
+
+
+@jit
+def directions(W, U, d, q, z, r):
+    """How β and the multipliers move as the multiplier of a new row grows by 1.
+
+    W, U: as in `ActiveSet`.
+    d: (nb,), W times the new row.
+    q: number of active rows.
+    z: (nb,) receives the step of β.
+    r: (nb,) receives the decrease of the q multipliers.
+    """
+    n, j = d.size, q
+    for i in range(n):
+        z[i] = 0.0
+    while j + 4 <= n:  # four rows at a time: each sum is loaded and stored once for all of them
+        a, b, c, e = d[j], d[j + 1], d[j + 2], d[j + 3]
+        for i in range(n):
+            z[i] -= a * W[j, i] + b * W[j + 1, i] + c * W[j + 2, i] + e * W[j + 3, i]
+        j += 4
+    for late in range(j, n):
+        for i in range(n):
+            z[i] -= d[late] * W[late, i]
+    for i in range(q - 1, -1, -1):
+        total = d[i]
+        for j in range(i + 1, q):
+            total -= U[i, j] * r[j]
+        r[i] = total / U[i, i]
+
+
+@jit
+def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
+    """Bring one violated row to its bound, dropping active rows whose multiplier would turn negative.
+
+    number, row, bound: of the row, (nb,) and its bound in h.
+    q: number of active rows.
+    d, z, r: (nb,), memory for `directions`.
+    active, beta: updated.
+
+    Returns the new q, or why there is none.
+    """
+    n, multiplier, mu, W, U = beta.size, 0.0, active.mu, active.W, active.U
+    for _ in range(2 * n + 2):
+        times_row(W, row, d)
+        directions(W, U, d, q, z, r)
+        curvature, size, excess = 0.0, 0.0, -bound
+        for j in range(n):
+            size += d[j] * d[j]
+            if j >= q:
+                curvature += d[j] * d[j]
+            excess += row[j] * beta[j]
+        longest, drop = np.inf, -1
+        for j in range(q):
+            if r[j] > 0.0 and mu[j] < longest * r[j]:
+                longest, drop = mu[j] / r[j], j
+        full = excess / curvature if q < n and curvature > PARALLEL * size else np.inf
+        step = min(longest, full)
+        if step == np.inf:
+            return INFEASIBLE
+        for j in range(q):
+            mu[j] -= step * r[j]
+        multiplier += step
+        if full < np.inf:
+            for j in range(n):
+                beta[j] += step * z[j]
+        if full <= longest:
+            add_row(W, U, d, z, q)
+            active.numbers[q], mu[q], active.bounds[q] = number, multiplier, bound
+            for j in range(n):
+                active.rows[q, j] = row[j]
+            return q + 1
+        drop_row(active, drop, q)
+        q -= 1
+    return INACCURATE
+
+
+@jit
+def newton_step(q, slope, L, step, move, y, active: ActiveSet, beta):
+    """One step of Newton's method on the optimality conditions from (β, mu) that are right but for rounding.
+
+    q: number of active rows.
+    slope: (nb,), the cost's slope at β; overwritten.
+    L: (nb, nb), Cholesky factor of the Hessian.
+    step, move, y: (nb,), memory.
+    active, beta: the multipliers and β are updated.
+
+    Returns the largest change of an entry of β.
+    """
+    nb, mu, rows, W, U = beta.size, active.mu, active.rows, active.W, active.U
+    if q == 0:
+        minimum(L, slope, move)
+        for i in range(nb):
+            beta[i] += move[i]
+        return largest(move)
+    for a in range(q):
+        for c in range(nb):
+            slope[c] += mu[a] * rows[a, c]
+    for j in range(nb):
+        step[j], move[j] = 0.0, 0.0
+        for i in range(nb):
+            step[j] -= W[j, i] * slope[i]
+    for a in range(q):  # back to the bounds: Uᵀ y = h - G β
+        y[a] = active.bounds[a]
+        for c in range(nb):
+            y[a] -= rows[a, c] * beta[c]
+        for j in range(a):
+            y[a] -= U[j, a] * y[j]
+        y[a] /= U[a, a]
+    for j in range(nb):
+        along = y[j] if j < q else step[j]
+        for i in range(nb):
+            move[i] += along * W[j, i]
+    for i in range(nb):
+        beta[i] += move[i]
+    for a in range(q - 1, -1, -1):  # the multipliers balance the slope that is left after the way to the bounds
+        step[a] -= y[a]
+        for j in range(a + 1, q):
+            step[a] -= U[a, j] * step[j]
+        step[a] /= U[a, a]
+        mu[a] += step[a]
+    return largest(move)
+
+
+@jit
+def wrong_signed_row(mu, q):
+    """The place, among q active rows, of the most negative multiplier in mu; -1 where none is negative beyond rounding."""
+    least, size, found = 0.0, 0.0, -1
+    for a in range(q):
+        size = max(size, abs(mu[a]))
+        if mu[a] < least:
+            least, found = mu[a], a
+    return found if least < -WRONG_SIGN * size - 1e-13 else -1
+
+
+@jit
+def dual_search(cost: Cost, limits: Inequalities, space: Space, workspace, numbers, mu, beta):
+    """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why there is no answer.
+
+    numbers, mu: (nb,) receive the numbers and multipliers of the active rows.
+    beta: (nb,) receives the optimum.
+
+    Newton's method refines the end of the search. Where that shows that it was not the optimum, as a multiplier has the wrong
+    sign or a row is violated, the search goes on.
+    """
+    nb, d, k = beta.size, limits.torque_limits.size, 3 * (limits.lengths.size // (limits.facets + 1))
+    H, slope, L = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb), take_matrix(workspace, nb, nb)
+    W, U, rows = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
+    bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
+    step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
+    forces, tau = take_vector(workspace, k), take_vector(workspace, d)
+    active = ActiveSet(numbers, mu, bounds, rows, W, U)
+    hessian(cost, H, slope)
+    if not cholesky(H, L):
+        return INACCURATE
+    minimum(L, slope, beta)
+    q, refined, moved, number, has_factors = 0, 0, 0.0, 0, False
+    for _ in range(100 + 10 * nb):
+        number = violated_row(limits, space, beta, forces, tau)
+        if number < 0:
+            if refined == NEWTON_STEPS:
+                break
+            gradient(cost, beta, slope)
+            moved = newton_step(q, slope, L, step, z, r, active, beta)
+            refined = refined + 1 if moved > SETTLED * (1.0 + largest(beta)) else NEWTON_STEPS
+            wrong = wrong_signed_row(mu, q)
+            if wrong >= 0:
+                drop_row(active, wrong, q)
+                q, refined = q - 1, 0
+            elif moved <= FEASIBILITY_TOLERANCE:
+                break
+            continue
+        refined = 0
+        if not has_factors:
+            inverse(L, W)
+            clear(U)
+            has_factors = True
+        bound = row_in_beta(number, limits, space, row)
+        q = enforce(number, row, bound, q, step, z, r, active, beta)
+        if q < 0:
+            return q
+    if number >= 0 or refined == 0 or not moved <= UNSETTLED * (1.0 + largest(beta)):
+        return INACCURATE
+    return q

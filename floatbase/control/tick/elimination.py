@@ -1,0 +1,207 @@
+"""The equalities of (27) eliminated: q̈, λ and τ as functions of the free entries β, by Gauss-Jordan elimination (13)(16)(17).
+
+The readable path takes an SVD for the space of motions (13). Here variables are eliminated one by one, and each β is an entry
+of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv, d, k as everywhere, n = nv + k entries of (q̈, λ), nb of β.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from floatbase.control.problem import INCONSISTENT
+from floatbase.control.tick.jit import jit, jit_allocating
+from floatbase.control.tick.memory import clear, take_vector
+from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
+
+DEPENDENT_ROW = 2e-2  # a motion row of which elimination leaves less may nearly depend on the others: an SVD must decide
+LOST_ROW = 1e-11  # less than this part of a row is rounding
+ZERO_PIVOT = 1e-14  # relative to the row: no variable is left to solve it for
+
+
+class Space(NamedTuple):
+    """All (q̈, λ, τ) that satisfy the equalities, as functions of β."""
+
+    V: Any  # (n, nb + 1), (q̈, λ) = V (β, 1)
+    beta_of: Any  # (n,), the number of the β that an entry of (q̈, λ) is, -1 where it is none
+    T: Any  # (d, nb + 1), τ = T (β, 1)
+
+
+@jit
+def gauss_jordan(B, first, last, top, columns, weights, lengths, pivots):
+    """Reduce rows first:last of B in place, each to one pivot that is 1. Returns the least part of a row left at its turn.
+
+    B: (·, n + 1), the right-hand side in the last column; rows first:last have other entries in the first `columns` only.
+    top: rows from there on are cleared of the pivots.
+    weights: (columns,), each row takes the pivot of the largest weight × |entry|.
+    lengths: length of each row of B before the elimination.
+    pivots: receives the column of each row's pivot.
+    """
+    right, least = B.shape[1] - 1, 1.0
+    for row in range(first, last):
+        best, pivot = 0.0, -1
+        for c in range(columns):
+            size = weights[c] * abs(B[row, c])
+            if size > best:
+                best, pivot = size, c
+        if pivot < 0 or abs(B[row, pivot]) <= ZERO_PIVOT * lengths[row]:
+            return 0.0
+        least = min(least, abs(B[row, pivot]) / lengths[row])
+        pivots[row] = pivot
+        scale = 1.0 / B[row, pivot]
+        for c in range(columns):
+            B[row, c] *= scale
+        B[row, right] *= scale
+        for other in range(top, B.shape[0]):
+            factor = B[other, pivot]
+            if other != row and factor != 0.0:
+                for c in range(columns):
+                    B[other, c] -= factor * B[row, c]
+                B[other, right] -= factor * B[row, right]
+                B[other, pivot] = 0.0
+    return least
+
+
+@jit
+def equalities(A, b, M, h, J, base, lengths, B):
+    """(7) without its joint rows: B (m + base, n + 1) = [A 0 | b] above [M_b -J_bᵀ | -h_b]; see `eliminate`.
+
+    lengths: (m + base,) receives the length of each row without its last entry.
+    """
+    m, nv, k = A.shape[0], A.shape[1], J.shape[0]
+    for i in range(m):
+        for c in range(nv):
+            B[i, c] = A[i, c]
+        for c in range(nv, nv + k):
+            B[i, c] = 0.0
+        B[i, nv + k] = b[i]
+    for i in range(base):
+        for c in range(nv):
+            B[m + i, c] = M[i, c]
+        for c in range(k):
+            B[m + i, nv + c] = -J[c, i]
+        B[m + i, nv + k] = -h[i]
+    for row in range(m + base):
+        square = 0.0
+        for c in range(nv + k):
+            square += B[row, c] * B[row, c]
+        lengths[row] = np.sqrt(square)
+
+
+@jit_allocating
+def inconsistent(A, b, v, U):
+    """Whether rows of A q̈ = b disagree by more than the contacts' motion A v explains; U: (m, r), of the SVD of A."""
+    gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
+    return np.max(np.abs(gap)) > INCONSISTENT + MOTION_NOISE * np.max(np.abs(motion))
+
+
+@jit_allocating
+def independent_rows(A, b, v, rows, right):
+    """(5) Orthonormal rows (r, nv) that say what A q̈ = b says along the directions that A resolves, as in `build_qp`.
+
+    v: (nv,), the velocity. rows: (m, nv) and right: (m,) receive them and their right-hand sides first. Returns r, -1 where
+    A q̈ = b is inconsistent.
+    """
+    U, s, Vt = np.linalg.svd(A, False)
+    r = 0
+    while r < s.size and s[r] > MOTION_TOLERANCE * s[0]:
+        r += 1
+    U = np.ascontiguousarray(U[:, :r])
+    rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
+    return -1 if inconsistent(A, b, v, U) else r
+
+
+@jit
+def eliminate(A, b, M, h, J, base, workspace, B, pivots):
+    """(13)(17) Solve the equalities for as many entries of (q̈, λ). Returns the least part left of a motion row, of any row.
+
+    A, b: (m, nv), (m,), the motion rows (5).
+    M, h: (nv, nv), (nv,), of (7).
+    J: (k, nv), of all contact points.
+    base: number of rows of (7) without a motor, 6 or 0.
+    B: (m + base, n + 1) receives the reduced rows.
+    pivots: (m + base,) receives the entry of (q̈, λ) that each is solved for.
+
+    Motion rows are solved for joints where that is possible, and for the base where knees are straight; base rows for the base,
+    and for λ where the contacts already hold it.
+    """
+    m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
+    lengths, motion_weights = take_vector(workspace, m + base), take_vector(workspace, nv)
+    base_weights = take_vector(workspace, n)
+    for c in range(n):
+        base_weights[c] = 1.0 if c < base else (0.1 if c < nv else 0.01)
+    for c in range(nv):
+        motion_weights[c] = 0.05 if c < base else 1.0
+    equalities(A, b, M, h, J, base, lengths, B)
+    least = gauss_jordan(B, 0, m, 0, nv, motion_weights, lengths, pivots)
+    if least <= LOST_ROW:
+        return least, least
+    return least, min(least, gauss_jordan(B, m, m + base, m, n, base_weights, lengths, pivots))
+
+
+@jit
+def parametrise(B, pivots, m, free, V, beta_of):
+    """(13)(17) V and beta_of of `Space` from reduced rows.
+
+    B, pivots: as from `eliminate`; the pivots of rows from m on still stand in the rows before, and are substituted here.
+    m: number of motion rows.
+    free: (nb,), memory for the entries of (q̈, λ) that each β is.
+    """
+    n, nb = V.shape[0], V.shape[1] - 1
+    for c in range(n):
+        beta_of[c] = 0
+    for row in range(pivots.size):
+        beta_of[pivots[row]] = -1
+    clear(V)
+    j = 0
+    for c in range(n):
+        if beta_of[c] == 0:
+            beta_of[c], free[j], V[c, j] = j, c, 1.0
+            j += 1
+    for row in range(pivots.size):
+        pivot = pivots[row]
+        for j in range(nb):
+            V[pivot, j] = -B[row, free[j]]
+        V[pivot, nb] = B[row, n]
+    for row in range(m):
+        pivot = pivots[row]
+        for late in range(m, pivots.size):
+            source = pivots[late]
+            factor = B[row, source]
+            if factor != 0.0:
+                for j in range(nb + 1):
+                    V[pivot, j] -= factor * V[source, j]
+
+
+@jit
+def add_entry(factor, V, beta_of, entry, out, row):
+    """Add factor × row `entry` of V to a row of out (·, nb + 1); where the entry is a β, that is one number."""
+    if beta_of[entry] >= 0:
+        out[row, beta_of[entry]] += factor
+    else:
+        for c in range(V.shape[1]):
+            out[row, c] += factor * V[entry, c]
+
+
+@jit
+def add_product(rows, V, beta_of, out, first):
+    """Add rows (m, nv) times the q̈ of V to rows first:first + m of out (·, nb + 1); most entries of `rows` are zero."""
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            if rows[i, j] != 0.0:
+                add_entry(rows[i, j], V, beta_of, j, out, first + i)
+
+
+@jit
+def torques(V, beta_of, M, h, J, base, T):
+    """(16) T of `Space` from τ = M_j q̈ + h_j - J_jᵀ λ, the rows of (7) after the first `base`; V, beta_of: of `Space`."""
+    nv, k, nb = M.shape[0], J.shape[0], V.shape[1] - 1
+    clear(T)
+    add_product(M[base:], V, beta_of, T, 0)
+    for c in range(k):
+        for j in range(nv - base):
+            if J[c, base + j] != 0.0:
+                add_entry(-J[c, base + j], V, beta_of, nv + c, T, j)
+    for j in range(nv - base):
+        T[j, nb] += h[base + j]

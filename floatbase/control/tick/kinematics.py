@@ -1,0 +1,144 @@
+"""Velocities, drifts and Jacobians of all bodies and contacts from Pinocchio's world Jacobian: (1)(4)(5).
+
+All quantities are in the world frame. A drift is the acceleration at q̈ = 0, that is J̇ v. Joint 0 is the world itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from floatbase.control.tick.jit import jit
+from floatbase.control.tick.memory import clear
+from floatbase.control.tick.tables import POINT
+from floatbase.control.tick.vectors import column_part, cross, minus, plus, rotate, rotation_in, row_part, times
+
+
+class Bodies(NamedTuple):
+    """The tree of n joints in one state."""
+
+    tree: Any  # (n, 5), parent, first index in v, count in v, first index in q, count in q
+    poses: Any  # (n, 12), rotation column by column, then position
+    J: Any  # (6, nv), spatial velocity about the world's origin for each entry of v: linear, then angular
+    velocity: Any  # (n, 6), spatial velocity of each joint about the world's origin: linear, then angular
+    drift: Any  # (n, 6), its derivative at q̈ = 0
+
+
+class ContactTable(NamedTuple):
+    """C contacts with P points."""
+
+    table: Any  # (C, 4), joint, kind, first point, number of points
+    frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
+    points: Any  # (P, 3), centre of the ball, or corners, in the frame
+
+
+@jit
+def forward_velocities(bodies: Bodies, v):
+    """Fill velocity and drift of `bodies` from the root to the leaves, for v (nv,).
+
+    A joint's columns of J move with it, so its drift is that of its parent + velocity × (J v of the joint alone).
+    """
+    tree, _, J, velocity, drift = bodies
+    for r in range(6):
+        velocity[0, r], drift[0, r] = 0.0, 0.0
+    for i in range(1, tree.shape[0]):
+        parent, first, count = tree[i, 0], tree[i, 1], tree[i, 2]
+        own_linear, own_angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for c in range(first, first + count):
+            own_linear = plus(own_linear, times(v[c], column_part(J, 0, c)))
+            own_angular = plus(own_angular, times(v[c], column_part(J, 3, c)))
+        linear, angular = plus(row_part(velocity, parent, 0), own_linear), plus(row_part(velocity, parent, 3), own_angular)
+        a = plus(row_part(drift, parent, 0), plus(cross(angular, own_linear), cross(linear, own_angular)))
+        alpha = plus(row_part(drift, parent, 3), cross(angular, own_angular))
+        for r in range(3):
+            velocity[i, r], velocity[i, 3 + r], drift[i, r], drift[i, 3 + r] = linear[r], angular[r], a[r], alpha[r]
+
+
+@jit
+def point_velocity(bodies: Bodies, joint, p):
+    """Velocity and drift of the point p, world, of a joint's body."""
+    angular = row_part(bodies.velocity, joint, 3)
+    linear = plus(row_part(bodies.velocity, joint, 0), cross(angular, p))
+    a = plus(row_part(bodies.drift, joint, 0), cross(row_part(bodies.drift, joint, 3), p))
+    return linear, plus(a, cross(angular, linear))
+
+
+@jit
+def frame_pose(bodies: Bodies, joint, frames, i):
+    """Rotation and position, world, of the frame whose pose in the joint is row i of `frames`."""
+    R = rotation_in(bodies.poses, joint)
+    x, y, z = rotation_in(frames, i)
+    return (rotate(R, x), rotate(R, y), rotate(R, z)), plus(row_part(bodies.poses, joint, 9), rotate(R, row_part(frames, i, 9)))
+
+
+@jit
+def point_jacobian(bodies: Bodies, joint, p, out, row):
+    """Write the Jacobian of the point p, world, of a joint's body into rows row:row + 3 of out (·, nv), which hold zeros."""
+    i = joint
+    while i > 0:
+        for c in range(bodies.tree[i, 1], bodies.tree[i, 1] + bodies.tree[i, 2]):
+            J_c = plus(column_part(bodies.J, 0, c), cross(column_part(bodies.J, 3, c), p))
+            out[row, c], out[row + 1, c], out[row + 2, c] = J_c
+        i = bodies.tree[i, 0]
+
+
+@jit
+def angular_jacobian(bodies: Bodies, joint, out, row):
+    """Write the Jacobian of a body's angular velocity into rows row:row + 3 of out (·, nv), which hold zeros."""
+    i = joint
+    while i > 0:
+        for c in range(bodies.tree[i, 1], bodies.tree[i, 1] + bodies.tree[i, 2]):
+            out[row, c], out[row + 1, c], out[row + 2, c] = column_part(bodies.J, 3, c)
+        i = bodies.tree[i, 0]
+
+
+@jit
+def centre_of_mass(bodies: Bodies, links):
+    """Position, velocity and drift of the centre of mass, and the mass. links: (n, 4), mass and its position in the joint."""
+    com, com_velocity, com_drift, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+    for i in range(1, links.shape[0]):
+        p = plus(row_part(bodies.poses, i, 9), rotate(rotation_in(bodies.poses, i), row_part(links, i, 1)))
+        velocity, drift = point_velocity(bodies, i, p)
+        com = plus(com, times(links[i, 0], p))
+        com_velocity, com_drift = plus(com_velocity, times(links[i, 0], velocity)), plus(com_drift, times(links[i, 0], drift))
+        mass += links[i, 0]
+    return times(1.0 / mass, com), times(1.0 / mass, com_velocity), times(1.0 / mass, com_drift), mass
+
+
+@jit
+def count_motion_rows(contacts: ContactTable):
+    """The number m of rows of A in (5): three for a point, six for a flat foot."""
+    m = 0
+    for i in range(contacts.table.shape[0]):
+        m += 3 if contacts.table[i, 1] == POINT else 6
+    return m
+
+
+@jit
+def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
+    """(4)(5) A (m, nv) and b (m,) of all contacts, and the Jacobian J (k, nv) of their points.
+
+    A and J may be one array where all contacts are points.
+    """
+    all_points, row = contacts.table.shape[0] == contacts.points.shape[0] and b.size == J.shape[0], 0
+    clear(A)
+    clear(J)
+    for i in range(contacts.table.shape[0]):
+        joint, kind, first, count = contacts.table[i, 0], contacts.table[i, 1], contacts.table[i, 2], contacts.table[i, 3]
+        R, p = frame_pose(bodies, joint, contacts.frames, i)
+        normal, radius = row_part(contacts.frames, i, 12), contacts.frames[i, 15]
+        for j in range(first, first + count):
+            point = minus(plus(p, rotate(R, row_part(contacts.points, j, 0))), times(radius, normal))
+            point_jacobian(bodies, joint, point, J, 3 * j)
+            if kind == POINT:
+                p = point
+        if not all_points:
+            point_jacobian(bodies, joint, p, A, row)
+        _, drift = point_velocity(bodies, joint, p)
+        if kind == POINT:  # the ball rolls: its lowest point moves on the ball
+            angular = row_part(bodies.velocity, joint, 3)
+            drift = plus(drift, times(radius, cross(angular, cross(angular, normal))))
+        else:
+            angular_jacobian(bodies, joint, A, row + 3)
+            b[row + 3], b[row + 4], b[row + 5] = times(-1.0, row_part(bodies.drift, joint, 3))
+        b[row], b[row + 1], b[row + 2] = times(-1.0, drift)
+        row += 3 if kind == POINT else 6

@@ -1,0 +1,55 @@
+"""Memory of the tick.
+
+The tick allocates nothing: it carves arrays out of a preallocated workspace. Output arrays come last.
+
+workspace: one array of real or of whole numbers; its first entry counts how many are in use.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from floatbase.control.tick.jit import jit, jit_inline
+
+
+@jit_inline
+def take_vector(workspace, n):
+    """The next n unused numbers of a workspace, not set to anything. Raises `MemoryError` where there are fewer."""
+    first = int(workspace[0])
+    last = first + n
+    if last > workspace.size:
+        raise MemoryError("the workspace of the controller's tick is too small")
+    workspace[0] = last
+    return workspace[first:last]
+
+
+@jit_inline
+def take_matrix(workspace, rows, columns):
+    """The next unused numbers of a workspace as an array (rows, columns), not set to anything."""
+    return take_vector(workspace, rows * columns).reshape(rows, columns)
+
+
+@jit
+def clear(array):
+    """Set all entries of a C-contiguous array to zero."""
+    flat = array.reshape(array.size)
+    for i in range(flat.size):
+        flat[i] = 0.0
+
+
+@jit
+def all_finite(vector):
+    """Whether all entries of a vector (n,) are finite."""
+    for i in range(vector.size):
+        if not np.isfinite(vector[i]):
+            return False
+    return True
+
+
+@jit
+def largest(vector):
+    """The largest absolute value in a vector (n,)."""
+    size = 0.0
+    for i in range(vector.size):
+        size = max(size, abs(vector[i]))
+    return size

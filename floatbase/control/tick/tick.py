@@ -1,0 +1,162 @@
+"""The tick, compiled: (26)(27) over plain arrays, which `compiled.py` fills and passes on.
+
+The same problem as `build_qp` makes, solved in another way that costs a fraction:
+
+    kinematics    velocities and drifts of all joints; A, b, J of the contacts                (1)(4)(5)
+    elimination   q̈, λ and τ as functions of β: Gauss-Jordan on the equalities                 (13)(16)(17)
+    costs         the tasks as one quadratic cost in β                                         (18)(26)
+    inequalities  rows that β violates                                                         (27)(28)
+    dual_search   the optimum without inequalities, then one violated row after the other      App. C
+
+A tick without an answer says why: INVALID (a value is not finite, a quaternion or rotation is none), INACCURATE (its last
+digits are lost), INFEASIBLE. Then the readable path decides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from floatbase.control.tick.costs import Cost, TaskTable, task_costs
+from floatbase.control.tick.dual_search import INACCURATE, dual_search
+from floatbase.control.tick.elimination import DEPENDENT_ROW, LOST_ROW, Space, eliminate, independent_rows, parametrise, torques
+from floatbase.control.tick.inequalities import Inequalities, affine_value
+from floatbase.control.tick.jit import jit, jit_cached, jit_inline
+from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, count_motion_rows, forward_velocities
+from floatbase.control.tick.memory import all_finite, take_matrix, take_vector
+
+INVALID, STOPPED = -1, -4
+PARTS = 4  # of a tick: contact rows, elimination, costs, optimum
+FAR = 1e8  # m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
+UNIT = 1e-6  # part by which a quaternion or (cos, sin) may miss length 1, as for `State`
+
+
+@jit_inline
+def unpack(sizes, indices, numbers, targets):
+    """Tree, links, contacts, tasks and limits as `tables.tables_of` laid them out, in that order and row by row.
+
+    sizes: number of joints, contacts, points, facets + 1, tasks, driven joints.
+    indices, numbers: whole and real numbers of all tables, one table after the other, as in a workspace.
+    targets: of all tasks, one after the other.
+    """
+    n, n_contacts, n_points, n_rows, n_tasks, d = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5]
+    indices[0], numbers[0] = 1, 1
+    tree, links, contact_table = take_matrix(indices, n, 5), take_matrix(numbers, n, 4), take_matrix(indices, n_contacts, 4)
+    contacts = ContactTable(contact_table, take_matrix(numbers, n_contacts, 16), take_matrix(numbers, n_points, 3))
+    task_table, gains = take_matrix(indices, n_tasks, 3), take_matrix(numbers, n_tasks, 3)
+    tasks = TaskTable(task_table, gains, take_matrix(numbers, n_tasks, 12), targets)
+    cones, lengths = take_matrix(numbers, n_points * n_rows, 3), take_vector(numbers, n_points * n_rows)
+    torque_limits, least_normal = take_vector(numbers, d), take_vector(numbers, 1)[0]
+    return tree, links, contacts, tasks, Inequalities(cones, lengths, n_rows - 1, torque_limits, least_normal)
+
+
+def workspace_sizes(sizes, m):
+    """How many real and how many whole numbers a tick needs; sizes: as for `unpack`, m: number of motion rows."""
+    n_joints, _, n_points, _, n_tasks, d = (int(size) for size in sizes)
+    base, k = 6, 3 * n_points
+    nv = d + base
+    n = nv + k  # and no more β than that
+    contact = 12 * n_joints + (k + m) * nv + m
+    elimination = (m + base) * (n + 1) + 2 * (nv + n + m + base) + m * nv + m
+    space = (n + d) * (n + 1)
+    cost = (3 * n_tasks + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
+    search = (n + 1) ** 2 + 4 * n * n + 7 * n + k + d
+    return 1 + contact + elimination + space + cost + search, 1 + (m + base) + 3 * n
+
+
+@jit
+def inputs_valid(q, v, targets, tree):
+    """Whether all numbers are finite, and quaternions and (cos, sin) in q have length 1; tree: as in `Bodies`."""
+    if not (all_finite(q) and all_finite(v) and all_finite(targets)):
+        return False
+    for i in range(1, tree.shape[0]):
+        if tree[i, 4] > tree[i, 2]:
+            square = 0.0
+            for at in range(tree[i, 3] + (3 if tree[i, 4] == 7 else 0), tree[i, 3] + tree[i, 4]):
+                square += q[at] * q[at]
+            if abs(np.sqrt(square) - 1.0) > UNIT:
+                return False
+    return True
+
+
+@jit
+def write_answer(space: Space, beta, active, n_active, nv, answer):
+    """Write (q̈, τ, λ) at β (nb,) and the numbers of the active rows into `answer`. Returns False where one has no digits.
+
+    active: (n_active or more,), numbers of the active rows.
+    nv: length of q̈.
+    answer: as for `tick`; the multipliers are there already.
+    """
+    n, d = space.V.shape[0], space.T.shape[0]
+    affine_value(space.V, beta, 0, nv, answer[:nv])
+    affine_value(space.T, beta, 0, d, answer[nv : nv + d])
+    affine_value(space.V, beta, nv, n, answer[nv + d : n + d])
+    for i in range(n_active):
+        answer[2 * n + d + i] = active[i]
+    for i in range(n + d):
+        if not abs(answer[i]) <= FAR:  # nor is NaN
+            return False
+    return True
+
+
+def make_tick(digest):
+    """The function `tick`, to be compiled; digest: of this folder."""
+
+    def tick(q, v, targets, M, h, J, Ag, oMi, sizes, indices, numbers, floats, ints, answer, parts):
+        """(26)(27) Torques, accelerations and forces of one state. Returns how many rows are active, or why there is no answer.
+
+        q, v: (nq,), (nv,), the state.
+        targets, sizes, indices, numbers: as for `unpack`; few arrays, since each costs.
+        M, h, J, Ag, oMi: Pinocchio's results for q and v, as in `tables.Dynamics`.
+        floats, ints: workspaces of `workspace_sizes` numbers.
+        answer: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each.
+        parts: how many of PARTS to run, for benchmarks.
+        """
+        _ = digest  # makes it part of numba's cache key
+        tree, links, contacts, tasks, limits = unpack(sizes, indices, numbers, targets)
+        nv, d, k, m = v.size, limits.torque_limits.size, 3 * contacts.points.shape[0], count_motion_rows(contacts)
+        base, n = nv - d, nv + k
+        if not inputs_valid(q, v, targets, tree):
+            return INVALID
+        floats[0], ints[0] = 1, 1
+        bodies = Bodies(tree, oMi, J, take_matrix(floats, tree.shape[0], 6), take_matrix(floats, tree.shape[0], 6))
+        forward_velocities(bodies, v)
+        J_points, b = take_matrix(floats, k, nv), take_vector(floats, m)
+        A = J_points if contacts.table.shape[0] == contacts.points.shape[0] and m == k else take_matrix(floats, m, nv)
+        contact_rows(bodies, contacts, A, b, J_points)
+        if parts == 1:
+            return STOPPED
+        M_rows = M.T  # symmetric, and Pinocchio stores it by columns
+        B, pivots = take_matrix(floats, m + base, n + 1), take_vector(ints, m + base)
+        least_motion, least = eliminate(A, b, M_rows, h, J_points, base, floats, B, pivots)
+        if least_motion <= DEPENDENT_ROW:
+            rows, right = take_matrix(floats, m, nv), take_vector(floats, m)
+            m = independent_rows(A, b, v, rows, right)
+            if m < 0:
+                return INACCURATE
+            B, pivots = B[: m + base], pivots[: m + base]
+            _, least = eliminate(rows[:m], right[:m], M_rows, h, J_points, base, floats, B, pivots)
+        if least <= LOST_ROW:
+            return INACCURATE
+        nb = n - m - base
+        space = Space(take_matrix(floats, n, nb + 1), take_vector(ints, n), take_matrix(floats, d, nb + 1))
+        parametrise(B, pivots, m, take_vector(ints, nb), space.V, space.beta_of)
+        torques(space.V, space.beta_of, M_rows, h, J_points, base, space.T)
+        if parts == 2:
+            return STOPPED
+        R = take_matrix(floats, 3 * tasks.table.shape[0] + 2 * d + k + 3, nb + 1)
+        diagonal, linear = take_vector(floats, nb), take_vector(floats, nb)
+        used = task_costs(q, v, bodies, Ag, links, tasks, space, base, floats, Cost(R, diagonal, linear))
+        if used < 0:
+            return INVALID
+        if parts == 3:
+            return STOPPED
+        beta, active, mu = take_vector(floats, nb), take_vector(ints, nb), answer[n + d : n + d + nb]
+        n_active = dual_search(Cost(R[:used], diagonal, linear), limits, space, floats, active, mu, beta)
+        if n_active < 0:
+            return n_active
+        return n_active if write_answer(space, beta, active, n_active, nv, answer) else INACCURATE
+
+    return tick
+
+
+tick = jit_cached(make_tick)

@@ -1,0 +1,75 @@
+"""Controllers of the lessons: constant torques, and a servo in every joint. Neither knows where the ground is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array
+from floatbase.dynamics import Contacts
+from floatbase.robots import State
+
+
+@dataclass(frozen=True, eq=False)
+class Torques:
+    """What a rollout reads from a controller's answer.
+
+    tau: shape (d,), N·m. forces: the contact forces that the controller predicts, shape (k,), N, world; None without a
+    prediction.
+    """
+
+    tau: Array
+    forces: Array | None = None
+
+
+class ConstantTorques:
+    """A controller that gives the same torques in every state.
+
+    tau: shape (d,), N·m.
+    contacts: the stance for which forces are recorded; all feet by default.
+    predict: contact forces that a theory expects in a configuration q with velocity v, (q, v) -> shape (k,), N, world. They
+        are recorded as planned forces and change nothing.
+    """
+
+    def __init__(
+        self,
+        tau: npt.ArrayLike,
+        contacts: Contacts | None = None,
+        predict: Callable[[Array, Array], Array] | None = None,
+    ):
+        self.tau, self.contacts = np.array(tau, dtype=np.float64), contacts
+        self._predict = predict
+
+    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+        """The torques, and the prediction for configuration q and velocity v."""
+        return Torques(self.tau, self._predict(q, v) if self._predict is not None else None)
+
+
+def joint_servo(
+    state: State,
+    tau: npt.ArrayLike | None = None,
+    path: Callable[[float], Array] | None = None,
+    stiffness: float = 100.0,
+    damping: float = 10.0,
+) -> Callable[[Array, Array, float], Torques]:
+    """A controller that knows joints only: τ = tau - stiffness · (position error) - damping · (velocity error), per joint.
+
+    state: its joints are the desired ones.
+    tau: torques that hold the joints at rest, shape (d,), N·m; 0 by default.
+    path: offset of the desired joints at time t in s, t -> shape (d,), rad; 0 by default.
+    stiffness: N·m/rad.
+    damping: N·m·s/rad.
+    """
+    d = state.robot.d
+    steady = np.zeros(d) if tau is None else np.array(tau)
+    offset = path if path is not None else lambda t: np.zeros(d)
+
+    def controller(q: Array, v: Array, t: float) -> Torques:
+        rate = (offset(t + 1e-4) - offset(t - 1e-4)) / 2e-4
+        error = q[-d:] - state.q[-d:] - offset(t)
+        return Torques(steady - stiffness * error - damping * (v[-d:] - rate))
+
+    return controller

@@ -1,0 +1,175 @@
+"""Exercises of lesson 01, What is a floating base?"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.dynamics import fixed_frame
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers, vector_text
+from floatbase.lessons.lesson01.pictures import PRESSING
+from floatbase.objectives import momentum_rate
+from floatbase.robots import unbolted
+
+
+@cache
+def _pressed() -> tuple[fb.State, Array, Array]:
+    """The pressing arm without bolts, the tool's position seen from the base, and f_r."""
+    state = unbolted(fb.load("ur5", posture=PRESSING)).standing()
+    return state, state.point("tool0") - state.point("base_link"), np.array([-60.0, 0.0, 0.0])
+
+
+def _bolts_moment() -> Array:
+    """From the constraint forces of (7): what the welded base's wrench becomes with the wall, less what it is without."""
+    state, _, force = _pressed()
+    J = state.frame_jacobian("tool0")[:3]
+    eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base_link")]))
+    wrench = np.linalg.lstsq(eom.J.T, -J.T @ force + eom.S @ (J.T @ force)[6:], rcond=None)[0]
+    return np.asarray(wrench[3:])
+
+
+def _about_the_centre_of_mass() -> Array:
+    state, _, force = _pressed()
+    return -np.cross(state.point("tool0") - state.com, force)
+
+
+def _with_the_weight() -> Array:
+    state, tool, force = _pressed()
+    lever = state.com - state.point("base_link")
+    return -np.cross(tool, force) + np.cross(lever, [0.0, 0.0, state.robot.weight])
+
+
+def _actuation_of_solo8() -> Array:
+    """S, column by column: what (3) gives for one torque at a time."""
+    robot = fb.load("solo8")
+    columns = [np.concatenate([np.zeros(6), one]) for one in np.eye(robot.d)]
+    return np.column_stack(columns)
+
+
+def _carried_by_friction() -> float:
+    """Largest horizontal force on a standing go2 that cones of 0.7 allow, from the cone's own number."""
+    robot = fb.load("go2")
+    contacts = fb.Contacts.points(robot, mu=0.7)
+    return float(contacts.mus.max()) * sum(inertia.mass for inertia in robot.model.inertias) * 9.81
+
+
+def _judge_thrust(answer: Any) -> Verdict:
+    """Thrusts at the four feet of a standing go2: 200 N straight up in all, and no moment about the centre of mass."""
+    f = numbers(answer, (4, 3), (12,))
+    if isinstance(f, Verdict):
+        return f
+    f = f.reshape(4, 3)
+    state = fb.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    # by the momentum that (4) brings about, not by sums of forces and levers
+    rate = momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0]
+    if abs(rate[2] + 200.0) < 0.2:
+        return Verdict(False, "The size is right, the sign is not: these thrusters push the robot down.")
+    if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
+        return Verdict(False, f"The forces add up to {vector_text(rate[:3])} N; asked are (0, 0, 200) N.")
+    if abs(rate[3:]).max() > 0.02:
+        where = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
+        return Verdict(False, f"The force is right, but it turns the robot: moment ({where}) N·m about the centre of mass.")
+    return Verdict(True, "Straight up without turning. Six conditions on twelve numbers: there are many other answers.")
+
+
+EXERCISES = (
+    Exercise(
+        name="01.1",
+        statement="The moment, shape (3,), N·m, by which the bolts answer the wall. The wall pushes with f_r at `tool`, both "
+        "seen from the base. The weight, which the bolts carry anyway, does not count.",
+        stub="bolts_moment = np.zeros(3)  # N·m: replace this, using tool and f_r",
+        solution="bolts_moment = -np.cross(tool, f_r)",
+        judge=Numeric(
+            right=_bolts_moment,
+            praise="The bolts undo what the wall does: force and moment, each with the opposite sign.",
+            mistakes={
+                "This is the wall's own moment about the base. The bolts answer it: look at the sign, or at the order of the "
+                "cross product.": lambda: -_bolts_moment(),
+                "The moment is taken about the centre of mass; the bolts sit at the base.": _about_the_centre_of_mass,
+                "This holds the weight's moment as well; asked is the answer to the wall alone.": _with_the_weight,
+                "Zero would mean that nobody answers the wall. Which lever, and which force?": lambda: np.zeros(3),
+                "This takes the height of the tool alone; it is also 11 cm to the side, and that is a lever too.": (
+                    lambda: np.array([0.0, 60.0 * _pressed()[1][2], 0.0])
+                ),
+                "* multiplies number by number; a moment is the cross product of lever and force.": (
+                    lambda: _pressed()[1] * _pressed()[2]
+                ),
+                "This is a force; a moment needs a lever: how far from the base does the force act?": lambda: -_pressed()[2],
+                "This is f_r itself; a moment needs a lever, and the bolts answer the other way round.": lambda: _pressed()[2],
+            },
+        ),
+        explanation="At rest the moments about the base add up to zero: tool × f_r + τ_b = 0.",
+    ),
+    Exercise(
+        name="01.2",
+        statement="solo8 has two joints in each of its four legs. Write its actuation matrix S of (3).",
+        stub="S_solo8 = np.eye(8)  # replace this: stack what is missing",
+        solution="S_solo8 = np.vstack([np.zeros((6, 8)), np.eye(8)])",
+        judge=Shaped(
+            shapes={
+                (8, 8): "S maps 8 torques into all rows of the equations of motion. How many rows does a base add, and where?",
+                (8, 14): "This is the transpose of the answer: S takes 8 torques to 14 rows.",
+                (9, 8): "A base adds more than one row: three for its position, three for its orientation.",
+                (18, 12): "That is the S of go2, with three joints in each leg; solo8 has two.",
+                (15, 8): "15 counts the quaternion's four numbers. Rows of (4) go with velocities, and a rotation has three.",
+            },
+            judge=Numeric(
+                right=_actuation_of_solo8,
+                praise="Six rows that no motor reaches, then one row for each motor.",
+                mistakes={
+                    "The base comes first in q, as (2) has it; here its rows stand last.": lambda: np.roll(
+                        _actuation_of_solo8(), -6, axis=0
+                    ),
+                    "Zeros everywhere: no motor drives anything. Where does each torque act?": lambda: np.zeros((14, 8)),
+                    "Is there a torque that pushes a joint backwards? One sign too many.": lambda: -_actuation_of_solo8(),
+                },
+            ),
+        ),
+        explanation="(2) puts the six numbers of the base before the joints, so (3) puts six zeros before the torques.",
+    ),
+    Exercise(
+        name="01.3",
+        statement="go2 stands on a level floor with μ = 0.7 and is pulled sideways, low enough not to tip. What is the largest "
+        "horizontal force, in N, that the floor can answer while the robot stays at rest?",
+        stub="most = 1000.0  # N: replace this number by an expression",
+        solution="most = 0.7 * go2.mass * 9.81",
+        judge=Numeric(
+            right=_carried_by_friction,
+            tolerance=2e-3,  # g may be 9.8
+            praise="The bolts' answer had no bound. This one is friction times weight, as long as no jump adds to it.",
+            mistakes={
+                "That takes g as 10 m/s²; the physics here has 9.81.": lambda: 10 * _carried_by_friction() / 9.81,
+                "That is the weight. A horizontal force has to come from friction.": lambda: _carried_by_friction() / 0.7,
+                "That is the share of one foot; four feet share the work.": lambda: _carried_by_friction() / 4,
+                "All four feet together carry one weight, not four.": lambda: 4 * _carried_by_friction(),
+                "That is friction times mass, in kg; a force needs one more factor.": lambda: _carried_by_friction() / 9.81,
+                "μ multiplies the normal force; it does not divide it.": lambda: _carried_by_friction() / 0.49,
+                "That is what the controller's four-sided pyramid allows. Asked is what the floor can do: the round cone.": (
+                    lambda: _carried_by_friction() / np.sqrt(2.0)
+                ),
+                "Friction answers along the floor only as far as the normal force goes: multiply by μ, once.": (
+                    lambda: 0.7 * _carried_by_friction()
+                ),
+            },
+        ),
+        explanation="Each foot gives at most μ times its normal force, and the normal forces add up to the weight.",
+    ),
+    Exercise(
+        name="01.4",
+        statement="A design: go2 floats in its standing posture with a thruster at every foot. Choose the forces, shape "
+        "(4, 3), N, world, in the order of `contacts.names`, so that they add up to 200 N straight up and turn nothing. "
+        "`contacts.positions(state)` and `state.com` are known.",
+        stub="thrust = np.tile([0.0, 0.0, 50.0], (4, 1))  # N: four equal thrusts are a first guess",
+        solution="lever = contacts.positions(state) - state.com\n"
+        "G = np.vstack([np.tile(np.eye(3), 4), np.hstack([np.cross(np.eye(3), -r).T for r in lever])])\n"
+        "thrust = np.linalg.lstsq(G, [0, 0, 200, 0, 0, 0], rcond=None)[0].reshape(4, 3)",
+        judge=Shaped(_judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}),
+        explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; least squares gives the "
+        "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, (20) and (21).",
+    ),
+)

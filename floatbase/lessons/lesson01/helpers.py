@@ -1,0 +1,53 @@
+"""Lesson 01, the arm without bolts: paths of its joints, physics without gravity, and how far its base turned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+import floatbase as fb
+from floatbase._arrays import Array, read_only
+from floatbase.robots import Robot
+from floatbase.simulation import Rollout
+
+
+def turn(joint: int, angle: float, duration: float) -> Callable[[float], Array]:
+    """A path t -> joint offsets, (6,) rad, for `joint_servo`: one joint of six turns by `angle`, rad, in `duration`, s.
+
+    It starts and ends at rest.
+    """
+    return lambda t: angle * _smooth(t / duration) * np.eye(6)[joint]
+
+
+def wave(first: int, second: int, size: float, duration: float) -> Callable[[float], Array]:
+    """A path t -> joint offsets, (6,) rad, for `joint_servo`: two joints of six go once around a circle, back to 0.
+
+    first, second: numbers of the joints, from 0. size: radius, rad. duration: s. It starts and ends at rest.
+    """
+
+    def path(t: float) -> Array:
+        angle = 2.0 * np.pi * _smooth(t / duration)
+        return size * (np.sin(angle) * np.eye(6)[first] + (1.0 - np.cos(angle)) * np.eye(6)[second])
+
+    return path
+
+
+def _smooth(s: float) -> float:
+    """From 0 to 1 with no velocity or acceleration at the ends."""
+    s = min(max(s, 0.0), 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
+def weightless(robot: Robot) -> fb.Simulation:
+    """A `Simulation` of the robot without gravity."""
+    sim = fb.Simulation(robot)
+    sim.model.opt.gravity[:] = 0.0
+    return sim
+
+
+def base_turn(record: Rollout) -> Array:
+    """How the base turned from the first row of a record to the last: axis times angle, shape (3,), degrees, world."""
+    first, last = (record.state(i).frame_pose("base_link").rotation for i in (0, -1))
+    return read_only(np.degrees(pin.log3(last @ first.T)))

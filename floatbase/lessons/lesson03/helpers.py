@@ -1,0 +1,78 @@
+"""Lesson 03, The space of possible motions: points and directions in β, and the states that the lesson looks at."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.dynamics import EquationsOfMotion, FeasibleSpace
+from floatbase.linear_algebra import rank
+from floatbase.robots import Robot
+
+
+@cache
+def standing_go2() -> EquationsOfMotion:
+    """(7) of go2 standing on four feet."""
+    robot = fb.load("go2")
+    return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
+
+
+@cache
+def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
+    """(7) of go2 tilted and moving, and forces, shape (12,), N, world: 10 N push the feet FL and RR apart along their line."""
+    robot = fb.load("go2")
+    eom = fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7))
+    feet = eom.contacts.positions(eom.state)
+    line = (feet[0] - feet[3]) / np.linalg.norm(feet[0] - feet[3])
+    return eom, np.concatenate([10.0 * line, np.zeros(6), -10.0 * line])
+
+
+def space_of(robot: Robot, *frames: str) -> FeasibleSpace:
+    """The space of motions (13) of a robot in its standing state on the feet of these frames; on all feet without `frames`."""
+    contacts = fb.Contacts.points(robot, mu=0.7)
+    return fb.feasible_space(fb.equations_of_motion(robot.standing(), contacts.only(*frames) if frames else contacts))
+
+
+def direction(space: FeasibleSpace, base: npt.ArrayLike = (0.0,) * 6, squeeze: npt.ArrayLike | None = None) -> Array:
+    """The step in β, shape (dimension,), that changes the base's acceleration by `base` and the forces as little as possible.
+
+    base: shape (6,), m/s² and rad/s², base frame. squeeze: internal forces to add, shape (k,), N, world.
+    """
+    rows = space.qdd.A[:6]
+    step = np.linalg.pinv(rows, rcond=1e-9) @ np.asarray(base, dtype=np.float64)
+    free = np.linalg.svd(rows)[2][rank(rows, absolute=True) :].T
+    step -= free @ np.linalg.pinv(space.forces.A @ free, rcond=1e-9) @ (space.forces.A @ step)
+    if squeeze is not None:
+        forces = np.asarray(squeeze, dtype=np.float64)
+        torques = -space.eom.S.T @ space.eom.J.T @ forces
+        step += space.map.A.T @ np.concatenate([np.zeros(space.eom.nv), torques, forces])
+    return step
+
+
+def standing_still(space: FeasibleSpace) -> Array:
+    """The β with q̈ = 0 and the smallest forces that allow it, shape (dimension,)."""
+    eom = space.eom
+    J_base, J_joints = eom.J[:, :6], eom.J[:, 6:]
+    forces = np.linalg.lstsq(J_base.T, eom.h[:6], rcond=1e-9)[0]
+    return space.coordinates(np.zeros(eom.nv), eom.h[6:] - J_joints.T @ forces, forces)
+
+
+def upright(robot: Robot, bend: float) -> fb.State:
+    """solo12 at rest on the ground, every foot below its hip, every knee bent by `bend` rad; 0 is a straight leg."""
+    q = robot.standing().q.copy()
+    for leg in range(4):
+        side = 1.0 if leg < 2 else -1.0
+        q[7 + 3 * leg : 10 + 3 * leg] = 0.0, side * bend / 2, -side * bend
+    for _ in range(3):  # turn the hips until the foot is below the hip's axis
+        state = fb.State(robot, q)
+        for leg, foot in enumerate(robot.feet):
+            joint = robot.model.getJointId(robot.joint_names[3 * leg])
+            hip, sole = state.joint_transforms[joint][:3, 3], state.point(foot.frame)
+            q[7 + 3 * leg] -= np.arctan2(sole[1] - hip[1], hip[2] - sole[2])
+    state = fb.State(robot, q)
+    q[2] -= min(state.point(foot.frame)[2] - foot.radius for foot in robot.feet)
+    return fb.State(robot, q)

@@ -1,0 +1,171 @@
+"""Exercises of lesson 04, One cost, many spaces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
+from floatbase.lessons.lesson03 import standing_go2
+from floatbase.lessons.lesson04.helpers import DESIRED, tilted
+from floatbase.linear_algebra import rank
+
+
+def _gradient_by_newton() -> Array:
+    """By the forces, a_c = Σ f / m + g with λ = ζ(τ): no Jacobian of the centre of mass, no drift of it."""
+    eom = tilted()
+    zeta, mass = fb.forces_from_torques(eom), eom.robot.mass
+    sums = np.tile(np.eye(3), 4) / mass
+    return (sums @ zeta.A).T @ (sums @ zeta.b + eom.robot.model.gravity.linear - DESIRED)
+
+
+def _gradients() -> dict[str, Callable[[], Any]]:
+    def gradient(
+        drift: float = 1.0, offset: float = 1.0, turned: int = 0, back: Callable[[Array], Array] = np.transpose
+    ) -> Callable[[], Array]:
+        def value() -> Array:
+            eom = tilted()
+            state, eta = eom.state, fb.accelerations_from_torques(eom)
+            R = state.frame_pose("base").rotation
+            desired = (DESIRED, R @ DESIRED, R.T @ DESIRED)[turned]
+            J = state.com_jacobian
+            return back(eta.A) @ J.T @ (offset * J @ eta.b + drift * state.com_drift - desired)
+
+        return value
+
+    right = gradient()
+    return {
+        "There is nothing there yet: at a minimum the gradient is zero, but τ = 0 is none.": lambda: np.zeros(12),
+        "The sign: residual = actual - desired, and the gradient points uphill.": lambda: -right(),
+        "The drift is forgotten: the centre of mass accelerates by J q̈ + J̇ q̇.": gradient(drift=0.0),
+        "The drift has the wrong sign.": gradient(drift=-1.0),
+        "η has an offset: with the motors off the robot accelerates too, by b.": gradient(offset=0.0),
+        "The offset of η and the drift are both forgotten.": gradient(drift=0.0, offset=0.0),
+        "The frame: `desired` is in world axes, as are J and the drift; do not turn it.": gradient(turned=1),
+        "The frame: `desired` is in world axes already; the base's rotation takes it out of them.": gradient(turned=2),
+        "A gradient comes back by the transpose of A. A pseudo-inverse would bring back points.": gradient(back=np.linalg.pinv),
+        "This is the cost of the standing robot: J and the drift of the moving one are other numbers.": _gradient_of_standing,
+        "The cost has a ½ in front, so the square's 2 cancels.": lambda: 2 * right(),
+    }
+
+
+def _gradient_of_standing() -> Array:
+    """The lesson's own cost, made where the robot stands, pulled back through η of the moving robot."""
+    state = standing_go2().state
+    cost = fb.Quadratic.from_residual(state.com_jacobian, DESIRED - state.com_drift)
+    return cost.pullback(fb.accelerations_from_torques(tilted())).g
+
+
+def _flat_on_three_feet() -> int:
+    """By counting singular values of what both costs see, in τ; β on three feet is as long as τ and J has full rank."""
+    contacts = fb.Contacts.points(standing_go2().robot).without("FL_foot")
+    state = standing_go2().state
+    eta = fb.accelerations_from_torques(fb.equations_of_motion(state, contacts))
+    return eta.n_in - rank(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]) @ eta.A)
+
+
+def _first_costs() -> dict[str, Any]:
+    """η and the lesson's three costs: on q̈ the centre of mass and the turning of the base, on τ the effort."""
+    eom = standing_go2()
+    J, drift = eom.state.frame_jacobian("base")[3:], eom.state.frame_drift("base")[3:]
+    return {
+        "eta": fb.accelerations_from_torques(eom),
+        "com": fb.Quadratic.from_residual(eom.state.com_jacobian, DESIRED - eom.state.com_drift),
+        "turn": fb.Quadratic.from_residual(J, -drift),
+        "effort": fb.Quadratic.from_residual(np.eye(12), np.zeros(12)),
+    }
+
+
+def _judge_design(answer: Any) -> Verdict:
+    """Any cost on torques whose least point does what exercise 04.3 states."""
+    eom = standing_go2()
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
+    if not isinstance(answer, fb.Quadratic):
+        return Verdict(False, f"Give the cost, an fb.Quadratic on torques, not its minimiser or {type(answer).__name__}.")
+    if answer.n != eom.d:
+        return Verdict(False, f"This is a cost on {answer.n} numbers; on torques it has 12. Pull it back through η.")
+    try:
+        tau = answer.minimiser()
+    except fb.FloatbaseError as error:
+        return Verdict(False, f"It has no least point: {error}")
+    eta, zeta = fb.accelerations_from_torques(eom), fb.forces_from_torques(eom)
+    a = eom.state.com_jacobian @ eta(tau)
+    turning = np.linalg.norm(eta(tau)[3:6])
+    friction = np.linalg.norm(zeta(tau).reshape(4, 3)[:, :2], axis=1).max()
+    if np.linalg.norm(a + DESIRED) < 0.05:
+        return Verdict(False, "The sign: this accelerates to the right.")
+    if np.linalg.norm(a - DESIRED) > 0.01:
+        moves = f"The centre of mass accelerates by {_rounded(a)} m/s², not {_rounded(DESIRED)}"
+        return Verdict(False, f"{moves}: weigh that more.")
+    if turning > 0.05:
+        return Verdict(
+            False, f"The centre of mass is right, but the base turns at {turning:.1f} rad/s². Which cost is missing?"
+        )
+    if friction > 6.0:
+        most = f"one foot leans on friction with {friction:.1f} N"
+        return Verdict(False, f"It moves as desired, but {most}. Effort does not mind; who would?")
+    return Verdict(True, "Three costs, each in the space where it is easy to say, added in the space where the motors are.")
+
+
+def _rounded(a: Array) -> list[float]:
+    return [round(float(x), 3) + 0.0 for x in a]
+
+
+EXERCISES = (
+    Exercise(
+        name="04.1",
+        statement="The gradient at τ = 0 of ½‖J q̈ + J̇ q̇ - desired‖², seen from the torques.",
+        stub="gradient = np.zeros(12)  # replace: from A, b, J, drift and desired",
+        solution="gradient = A.T @ J.T @ (J @ b + drift - desired)",
+        judge=Shaped(
+            Numeric(
+                right=_gradient_by_newton,
+                praise="The chain rule: points go forward by η, slopes come back by its transpose.",
+                mistakes=_gradients(),
+            ),
+            {
+                (18,): "18 numbers: that is the slope on q̈. One step is left to come back to the torques.",
+                (3,): "3 numbers: that is the residual. Two steps are left to come back to the torques.",
+                (12, 1): "This is a matrix with one column; a vector of shape (12,) is asked for.",
+                (12, 12): "That is a curvature, shape (12, 12); the gradient is a vector.",
+            },
+        ),
+        explanation="(15) by hand; `pullback(eta).g` of the same cost gives it too.",
+    ),
+    Exercise(
+        name="04.2",
+        statement="On three feet: how many directions of β are flat for the sum of both costs?",
+        stub="flat = 9  # replace this number by what you find",
+        solution='three = fb.feasible_space(fb.equations_of_motion(state, contacts.without("FL_foot")))\n'
+        "flat = three.dimension - rank((com + turn).pullback(three.qdd).H)",
+        judge=Numeric(
+            count=True,
+            right=_flat_on_three_feet,
+            praise="Again 6, but others: three squeezes, and three ways to move the free foot.",
+            mistakes={
+                "That is for the centre of mass alone.": lambda: 9,
+                "Those are the squeezes. Has the free leg nothing to do?": lambda: 3,
+                "That is counted in q̈, where most directions are not possible at all.": lambda: 12,
+                "So it would be with effort; these two costs do not see all that three feet can do.": lambda: 0,
+            },
+        ),
+        explanation="β has 12 directions and the two costs bend 6 of them; 9 forces leave 9 - 6 = 3 squeezes.",
+    ),
+    Exercise(
+        name="04.3",
+        statement="A cost on torques: 0.5 m/s² to the left, no turning, at most 6 N of friction at every foot.",
+        stub="design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort  # change or add costs",
+        solution="from floatbase.objectives import tangential_bias\n\n"
+        "friction = tangential_bias(contacts)  # on λ\n"
+        "design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort + 1e-4 * friction.pullback(zeta)",
+        judge=_judge_design,
+        names=_first_costs,
+        explanation="Friction is easy to say in λ, so say it there and bring it to the torques through ζ. Its weight is small "
+        "enough not to spoil the acceleration.",
+    ),
+)

@@ -1,0 +1,57 @@
+"""Lesson 04, One cost, many spaces: a controller of least cost, what it reaches, and β in other units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.dynamics import EquationsOfMotion, FeasibleSpace
+from floatbase.lessons.controllers import Torques
+from floatbase.lessons.lesson03 import tilted_squeeze
+from floatbase.robots import Robot
+from floatbase.simulation import Rollout
+
+DESIRED = np.array([0.0, 0.5, 0.0])  # m/s², world: to the left
+RISE_TIME = 0.02  # s in which the engine's soft contact settles
+
+
+class LeastCost:
+    """A controller: in every tick the torques of least cost. contacts: its stance. cost: eom -> `Quadratic` on τ."""
+
+    def __init__(self, robot: Robot, contacts: fb.Contacts, cost: Callable[[EquationsOfMotion], fb.Quadratic]):
+        self.robot, self.contacts, self.cost = robot, contacts, cost
+
+    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+        """The torques for configuration q and velocity v."""
+        eom = fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)
+        return Torques(self.cost(eom).minimiser())
+
+
+def measured_acceleration(record: Rollout) -> Array:
+    """Mean acceleration of the centre of mass, shape (3,), m/s², from its velocities in a record of the physics."""
+    first = int(np.searchsorted(record.time, RISE_TIME))
+    change = record.final.com_velocity - record.state(first).com_velocity
+    return change / (record.time[-1] - record.time[first])
+
+
+def counted_in(space: FeasibleSpace, newtons: float) -> FeasibleSpace:
+    """The same space of motions with another β: the one that results where the unit of force is `newtons` N.
+
+    The maps still give q̈, τ and λ in SI units.
+    """
+    units = np.ones(space.map.n_out)
+    units[space.map.blocks["forces"]] = 1.0 / newtons
+    V = np.linalg.qr(units[:, None] * space.map.A)[0]
+    v = units * space.map.b
+    v = v - V @ (V.T @ v)
+    return FeasibleSpace(space.eom, fb.Affine(V / units[:, None], v / units, space.map.blocks))
+
+
+@cache
+def tilted() -> EquationsOfMotion:
+    """(7) of go2 on four feet, tilted and moving."""
+    return tilted_squeeze()[0]

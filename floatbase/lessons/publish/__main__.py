@@ -1,0 +1,66 @@
+"""`python -m floatbase.lessons.publish`: run, map and publish the lessons, and prepare a learner's copy of them."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from floatbase.errors import InputError
+from floatbase.lessons.publish import FOLDER, README, prepare, readme_with_table, run
+
+PAGES = Path("build/pages")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command. arguments: those of the command line by default."""
+    parser = argparse.ArgumentParser(prog="python -m floatbase.lessons.publish", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    stored = commands.add_parser("run", help="run lessons and store what they print")
+    stored.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
+    commands.add_parser("map", help="write equations.md, conventions.md and the README's table of lessons")
+    paged = commands.add_parser("pages", help="write lessons as HTML pages, which need no kernel")
+    paged.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course, and its map, by default")
+    paged.add_argument("--to", type=Path, default=PAGES, metavar="FOLDER", help=f"where to write, {PAGES} by default")
+    commands.add_parser("workspace", help="bring the learner's copy in notebooks/my up to date")
+
+    given = parser.parse_args(arguments)
+    try:
+        if given.command == "run":
+            _run(given.lessons or sorted(FOLDER.glob("*.ipynb")))
+        elif given.command == "map":
+            _map()
+        elif given.command == "pages":
+            _pages(given.lessons or [*sorted(FOLDER.glob("*.ipynb")), FOLDER / "equations.md"], given.to)
+        else:
+            for line in prepare():
+                print(line)
+    except InputError as error:
+        parser.error(str(error))
+
+
+def _run(lessons: Sequence[Path]) -> None:
+    for lesson in lessons:
+        print(lesson.name)
+        run(lesson)
+
+
+def _map() -> None:
+    from floatbase.lessons.publish import conventions, equations
+
+    (FOLDER / "equations.md").write_text(equations.table(), encoding="utf-8")
+    (FOLDER / "conventions.md").write_text(conventions.page(), encoding="utf-8")
+    README.write_text(readme_with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def _pages(sources: Sequence[Path], folder: Path) -> None:
+    from floatbase.lessons.publish import pages
+
+    for source in sources:
+        page = pages.build(source.resolve(), folder)
+        print(f"{page}: {page.stat().st_size / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""The table of contents: the lessons that exist, read from their notebooks, and those that are planned."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from floatbase.lessons.publish.notebooks import read
+from floatbase.lessons.publish.workspace import FOLDER
+
+README = FOLDER.parent / "README.md"
+# number -> title, equations of the document; a lesson is ready once a notebook has its number
+PLANNED = {
+    "05": ("Steering the centre of mass", "(20)-(25)"),
+    "06": ("Friction cones", "(28)"),
+    "07": ("Control as a quadratic program", "(26), (27)"),
+    "08": ("Standing, shifting, stepping", ""),
+    "09": ("Feet with area: the humanoid", ""),
+    "A": ("Fictitious forces", "App. A"),
+    "B": ("Torque is an abstraction", "App. B"),
+    "C": ("How a QP solver thinks", "App. C"),
+    "P": ("Playground", ""),
+}
+_BEGIN = "<!-- lessons: made by `python -m floatbase.lessons.publish map` -->\n"
+_END = "<!-- end of lessons -->\n"
+_EQUATIONS = re.compile(r"\bequations? ((?:\(\d+\)(?:-|, )?)+)|\b(App\. [ABC])\b")
+
+
+def lesson_table(folder: Path = FOLDER) -> str:
+    """The lessons as a table of Markdown: number, title, equations, ready or planned.
+
+    folder: of the notebooks, whose names start with their number, as in 02_equations_of_motion.ipynb.
+    """
+    rows = {number: f"| {number} | {title} | {equations} | planned |" for number, (title, equations) in PLANNED.items()}
+    for path in folder.glob("*.ipynb"):
+        number = path.name.split("_")[0]
+        title = title_of(path).split(" · ")[-1]
+        rows[number] = f"| {number} | [{title}](notebooks/{path.name}) | {equations_of(path)} | ready |"
+    lines = ["| | lesson | equations | |", "|---|---|---|---|", *(rows[number] for number in sorted(rows))]
+    return "\n".join(lines).replace("|  |", "| |") + "\n"
+
+
+def readme_with_table(text: str) -> str:
+    """The text of the README with the present table between its two marks."""
+    before, rest = text.split(_BEGIN)
+    return f"{before}{_BEGIN}\n{lesson_table()}\n{_END}{rest.split(_END)[1]}"
+
+
+def title_of(source: Path) -> str:
+    """The first heading of a lesson or of a text in Markdown."""
+    heading = re.search(r"^# (.+)$", next(texts_of(source), ""), re.MULTILINE)
+    return heading[1] if heading else source.stem
+
+
+def equations_of(lesson: Path) -> str:
+    """The equations of the document that a lesson names as its source, such as "(8)-(13), (16)"; none is ""."""
+    source = next((line for text in texts_of(lesson) for line in text.splitlines() if line.startswith("**Source**")), "")
+    found = _EQUATIONS.search(source)
+    return (found[1] or found[2]).strip(", ") if found else ""
+
+
+def texts_of(source: Path) -> Iterator[str]:
+    """What a lesson says in words, cell by cell; all of a text in Markdown."""
+    if source.suffix != ".ipynb":
+        yield source.read_text(encoding="utf-8")
+        return
+    yield from (cell.source for cell in read(source).cells if cell.cell_type == "markdown")

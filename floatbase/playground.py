@@ -1,0 +1,190 @@
+"""The page of `python -m floatbase view`: a robot on the physics under the controller, live, without a notebook."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+
+import floatbase as fb
+from floatbase.errors import ViewerError
+from floatbase.objectives import Task
+from floatbase.robots import Robot
+from floatbase.simulation import SEEN, Live, advice
+from floatbase.viewer import push_at
+
+PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller: with each, robots stand a push
+
+
+class Playground:
+    """A robot that stands on the physics, and the controls in the page that change its controller.
+
+    robot: as from `fb.load`.
+    friction: coefficient of the ground; what the controller takes it for is a control.
+    background: "white", "light" or "dark".
+    port: of the page; 0 for a free one.
+    """
+
+    def __init__(self, robot: Robot, *, friction: float = 0.7, background: str = "light", port: int = 0):
+        self.robot = robot
+        self.sim = fb.Simulation(robot, friction)
+        self.view = fb.Viewer(robot, background=background, port=port, facets=4 if robot.feet else None)
+        self.mu, self.facets = friction, 4
+        self.stance = {foot.frame: True for foot in robot.feet}
+        self.shift = [0.0, 0.0, 0.0]  # m, of the centre of mass
+        self.force = 0.1 * robot.weight  # N, of a push
+        self.towards = 0.0  # degrees, of a push: 0 forwards, 90 to the left
+        self.pushed = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
+        self.note = self.outcome = ""
+        self.last: fb.Rollout | None = None
+        self._drawing = threading.Lock()  # the run draws, and so does who pauses it
+        controller = self._controller()
+        self.period = control_period(self.sim, controller)
+        self.run = Live(self.sim, controller, self._show, control_period=self.period)
+        self.run.on_status(self._tell)
+        self.pace = Pace()
+        self._add_controls()
+
+    def start(self) -> None:
+        """Show the robot and let it run."""
+        self.view.show(self.robot.standing())
+        self.run.start()
+
+    def close(self) -> None:
+        """End the run and close the window."""
+        self.run.close()
+        self.view.close()
+
+    def _add_controls(self) -> None:
+        view, weight = self.view, self.robot.weight
+        view.button("run", self.run.start)
+        view.button("pause", self._pause)
+        view.button("reset", self.run.reset)
+        view.slider("speed", self.run.slow_motion, 1.0, 0.05, 1.0, 0.05)
+        view.slider("push [N]", self._set_force, self.force, 0.0, 0.5 * weight, 1.0)
+        view.slider("push towards [°]", self._turn, self.towards, -180.0, 180.0, 5.0)
+        view.button("push", self._push)
+        if not self.robot.is_floating:
+            return
+        for axis, name in enumerate("xyz"):
+            view.slider(f"CoM {name} [m]", lambda x, axis=axis: self._move(axis, x), 0.0, -0.08, 0.08, 0.005)  # type: ignore[misc]
+        view.slider("friction believed", self._believe, self.mu, 0.1, 1.5, 0.05)
+        view.slider("facets", self._cut, self.facets, 3, 16, 1)
+        for foot in self.stance:
+            view.checkbox(f"on {foot}", lambda on, foot=foot: self._stand(foot, on), True)  # type: ignore[misc]
+
+    def _controller(self) -> fb.WholeBodyController:
+        """The controller that the controls request."""
+        standing = self.robot.standing()
+        tasks: tuple[Task, ...] = (fb.PostureTask(standing.q),)
+        if self.robot.is_floating:
+            rotation = standing.frame_pose("base").rotation
+            tasks = (fb.CoMTask(standing.com + self.shift), fb.OrientationTask("base", rotation), *tasks)
+        return fb.WholeBodyController(self.robot, self._contacts(), tasks, facets=self.facets)
+
+    def _contacts(self) -> fb.Contacts:
+        lifted = [frame for frame, stands in self.stance.items() if not stands]
+        return fb.Contacts.feet(self.robot, self.mu).without(*lifted)
+
+    def _change(self) -> None:
+        """Hand a new controller to the run, or say why there is none."""
+        try:
+            self.run.use(self._controller())
+            self.note = ""
+        except fb.FloatbaseError as error:
+            self.note = str(error)
+
+    def _set_force(self, force: float) -> None:
+        self.force = force
+
+    def _turn(self, towards: float) -> None:
+        self.towards = towards
+
+    def _push(self) -> None:
+        angle = math.radians(self.towards)
+        self.run.push([self.force * math.cos(angle), self.force * math.sin(angle), 0.0], frame=self.pushed)
+
+    def _pause(self) -> None:
+        self.run.pause()
+
+    def _move(self, axis: int, distance: float) -> None:
+        self.shift[axis] = distance
+        self._change()
+
+    def _believe(self, mu: float) -> None:
+        self.mu = mu
+        self._change()
+
+    def _cut(self, facets: float) -> None:
+        self.facets = round(facets)
+        self.view.painter = self.view.painter.replace(self.facets)
+        self._change()
+
+    def _stand(self, foot: str, on: bool) -> None:
+        self.stance[foot] = on
+        self._change()
+
+    def _show(self, record: fb.Rollout) -> None:
+        """Draw the last row of a slice."""
+        self.last = record
+        self._draw()
+
+    def _tell(self, status: str) -> None:
+        """Show what stopped the run, if anything did, over the last picture."""
+        self.outcome = "" if status == "running" else advice(status)
+        with suppress(ViewerError):  # the window may be closed already
+            self._draw()
+
+    def _draw(self) -> None:
+        record = self.last
+        if record is None:
+            return
+        with self._drawing:
+            self.view.show(
+                record.final, record.contacts, record.measured[-1], record.planned[-1], push=push_at(record, -1, SEEN),
+                support=True, title="\n".join(filter(None, [self._headline(float(record.time[-1])), self.outcome, self.note])),
+            )  # fmt: skip
+
+    def _headline(self, now: float) -> str:
+        """Robot, time, the part of real time that this machine reaches, and the control period."""
+        speed = self.pace.update(now)
+        pace = "" if speed is None else f", {speed:.0%} of real time"
+        return f"{self.robot.name}, {now:.1f} s{pace}, control every {1e3 * self.period:g} ms"
+
+
+class Pace:
+    """Simulated time per real time. clock: gives real time, s. over: s of real time, back from now, that count."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, over: float = 2.0):
+        self._clock, self._over = clock, over
+        self._seen: deque[tuple[float, float]] = deque()  # clock and simulated time, s
+
+    def update(self, simulated: float) -> float | None:
+        """The pace when the simulation's clock has come to `simulated` s; None for half a second after a start or a pause."""
+        now = self._clock()
+        if self._seen and (simulated < self._seen[-1][1] or now - self._seen[-1][0] > self._over):
+            self._seen.clear()
+        self._seen.append((now, simulated))
+        while now - self._seen[0][0] > self._over:
+            self._seen.popleft()
+        since, start = self._seen[0]
+        return (simulated - start) / (now - since) if now - since > 0.5 else None
+
+
+def control_period(sim: fb.Simulation, controller: fb.WholeBodyController, share: float = 0.5) -> float:
+    """The shortest of `PERIODS`, s, of which physics and controller need at most `share` on this machine; else the longest.
+
+    The rest of the time is for pictures. Leaves the simulation reset.
+    """
+    shortest, ticks = PERIODS[0], 10
+    tries = []
+    for _ in range(4):  # the first one warms up, and the best of the others is this machine when it is not interrupted
+        start = time.perf_counter()
+        fb.rollout(sim, controller, ticks * shortest, control_period=shortest)
+        tries.append((time.perf_counter() - start) / ticks)
+    sim.reset()
+    tick = min(tries[1:])
+    return next((period for period in PERIODS if tick <= share * period), PERIODS[-1])

@@ -1,0 +1,80 @@
+"""The catalogue: what it adds to robots of example-robot-data. Data only; `loading` reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from floatbase.robots.robot import Foot
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the catalogue adds to a robot of example-robot-data.
+
+    description: what the robot is for.
+    feet: where it can touch the ground.
+    torque_limit: of every joint, N·m, where the URDF's limits are wrong.
+    joints: angles of the posture, rad, by joint, where the reference posture will not do.
+    sources: where these numbers come from.
+    """
+
+    description: str
+    feet: tuple[Foot, ...] = ()
+    torque_limit: float | None = None
+    joints: Mapping[str, float] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+
+def _balls(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Foot, ...]:
+    return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
+
+
+def _soles(frames: Sequence[str], x: tuple[float, float], y: tuple[float, float]) -> tuple[Foot, ...]:
+    corners = np.array([[x[1], y[1], 0.0], [x[1], y[0], 0.0], [x[0], y[0], 0.0], [x[0], y[1], 0.0]])
+    return tuple(Foot(frame, corners=corners) for frame in frames)
+
+
+_SOLO_FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
+_SOLO_SOURCES = {
+    "foot radius": "half the width of the foot's mesh in example-robot-data",
+    "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular robot architecture, 2020 "
+    "(the URDF says 1000 N·m, which no motor of this size gives)",
+}
+
+CATALOGUE: Mapping[str, Entry] = {
+    "go2": Entry(
+        "quadruped with 3 joints a leg: as many leg torques as contact forces",
+        _balls(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022),
+        sources={"foot radius": "the foot's mesh in example-robot-data", "torque limits": "URDF"},
+    ),
+    "solo12": Entry(
+        "small quadruped with 3 joints a leg, weak motors: torque limits are near",
+        _balls(_SOLO_FEET, 0.016),
+        torque_limit=2.7,
+        sources=_SOLO_SOURCES,
+    ),
+    "solo8": Entry(
+        "small quadruped with 2 joints a leg: fewer torques than contact forces",
+        _balls(_SOLO_FEET, 0.016),
+        torque_limit=2.7,
+        sources=_SOLO_SOURCES,
+    ),
+    "anymal_kinova": Entry(
+        "quadruped with an arm: more torques than contact forces",
+        _balls(("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), 0.031, (0.0, 0.0, 0.02325)),
+        sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
+    ),
+    "talos": Entry(
+        "humanoid with flat feet: each foot carries a wrench through its corners",
+        _soles(("left_sole_link", "right_sole_link"), (-0.1, 0.1), (-0.06, 0.06)),
+        sources={"sole": "20 cm × 12 cm, within the ankle's collision mesh", "torque limits": "URDF"},
+    ),
+    "ur5": Entry(
+        "arm bolted to the ground: the fixed-base equations (1)",
+        joints={"shoulder_lift_joint": -1.3, "elbow_joint": 1.6, "wrist_1_joint": -0.3, "wrist_2_joint": 0.0},
+        sources={"torque limits": "URDF"},
+    ),
+}

@@ -1,0 +1,188 @@
+"""A MuJoCo model from a robot's URDF: ground, feet, torque motors.
+
+The URDF's shapes are left out: only the ground's plane and balls at the feet touch. Where MuJoCo refuses a link's inertia that
+the robot's own model accepts, the inertia goes to the link that it is welded to.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from floatbase._arrays import Array, positive, unit_vector
+from floatbase.dynamics import UP, Contacts
+from floatbase.errors import SimulationError
+from floatbase.robots import Foot, Robot
+from floatbase.simulation.conversion import rotation_matrix
+
+# MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
+_IMPEDANCE_RATIO = 100.0  # friction as stiff as the normal force: feet creep less under a steady load
+_CONTACT_TIME = 0.004  # s, time constant of a critically damped contact: four of the default timesteps; two is the least
+_CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
+_CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
+_SMALLEST_BALL = 1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+_SMALLEST_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
+_ROUNDING = 1e-9  # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for rounding
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground: a plane through the origin. normal: (3,), world, made unit. mu: coefficient of friction with the feet."""
+
+    mu: float = 1.0
+    normal: Array = field(default_factory=lambda: UP)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mu", positive("friction coefficient mu of the ground", self.mu))
+        object.__setattr__(self, "normal", unit_vector("normal of the ground", self.normal))
+
+
+def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
+    """The robot on the ground as a MuJoCo model with a timestep, s: see `Simulation`.
+
+    The geoms of contact points are called as in `Contacts.feet(robot).point_names`, motors as their joints.
+    Raises `SimulationError` when MuJoCo cannot build it.
+    """
+    spec = _urdf_without_shapes(robot)
+    spec.option.timestep = timestep
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = _IMPEDANCE_RATIO
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if robot.is_floating:
+        spec.body(body_name(robot.base)).add_freejoint()
+    for joint in spec.joints:
+        if joint.name in robot.joint_names:
+            joint.armature = float(robot.model.armature[robot.model.idx_vs[robot.model.getJointId(joint.name)]])
+            joint.damping[:] = 0.0
+            joint.frictionloss = 0.0
+    _add_ground(spec, ground)
+    for foot, contact in zip(robot.feet, Contacts.feet(robot), strict=True):
+        _add_foot(spec, foot, contact.point_names, ground.mu)
+    for name, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
+        _add_motor(spec, name, float(limit))
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise SimulationError(f"MuJoCo cannot build {robot.name} from {robot.urdf.name}: {error}") from None
+    if model.nv != robot.nv:
+        raise SimulationError(
+            f"MuJoCo finds {model.nv} degrees of freedom in {robot.urdf.name}, the robot has {robot.nv}: "
+            "its model was changed after it was read from the URDF."
+        )
+    return model
+
+
+def body_name(link: str) -> str:
+    """Name in MuJoCo of a floating robot's link: its own, but for "world", which is what MuJoCo calls the ground."""
+    return "world of the robot" if link == "world" else link
+
+
+def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
+    """The URDF as MuJoCo reads it, welded links fused into one body, every inertia one that MuJoCo accepts."""
+    root = ElementTree.parse(robot.urdf).getroot()
+    if robot.is_floating:
+        _rename_links(root)
+    for link in root.findall("link"):
+        for shape in link.findall("visual") + link.findall("collision"):
+            link.remove(shape)
+    try:
+        spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    except ValueError as error:
+        raise SimulationError(f"MuJoCo cannot read {robot.urdf.name}: {error}") from None
+    spec.compiler.fusestatic = True
+    for body in spec.bodies:
+        if not _has_valid_inertia(body):
+            _move_inertia_to_neighbour(body)
+    return spec
+
+
+def _rename_links(root: ElementTree.Element) -> None:
+    """Give every link its `body_name`: MuJoCo would weld a link called world to the ground."""
+    for link in root.findall("link"):
+        link.set("name", body_name(link.get("name", "")))
+    for end in (*root.findall("joint/parent"), *root.findall("joint/child")):
+        end.set("link", body_name(end.get("link", "")))
+
+
+def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
+    """A body's inertia in its own frame, as the URDF gives it."""
+    ixx, iyy, izz, ixy, ixz, iyz = body.fullinertia
+    tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
+    inertia = pin.Inertia.Zero()  # the constructor refuses tensors that are not positive definite, which are looked for here
+    inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), R @ tensor @ R.T
+    return inertia
+
+
+def _has_valid_inertia(body: mujoco.MjsBody) -> bool:
+    """Whether some mass distribution has this inertia: principal values positive, none larger than the two others' sum."""
+    if not np.isfinite(body.fullinertia[0]):
+        return True  # the URDF gives none
+    smallest, middle, largest = np.linalg.eigvalsh(_inertia(body).inertia)
+    return bool(smallest > _SMALLEST_INERTIA and smallest + middle >= largest * (1.0 - _ROUNDING))
+
+
+def _move_inertia_to_neighbour(body: mujoco.MjsBody) -> None:
+    """Add a link's invalid inertia to that of the heaviest link welded to it: the robot moves by their sum alone."""
+    welded = {child.name: (child, _placement(child).inverse()) for child in body.bodies if not child.joints}
+    if not body.joints and body.parent.name != "world":
+        welded[body.parent.name] = (body.parent, _placement(body))
+    neighbours = [found for found in welded.values() if np.isfinite(found[0].fullinertia[0])]
+    if not neighbours:
+        return  # MuJoCo names the body when it compiles
+    neighbour, placement = max(neighbours, key=lambda found: float(found[0].mass))
+    total = _inertia(neighbour) + placement.act(_inertia(body))
+    tensor = total.inertia
+    neighbour.mass, neighbour.ipos, neighbour.iquat = total.mass, total.lever, [1.0, 0.0, 0.0, 0.0]
+    neighbour.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+    body.mass, body.fullinertia, body.explicitinertial = 0.0, [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], False
+
+
+def _placement(body: mujoco.MjsBody) -> pin.SE3:
+    """A body's frame in its parent's."""
+    return pin.SE3(rotation_matrix(body.quat), np.array(body.pos))
+
+
+def _add_ground(spec: mujoco.MjSpec, ground: Ground) -> None:
+    quat = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quat, np.array(ground.normal))
+    plane = spec.worldbody.add_geom(
+        name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05], quat=quat, contype=1, conaffinity=0
+    )
+    _set_contact(plane, ground.mu)
+
+
+def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...], mu: float) -> None:
+    """A ball for each of the foot's contact points, so that the ball's lowest point is the contact point."""
+    body = spec.body(body_name(foot.frame))
+    if body is None:
+        raise SimulationError(f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links.")
+    if foot.corners is None:
+        centres, radius = foot.centre[None], max(foot.radius, _SMALLEST_BALL)
+    else:
+        centres, radius = foot.corners + [0.0, 0.0, _CORNER_RADIUS], _CORNER_RADIUS
+    for name, centre in zip(names, centres, strict=True):
+        sphere, size = mujoco.mjtGeom.mjGEOM_SPHERE, [radius, 0.0, 0.0]
+        ball = body.add_geom(name=name, type=sphere, size=size, pos=centre, mass=0.0, contype=0, conaffinity=1)
+        _set_contact(ball, mu)
+
+
+def _set_contact(geom: mujoco.MjsGeom, mu: float) -> None:
+    """Coulomb friction, no resistance to spinning or rolling, a stiff contact."""
+    geom.condim = 3
+    geom.friction = [mu, 0.0, 0.0]
+    geom.solref = [_CONTACT_TIME, 1.0]
+    geom.solimp = _CONTACT_IMPEDANCE
+
+
+def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
+    """A motor on a joint, torque within ± limit, N·m."""
+    motor = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    motor.set_to_motor()
+    if np.isfinite(limit):
+        motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        motor.ctrlrange = [-limit, limit]

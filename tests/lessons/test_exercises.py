@@ -1,0 +1,130 @@
+"""Exercises: what counts as a try, when a solution is shown, and that no answer at all makes a check fail."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hints import missed, right
+
+import floatbase as fb
+from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
+
+MASS = 16.085  # kg, of go2
+
+
+@pytest.fixture(autouse=True)
+def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """One who has just begun."""
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
+
+
+def changed(answer: Any) -> Any:
+    """Another answer of the same kind."""
+    if isinstance(answer, fb.Quadratic):
+        return fb.Quadratic(answer.H, answer.g + 1e-3, answer.c)
+    if isinstance(answer, tuple):
+        return tuple(changed(part) for part in answer)
+    return answer + 1
+
+
+ODD = {
+    "nothing": None, "Ellipsis": ..., "text": "a", "texts": ["a"] * 12, "nothings": [None] * 12, "ragged": [[1.0], [1.0, 2.0]],
+    "object": object(), "three": (1, 2, 3),
+    "dictionary": {}, "not a number": np.nan, "not numbers": np.full(12, np.nan), "endless": np.full((4, 3), np.inf),
+    "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs, "pair": ("a", "b"),
+}  # fmt: skip
+
+
+def test_no_answer_at_all_makes_a_check_fail() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        said = {(name, kind): exercise.judge(odd) for name, exercise in all_exercises().items() for kind, odd in ODD.items()}
+    assert [where for where, verdict in said.items() if verdict.right or not verdict.text] == []
+
+
+def test_a_placeholder_gets_its_hint_and_counts_no_try() -> None:
+    for name, exercise in all_exercises().items():
+        placeholder = exercise.placeholder()
+        said = check(name, placeholder)
+        assert not said.right
+        assert said.text == exercise.judge(placeholder).text
+    assert progress.load() == {}
+
+
+def test_an_answer_beside_the_placeholder_is_a_try() -> None:
+    for name, exercise in all_exercises().items():
+        assert not check(name, changed(exercise.placeholder())).right
+    assert progress.load() == {name: {"tries": 1, "right": 0} for name in all_exercises()}
+
+
+def test_a_solution_is_shown_after_two_tries_and_placeholders_use_up_none(capsys: pytest.CaptureFixture[str]) -> None:
+    solution = all_exercises()["02.1"].solution
+    for _ in range(3):
+        check("02.1", (3, 8))
+        check("02.1", np.array([3.0, 8.0]))
+    show_progress()
+    assert "02.1 ·" in capsys.readouterr().out
+    for times in ("twice", "once"):
+        reveal("02.1")
+        printed = capsys.readouterr().out
+        assert printed.startswith(f"Try {times} more first")
+        assert solution not in printed
+        check("02.1", (9, 8))
+    show_progress()
+    assert "02.1 ✗" in capsys.readouterr().out
+    reveal("02.1")
+    assert solution in capsys.readouterr().out
+
+
+def test_progress_is_kept_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    check("00.1", None)
+    assert progress.load() == {}
+    marks = []
+    for answer in (None, 3.0, 9.81 * MASS):
+        check("00.1", answer)
+        show_progress()
+        marks += re.findall("00.1 (.)", capsys.readouterr().out)
+    assert marks == ["·", "✗", "✓"]
+
+
+def test_a_place_that_cannot_be_written_to_costs_only_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "file"))
+    assert not check("00.1", 3.0).right
+    assert progress.load() == {}
+
+
+def test_wrong_answers_to_00_1_get_the_hint_that_fits() -> None:
+    wrong = [
+        (MASS, "a mass in kg"),
+        (-9.81 * MASS, "what the robot does to the ground"),
+        (9.81 * MASS / 4, "share of one foot"),
+        ([1.0, 2.0], "shape"),
+        (float("nan"), "not finite"),
+        ("heavy", "should be numbers"),
+        (..., "no answer yet"),
+        (1.0, "Neither right nor a mistake this check knows"),
+    ]
+    assert missed("00.1", wrong) == []
+
+
+@pytest.mark.parametrize(("name", "share"), [("00.1", 1.0), ("01.3", 0.7)])
+def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str, share: float) -> None:
+    mass = fb.load("go2").mass
+    assert right(name, share * mass * 9.8)
+    assert missed(name, [(share * mass * 10.0, "g as 10")]) == []
+
+
+@pytest.mark.parametrize("name", ["01.3", "03.1", "04.2"])
+def test_many_numbers_where_one_is_asked_for_are_told_so(name: str) -> None:
+    assert missed(name, [(np.zeros(12), "One number is asked for")]) == []
+
+
+@pytest.mark.parametrize(("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))])
+def test_an_unknown_wrong_count_is_asked_what_it_counts(name: str, count: Any) -> None:
+    assert missed(name, [(count, "What is counted")]) == []

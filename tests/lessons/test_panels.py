@@ -1,0 +1,199 @@
+"""Panels: a slider shows the number that is computed with; a push goes where its handle points, and a line tells of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import ipywidgets as widgets
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.lessons import SliderPanel, live, push_panel, slider_panel
+from floatbase.simulation import Live
+
+RANGES = [
+    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05), (0, 60, 80, 1.0),
+    (0.0, 0.5, 1.0, 0.02), (0.0, 60.0, 120.0, 2.0), (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1), (0, 0.003, 0.01, 0.0002),
+    (0, 250, 5000, 50.0), (-180.0, 0.0, 180.0, 5.0),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def view() -> Iterator[fb.Viewer]:
+    made = fb.Viewer(fb.load("ur5"))
+    yield made
+    made.close()
+
+
+def slider_of(view: fb.Viewer, low: float, first: float, high: float) -> tuple[widgets.FloatSlider, list[float]]:
+    """The slider of a panel that has one, and the values that its picture was drawn for."""
+    drawn: list[float] = []
+    return slider_panel(view, lambda x: drawn.append(x), x=(low, first, high)).sliders["x"], drawn
+
+
+@pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
+def test_a_slider_goes_in_round_steps_through_its_first_value(
+    view: fb.Viewer, low: float, first: float, high: float, step: float
+) -> None:
+    slider, drawn = slider_of(view, low, first, high)
+    assert slider.step == pytest.approx(step, rel=1e-12)
+    for bound in (low, first, high):
+        assert (bound - low) / step == pytest.approx(round((bound - low) / step), abs=1e-6)
+        assert float(format(bound, slider.readout_format)) == bound
+    assert drawn == [first]
+
+
+@pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
+def test_what_a_slider_shows_is_what_is_computed_with(
+    view: fb.Viewer, low: float, first: float, high: float, step: float
+) -> None:
+    slider, drawn = slider_of(view, low, first, high)
+    for i in range(60):
+        slider.value = min(low + i * slider.step, high)  # as a browser adds them up
+        assert format(drawn[-1], slider.readout_format) == format(slider.value, slider.readout_format)
+        assert drawn[-1] == round(drawn[-1], 4)
+    assert len(drawn) > 50
+
+
+def test_bounds_that_are_not_round_get_a_fine_step(view: fb.Viewer) -> None:
+    slider, drawn = slider_of(view, 0.0, 2.0 / 3.0, 3.14159)
+    assert slider.step <= 1e-4
+    assert drawn[0] == pytest.approx(2.0 / 3.0, abs=1e-4)
+
+
+def test_a_range_with_no_width_does_not_fail(view: fb.Viewer) -> None:
+    assert slider_of(view, 2.0, 2.0, 2.0)[1] == [2.0]
+
+
+def test_a_slider_names_its_unit_and_what_the_package_refuses_stands_in_the_note(view: fb.Viewer) -> None:
+    def draw(push_force: float) -> str:
+        if push_force:
+            raise fb.FloatbaseError("too hard")
+        return f"<b>{push_force:.0f}</b>"
+
+    panel = slider_panel(view, draw, push_force=(0.0, 0.0, 60.0, "N"))
+    slider = panel.sliders["push_force"]
+    assert (slider.description, panel.note.value) == ("push force [N]", "<b>0</b>")
+    slider.value = 20.0
+    assert panel.note.value == "too hard"
+    slider.value = 0.0
+    assert panel.note.value == "<b>0</b>"
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_panel_holds_its_picture_once_it_is_displayed(view: fb.Viewer, beside: bool) -> None:
+    panel: SliderPanel = slider_panel(view, lambda x: None, beside=beside, x=(0.0, 1.0, 2.0))
+    picture = (panel.children[0].children if beside else panel.children)[0]
+    assert picture.value == ""
+    panel._repr_mimebundle_()
+    assert "<iframe" in picture.value
+
+
+class Pushed:
+    """What a reader can touch of a push panel, and the run behind it."""
+
+    def __init__(self, robot: fb.Robot):
+        controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+        self.view = fb.Viewer(robot)
+        self.sim = fb.Simulation(robot)
+        self.run: Live = live(self.sim, controller, self.view)
+        _, self.force, row, buttons = push_panel(self.run, self.view, most=600.0).children
+        self.towards, self.push = row.children
+        self.line = buttons.children[-1]
+        self.buttons: dict[str, widgets.Button] = {b.description: b for b in buttons.children[:-1]}
+
+    @property
+    def arrow(self) -> np.ndarray | None:
+        """Direction of the push in the picture, shape (3,), m."""
+        item = self.view.canvas.picture.get("push")
+        return None if item is None else np.array(item.matrix[:3, 2])
+
+
+@pytest.fixture
+def panel() -> Iterator[Pushed]:
+    made = Pushed(fb.load("go2"))
+    yield made
+    made.run.close()
+    made.view.close()
+
+
+def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
+    stop = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < stop, "waited in vain"
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("force", "towards", "way", "words"),
+    [
+        (40.0, 90.0, (0, 1, 0), "pushed with 40 N to the left for 0.1 s"),
+        (-40.0, 90.0, (0, -1, 0), "pushed with 40 N to the right for 0.1 s"),
+        (30.0, 0.0, (1, 0, 0), "pushed with 30 N forwards for 0.1 s"),
+        (30.0, -180.0, (-1, 0, 0), "pushed with 30 N backwards for 0.1 s"),
+        (30.0, 30.0, (np.sqrt(0.75), 0.5, 0), "pushed with 30 N towards 30° for 0.1 s"),
+    ],
+)
+def test_the_handle_pushes_where_it_points_and_the_arrow_stays_to_be_seen(
+    panel: Pushed, force: float, towards: float, way: tuple[float, ...], words: str
+) -> None:
+    panel.towards.value = towards
+    panel.force.value = force
+    assert panel.line.value == words
+    assert panel.run.status == "running"
+    until(lambda: panel.arrow is not None)
+    start = time.monotonic()
+    arrow = panel.arrow
+    assert arrow is not None
+    np.testing.assert_allclose(arrow, panel.view.scale * abs(force) * np.array(way), atol=1e-9)
+    until(lambda: panel.arrow is None)
+    assert time.monotonic() - start > 0.3
+
+
+def test_the_button_pushes_again_and_says_when_there_is_nothing_to_push_with(panel: Pushed) -> None:
+    panel.push.click()
+    assert panel.line.value == "a push of 0 N: set how hard first"
+    assert panel.run.status == "paused"
+    panel.force.value = 20.0
+    until(lambda: panel.arrow is not None)
+    until(lambda: panel.arrow is None)
+    panel.push.click()
+    until(lambda: panel.arrow is not None)
+
+
+def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Pushed) -> None:
+    panel.towards.value = 60.0
+    panel.force.value = 600.0
+    until(lambda: panel.line.value == "fell: press reset, or push again")
+    panel.buttons["reset"].click()
+    assert (panel.force.value, panel.towards.value, panel.line.value) == (0.0, 90.0, "running")
+    until(lambda: panel.run.sim.time > 0.1 and panel.arrow is None)
+    assert panel.run.status == "running"
+    panel.buttons["pause"].click()
+    assert panel.line.value == "paused"
+    panel.buttons["run"].click()
+    assert panel.line.value == "running"
+
+
+def test_a_push_after_a_fall_always_pushes(panel: Pushed) -> None:
+    told = "pushed with 600 N towards 60° for 0.1 s"
+    panel.towards.value = 60.0
+    panel.force.value = 600.0
+    for _ in range(6):
+        until(lambda: panel.line.value == "fell: press reset, or push again")
+        panel.push.click()
+        assert panel.line.value == told
+        assert panel.run.status == "running"
+
+
+def test_a_reset_shows_what_the_run_does_and_no_old_word(panel: Pushed) -> None:
+    panel.force.value = 20.0
+    assert panel.line.value.startswith("pushed with")
+    panel.buttons["reset"].click()
+    assert panel.line.value == "running"
+    panel.push.click()
+    assert panel.line.value == "a push of 0 N: set how hard first"
+    panel.buttons["reset"].click()
+    assert panel.line.value == "running"
