@@ -51,7 +51,7 @@ class Limits:
 class Problem:
     """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning there.
 
-    Where no task acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` with its small default weight is added,
+    Where no task acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added,
     so that the optimum is unique. Raises `InputError` for values of a wrong kind; `check_shapes` looks at names and shapes.
     """
 
