@@ -22,14 +22,14 @@ def read_only(value: Any) -> Array:
 def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
     """A read-only copy of `value`, after checking that it has `shape` (None = any length) and is finite.
 
-    Raises `InputError` with the name, the shape found and the shape wanted.
+    Raises `InputError` with the name, the shape found and the shape required.
     """
     try:
         array = read_only(value)
     except (TypeError, ValueError):
-        wanted = f"numbers of shape {_shape_text(shape)}" if shape else "a number"
-        raise InputError(f"{name} must be {wanted}, not {value!r}.") from None
-    fits = array.ndim == len(shape) and all(want is None or have == want for have, want in zip(array.shape, shape, strict=True))
+        required = f"numbers of shape {_shape_text(shape)}" if shape else "a number"
+        raise InputError(f"{name} must be {required}, not {value!r}.") from None
+    fits = array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
     if not fits:
         unit_text = f" ({unit})" if unit else ""
         raise InputError(f"{name} has shape {array.shape}; it must have shape {_shape_text(shape)}{unit_text}.")

@@ -28,9 +28,8 @@ class WholeBodyController:
 
     robot: the robot to control.
     contacts: its contacts with the ground.
-    tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none of them acts on
-        forces or on torques, a `ForceTask()` or a `TorqueTask()` with its small default weight is added, so that the optimum
-        is unique.
+    tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none acts on forces, or
+        none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added, so that the optimum is unique.
     facets, inside: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
     min_normal_force: N, at every contact point.
     torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.

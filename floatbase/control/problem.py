@@ -49,16 +49,10 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """(26)(27) without a state: what a controller is made of.
+    """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning there.
 
-    robot: the robot.
-    contacts: its contacts.
-    tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none of them acts on
-        forces or on torques, a `ForceTask()` or a `TorqueTask()` with its small default weight is added, so that the optimum
-        is unique.
-    limits: friction, normal forces and torque limits.
-
-    Raises `InputError` for values of a wrong kind; `check_shapes` looks at names and shapes too.
+    Where no task acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` with its small default weight is added,
+    so that the optimum is unique. Raises `InputError` for values of a wrong kind; `check_shapes` looks at names and shapes.
     """
 
     robot: Robot

@@ -16,7 +16,7 @@ from floatbase.errors import InputError
 from floatbase.robots import State
 
 Turning: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
-_LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up: 1e-9 rad off in a turn
+_LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up: 1e-10 rad off after a turn
 _STEP = 1e-5  # m and rad to each side for central differences: curvature and rounding both leave about 1e-10 of M
 
 
@@ -80,7 +80,7 @@ def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
     """App. A: vᵀ (Ṁ - 2 C) v, W, which is zero: fictitious forces do no net work.
 
     Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f remains. Ṁ
-    comes from central differences of M along the motion, which know nothing of C; their error is about 1e-9 of the two terms.
+    comes from central differences of M along the motion, which know nothing of C; their error is about 1e-10 of the two terms.
 
     C: shape (nv, nv), the matrix to try, `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
     """

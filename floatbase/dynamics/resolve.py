@@ -11,13 +11,9 @@ from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
 
-# Directions of motion whose singular value of A is below this part of the largest count as not held. Joint angles are
-# measured to about 1e-4 rad, so a smaller singular value cannot be told from 0.
-MOTION_TOLERANCE = 1e-4
-# 1/s: rows of (5) may be inconsistent by this much, m/s², for each m/s that the contacts move: 1 m/s² for 1 cm/s of slip.
-MOTION_NOISE = 100.0
-# A and J come from the same kinematics. Where they fit, rounding leaves 1e-12 of J; where they do not, parts as large as J.
-_FIT_TOLERANCE = 1e-6
+MOTION_TOLERANCE = 1e-4  # part of A's largest singular value below which a motion counts as not held: angles err by 1e-4 rad
+MOTION_NOISE = 100.0  # 1/s: rows of (5) may disagree by this for each m/s that contacts move: 1 m/s² for 1 cm/s of slip
+_FIT_TOLERANCE = 1e-6  # part of J that may lie beside A's rows: rounding leaves 1e-14, contacts that do not fit leave all
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,15 +7,18 @@ those again, so that its own tolerances do not stay in the answer.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull, QhullError
 
 from floatbase._arrays import Array
 from floatbase.errors import SolverError
 from floatbase.linear_algebra import ranked_svd
 from floatbase.qp import linear_program
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 _FLAT = 1e-9  # part of the size below which a set counts as flat, a point as on a facet: above a linear program's rounding
 _ROUNDS = 200  # of looking for farther points; each adds one at least, and the stances of the course need about ten
@@ -146,6 +149,8 @@ def _affine_hull(farthest: Callable[[Array], Array], n: int, tolerance: float) -
 
 
 def _hull(points: Array) -> ConvexHull:
+    from scipy.spatial import ConvexHull, QhullError  # slow to load, and no controller needs it
+
     try:
         return ConvexHull(points)
     except QhullError as error:

@@ -19,6 +19,7 @@ from floatbase.qp.solution import Solution, with_equality_multipliers
 BackEnd = Callable[[QP], Solution | None]
 
 _DAQP_INFINITY, _PROXQP_INFINITY = 1e30, 1e20  # what these solvers take for no bound
+_CLARABEL = (1e-12, 1e-10, 1e-8)  # tolerances to ask Clarabel for; now and then it makes no progress on the way to the first
 _CONVEX = 1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
 _POLISHABLE = 1e-4  # part of the largest variable that polishing may move any: beyond it, it mends no last digits
 
@@ -87,13 +88,17 @@ def cvxpy(qp: QP) -> Solution | None:
     if len(qp.G):
         constraints.append(qp.G @ step <= qp.h - qp.G @ origin)
     problem = cp.Problem(cp.Minimize(0.5 * cp.quad_form(step, cp.psd_wrap(H)) + slope @ step), constraints)
-    try:
-        with warnings.catch_warnings():
-            # at its last digits Clarabel calls itself inaccurate; how accurate it was, Solution.residuals says
-            warnings.filterwarnings("ignore", message="Solution may be inaccurate")
-            problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=200)
-    except cp.error.SolverError as error:
-        raise SolverError(f"Clarabel did not converge on {qp!r}: {error}") from None
+    for tolerance in _CLARABEL:
+        try:
+            with warnings.catch_warnings():
+                # at its last digits Clarabel calls itself inaccurate; how accurate it was, Solution.residuals says
+                warnings.filterwarnings("ignore", message="Solution may be inaccurate")
+                tolerances = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tolerance)
+                problem.solve(solver=cp.CLARABEL, max_iter=200, **tolerances)
+            break
+        except cp.error.SolverError as error:
+            if tolerance == _CLARABEL[-1]:
+                raise SolverError(f"Clarabel did not converge on {qp!r}: {error}") from None
     if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
         return None
     if problem.status in (cp.UNBOUNDED, cp.UNBOUNDED_INACCURATE):

@@ -12,7 +12,7 @@ from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
 _TOLERANCE = 1e-11  # m and rad: a hundred roundings of a robot of 1 m
-_STEPS = 50  # ten do from any posture that stands nearly
+_STEPS = 50  # the catalogue's robots take five
 _LARGEST_STEP = 0.2  # m and rad: Gauss-Newton's Jacobian is good that far
 
 

@@ -21,8 +21,8 @@ _FALLEN_HEIGHT = 0.4  # part of the base's height at the last reset: a crouch ke
 _FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))  # of the base's tilt since the last reset: no leg brings it back from there
 _LEAST_STATURE = 1e-3  # m: a base that begins lower than this lies on the ground, and its height measures no fall
 _CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
-# MuJoCo's warnings after which its numbers mean nothing
-_FATAL = [int(getattr(mujoco.mjtWarning, f"mjWARN_{name}")) for name in ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")]
+_FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
+_NORMAL_AND_TANGENTS = np.arange(3)  # places of a contact's forces in the solver's, from its address on
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +80,10 @@ class Simulation:
         self._point_of_geom[self._balls] = np.arange(len(self._balls))
         self._below = self.model.geom_size[self._balls, :1] * self.ground.normal
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
-        self._base_position = self.data.xpos[self._base]  # views into MuJoCo's memory, as is the next
+        # views into MuJoCo's memory
+        self._base_position = self.data.xpos[self._base]
         self._base_vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
+        self._fatal_warnings = self.data.warning.number[_FATAL:]
         self.reset()
 
     @property
@@ -119,7 +121,7 @@ class Simulation:
         """Whether positions, velocities, accelerations or torques became infinite, NaN or larger than MuJoCo takes."""
         qpos, qvel = self.data.qpos, self.data.qvel
         finite = isfinite(qpos @ qpos) and isfinite(qvel @ qvel)  # MuJoCo itself finds out only in the next step
-        return not finite or bool(self.data.warning.number[_FATAL].any())
+        return not finite or bool(self._fatal_warnings.any())
 
     @property
     def fallen(self) -> bool:
@@ -164,13 +166,11 @@ class Simulation:
     def contact_forces(self) -> Array:
         """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world, ordered as `point_names`."""
         forces = np.zeros((len(self._balls), 3))
-        contact = self.data.contact
-        rows = contact.efc_address  # of each contact's normal force in the solver's forces; two tangential ones follow
-        if not len(rows):
-            return forces
-        in_frame = self.data.efc_force[rows[:, None] + [0, 1, 2]]
-        # rows of the frame: normal from the ground (geom 0) to the ball (geom 1), two tangents
-        forces[self._point_of_geom[contact.geom[:, 1]]] = (in_frame[:, None] @ contact.frame.reshape(-1, 3, 3))[:, 0]
+        if self.data.ncon:
+            contact = self.data.contact
+            in_frame = self.data.efc_force[contact.efc_address[:, None] + _NORMAL_AND_TANGENTS]
+            # one plane (geom 0), so one frame for all contacts: its rows are normal and tangents, from the plane to the ball
+            forces[self._point_of_geom[contact.geom[:, 1]]] = in_frame @ contact.frame[0].reshape(3, 3)
         return forces
 
     def contact_positions(self) -> Array:

@@ -317,7 +317,7 @@ def feasible(qp: QP, rows: list[int]) -> bool:
 def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict(name: str) -> None:
     controller = controller_of(name, min_normal_force=500.0)
     state = judges.load(name).standing()
-    with pytest.raises(InfeasibleError, match=r"(?s)these contradict each other:.*Loosen or drop any one of them") as caught:
+    with pytest.raises(InfeasibleError, match=r"(?s)these are in conflict:.*Loosen or drop any one of them") as caught:
         controller(state.q, state.v)
     qp = controller.qp(state)
     rows = [qp.inequality_names.index(row) for row in caught.value.rows]

@@ -100,7 +100,7 @@ def test_fictitious_forces_do_no_net_work_and_those_of_a_wrong_matrix_would(name
         power = np.abs(state.v) @ np.abs(C) @ np.abs(state.v)
         found = [power_identity(state), power_identity(state, 0.5 * C), power_identity(state, wrong)]
         worst = np.maximum(worst, np.abs(found) / power)
-    assert worst[0] < 1e-6
+    assert worst[0] < 1e-8  # the differences leave 2e-10
     assert np.all(worst[1:] > 1e-3)
 
 
@@ -116,8 +116,8 @@ def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy() -> None:
         acceleration = -np.linalg.solve(middle.M, bias_forces(middle).fictitious)
         state = state.replace(q=state.integrate(dt * middle.v), v=state.v + dt * acceleration)
         joints.append(0.5 * state.v[6:] @ state.M[6:, 6:] @ state.v[6:])
-    lost = abs(0.5 * state.v @ state.M @ state.v / start - 1.0)
-    assert lost < 1e-6  # by the midpoint rule; without the fictitious forces it would be of order 1
+    # the midpoint rule's own error is 1e-7; without these forces, or with half of them, energy changes by 1e-2
+    assert abs(0.5 * state.v @ state.M @ state.v / start - 1.0) < 1e-6
     assert np.ptp(joints) > 0.3 * joints[0]
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from floatbase.errors import InputError
-from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, tangents
+from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
 
 Array = npt.NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])
@@ -206,8 +206,6 @@ def test_results_cannot_be_written_to() -> None:
         decompose(outside, UP).f_perp,
     ]
     arrays += [shape.project(force) for shape in (cone, polyhedron) for force in (outside, UP, -UP)]
-    wrenches = WrenchSet(np.eye(3), [polyhedron] * 3, np.zeros(3), 100.0, np.full(3, np.inf))
-    arrays += [wrenches.points, wrenches.rays, wrenches.rows, wrenches.equalities, wrenches.support_region()]
     assert not any(array.flags.writeable for array in arrays)
 
 

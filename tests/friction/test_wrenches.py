@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import count
 
 import cvxpy as cp
 import judges
@@ -54,11 +55,11 @@ def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) 
     return of(rng.uniform(-0.5, 0.5, (n, 3)), judges.random_normals(n, seed, 0.8), 0.6, facets, inside)
 
 
-def random_wrenches(wrenches: WrenchSet, count: int, seed: int) -> Array:
-    """About half of them inside: forces from the cones, and pushes added to them."""
+def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
+    """Sums of forces from the cones, so inside: the first quarter as they are, to the others ever harder pushes are added."""
     rng = np.random.default_rng(seed)
-    inside = wrenches.rays @ rng.exponential(30.0, (wrenches.rays.shape[1], count))
-    push = rng.normal(size=(6, count)) * rng.uniform(0, 5.0, count)
+    inside = wrenches.rays @ rng.exponential(30.0, (wrenches.rays.shape[1], n))
+    push = rng.normal(size=(6, n)) * np.maximum(np.linspace(-2.0, 8.0, n), 0.0)
     return (inside + push * np.array([60.0] * 3 + [15.0] * 3)[:, None]).T
 
 
@@ -329,9 +330,9 @@ def test_on_level_ground_this_holds_for_feet_anywhere(seed: int, feet: int) -> N
     assert max(np.min(np.linalg.norm(hull - corner, axis=1)) for corner in region) < 1e-8
 
 
-@pytest.mark.parametrize("seed", [1, 2, 4])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(seed: int) -> None:
-    wrenches = feet_on_slopes(seed)
+    wrenches = next(feet for feet in map(feet_on_slopes, count(100 * seed)) if len(feet.support_region()) > 2)
     region = wrenches.support_region()
     judge = Judge(wrenches.points, np.array([cone.normal for cone in wrenches.cones]), 0.6, exact=False)
     low, high = region.min(axis=0), region.max(axis=0)
@@ -451,6 +452,12 @@ def test_turning_a_robot_about_the_vertical_turns_its_support_region() -> None:
 
 
 # input
+
+
+def test_a_wrench_sets_arrays_cannot_be_written_to() -> None:
+    wrenches = of(np.eye(3), [UP] * 3)
+    arrays = [wrenches.points, wrenches.rays, wrenches.rows, wrenches.equalities, wrenches.support_region()]
+    assert not any(array.flags.writeable for array in arrays)
 
 
 def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:

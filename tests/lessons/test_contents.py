@@ -10,7 +10,10 @@ import nbformat
 import pytest
 from nbformat.v4 import new_markdown_cell, new_notebook
 
-from floatbase.lessons.publish import FOLDER, README, equations, lesson_table, readme_with_table
+from floatbase.dynamics import MOTION_NOISE
+from floatbase.lessons.publish import FOLDER, README, conventions, equations, lesson_table, readme_with_table
+from floatbase.linear_algebra import RANK_TOLERANCE
+from floatbase.qp import FEASIBILITY_TOLERANCE
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +49,18 @@ MADE = "run `python -m floatbase.lessons.publish map`"
 
 def test_the_map_is_the_one_that_the_code_makes() -> None:
     assert (FOLDER / "equations.md").read_text(encoding="utf-8") == equations.table(), MADE
+
+
+def test_the_page_of_conventions_is_the_one_that_the_code_makes() -> None:
+    assert (FOLDER / "conventions.md").read_text(encoding="utf-8") == conventions.page(), MADE
+
+
+def test_the_page_of_conventions_shows_every_tolerance_with_its_reason() -> None:
+    shown = {(file, name): float(value) for file, name, value, _ in conventions.tolerances()}
+    assert shown["linear_algebra", "RANK_TOLERANCE"] == RANK_TOLERANCE
+    assert shown["dynamics/resolve", "MOTION_NOISE"] == MOTION_NOISE
+    assert shown["qp/problem", "FEASIBILITY_TOLERANCE"] == FEASIBILITY_TOLERANCE
+    assert all(len(reason) > 15 for *_, reason in conventions.tolerances())
 
 
 def test_the_table_of_lessons_in_the_readme_is_the_one_that_the_lessons_make() -> None:

@@ -12,8 +12,7 @@ import pytest
 import floatbase as fb
 from floatbase.dynamics import fixed_frame
 from floatbase.errors import FloatbaseError, InfeasibleError
-from floatbase.lessons.lesson01 import unbolted
-from floatbase.robots import State
+from floatbase.robots import State, unbolted
 
 
 @dataclass

@@ -10,18 +10,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from floatbase._assets import assets_root
 from floatbase.dynamics import Contacts
 from floatbase.robots import catalogue, load, load_urdf
 from floatbase.viewer import robot_meshes, urdf_visuals
 
+MESHES = Path(__file__).parents[2] / "assets" / "meshes"
 BOX = 0.006  # m: by which decimation may move an outermost vertex; two pixels in a picture of a whole robot
 REACH = 0.03  # m from a contact to the nearest vertex: a foot's ball has a radius of 2 cm, and a sole few vertices
 
 
 def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
     for name in catalogue():
-        assert (assets_root() / "meshes" / f"{name}.npz").stat().st_size < 400_000, name
+        assert (MESHES / f"{name}.npz").stat().st_size < 400_000, name
         for mesh in robot_meshes(load(name)):
             assert mesh.faces.max() < len(mesh.vertices) == len(mesh.colours), name
             assert np.all(np.isfinite(mesh.vertices)), name

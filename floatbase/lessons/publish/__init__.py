@@ -8,12 +8,12 @@ from floatbase.lessons.publish.notebooks import execute, read, run, solved
 from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare, without_outputs
 
 if TYPE_CHECKING:
-    from floatbase.lessons.publish import equations, pages, prose
+    from floatbase.lessons.publish import conventions, equations, pages, prose
 
-_PARTS = ("equations", "pages", "prose")  # imported at first use; the last two need the extra `pages`
+_PARTS = ("conventions", "equations", "pages", "prose")  # imported at first use; the last two need the extra `pages`
 
 __all__ = [
-    "FOLDER", "MINE", "README", "equations", "execute", "lesson_table", "pages", "prepare", "prose", "read",
+    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "lesson_table", "pages", "prepare", "prose", "read",
     "readme_with_table", "run", "solved", "title_of", "without_outputs",
 ]  # fmt: skip
 

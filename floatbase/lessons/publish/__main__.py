@@ -19,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     stored = commands.add_parser("run", help="run lessons and store what they print")
     stored.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
-    commands.add_parser("map", help="write notebooks/equations.md and the table of lessons in README.md")
+    commands.add_parser("map", help="write equations.md, conventions.md and the README's table of lessons")
     paged = commands.add_parser("pages", help="write lessons as HTML pages, which need no kernel")
     paged.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course, and its map, by default")
     paged.add_argument("--to", type=Path, default=PAGES, metavar="FOLDER", help=f"where to write, {PAGES} by default")
@@ -47,9 +47,10 @@ def _run(lessons: Sequence[Path]) -> None:
 
 
 def _map() -> None:
-    from floatbase.lessons.publish import equations
+    from floatbase.lessons.publish import conventions, equations
 
     (FOLDER / "equations.md").write_text(equations.table(), encoding="utf-8")
+    (FOLDER / "conventions.md").write_text(conventions.page(), encoding="utf-8")
     README.write_text(readme_with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
 
 
