@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from floatbase.control.problem import INCONSISTENT
-from floatbase.control.tick.jit import jit, jit_allocating
+from floatbase.control.tick.jit import jit, jit_allocating, jit_forced
 from floatbase.control.tick.memory import clear, take_vector
 from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
 
@@ -174,7 +174,7 @@ def parametrise(B, pivots, m, free, V, beta_of):
                     V[pivot, j] -= factor * V[source, j]
 
 
-@jit
+@jit_forced
 def add_entry(factor, V, beta_of, entry, out, row):
     """Add factor × row `entry` of V to a row of out (·, nb + 1); where the entry is a β, that is one number."""
     if beta_of[entry] >= 0:

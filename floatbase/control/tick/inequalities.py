@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from floatbase.control.tick.elimination import Space
-from floatbase.control.tick.jit import jit
+from floatbase.control.tick.jit import jit, jit_forced
 from floatbase.control.tick.memory import clear
 from floatbase.control.tick.vectors import dot, minus, row_part, times
 from floatbase.qp import FEASIBILITY_TOLERANCE
@@ -35,7 +35,7 @@ def affine_value(V, beta, first, last, out):
         out[i - first] = total
 
 
-@jit
+@jit_forced
 def forces_of(space: Space, beta, forces):
     """forces (k,) at β; most of them are a β themselves."""
     first = space.V.shape[0] - forces.size
@@ -46,7 +46,7 @@ def forces_of(space: Space, beta, forces):
             affine_value(space.V, beta, first + i, first + i + 1, forces[i:])
 
 
-@jit
+@jit_forced
 def worst_facet(limits: Inequalities, first, f):
     """(28) The row of a point's facets, of which `first` is the first, that the force f violates most, and by how much; or -1.
 

@@ -26,6 +26,7 @@ _FILES = 16  # kept on disk: two for each processor and version of Python that s
 
 jit: Callable[..., Any] = partial(numba.njit, **_OPTIONS)
 jit_inline: Callable[..., Any] = partial(numba.njit, inline="always", **_OPTIONS)  # part of its caller, so it may return arrays
+jit_forced: Callable[..., Any] = partial(numba.njit, forceinline=True, **_OPTIONS)  # small and called often
 jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
 
 cache_on_disk = True  # False where numba finds no folder that it can write to
