@@ -19,6 +19,7 @@ from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.qp import FEASIBILITY_TOLERANCE, Solution
 from floatbase.robots import Robot, State
 
+DEPENDENT = 1e-6  # N·m between the paths where contact rows depend on one another: the readable path holds no more digits
 TORQUE = 1e-8  # N·m between the paths: both keep eight digits of the strongest motor's limit on well-conditioned contacts
 
 
@@ -83,11 +84,11 @@ def test_a_compiled_tick_gives_the_torques_of_the_readable_path(name: str) -> No
 
 
 def test_on_dependent_contact_rows_a_compiled_tick_is_optimal() -> None:
-    """solo8 on four feet: J has rank 11. There the readable path itself carries no more than 1e-7 N·m."""
+    """solo8 on four feet: J has rank 11."""
     robot = judges.load("solo8")
     both = pair(robot, judges.stance(robot))
     for state in cases("solo8", 15):
-        assert difference(both, state) < 1e-7
+        assert difference(both, state) < DEPENDENT
         prove_optimal(both[0](state.q, state.v).solution)
 
 
@@ -130,7 +131,7 @@ def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(s
     both = pair(robot, contacts)
     for moved in judges.states("solo8", 3, 0.1):
         state = with_resolution(moved, contacts, share * MOTION_TOLERANCE)
-        assert difference(both, state) < 1e-6
+        assert difference(both, state) < DEPENDENT
         prove_optimal(both[0](state.q, state.v).solution)
 
 
@@ -312,7 +313,10 @@ def test_a_bad_target_is_refused_in_the_same_words() -> None:
 @pytest.mark.parametrize("name", ["go2", "talos"])
 def test_a_compiled_answer_proves_itself_on_the_readable_problem(name: str) -> None:
     robot = judges.load(name)
-    both = pair(robot, judges.stance(robot), torque_limits=np.where(np.arange(robot.d) == 4, np.inf, robot.torque_limits))
+    free, _ = pair(robot, judges.stance(robot), torque_limits=np.inf)
+    strongest = np.max([np.abs(free(state.q, state.v).tau) for state in cases(name, 6)], axis=0)
+    limits = np.where(np.arange(robot.d) == 4, np.inf, 0.8 * strongest)  # some are reached, one joint has none
+    both = pair(robot, judges.stance(robot), torque_limits=limits)
     kinds = set()
     for state in cases(name, 6):
         found, expected = (controller(state.q, state.v) for controller in both)
@@ -326,7 +330,7 @@ def test_a_compiled_answer_proves_itself_on_the_readable_problem(name: str) -> N
             for row, multiplier in expected.multipliers.items():
                 assert found.multipliers[row] == pytest.approx(multiplier, rel=1e-5, abs=1e-7)
         kinds |= {row.split()[0] for row in found.active}
-    assert "torque" in kinds or name == "talos"
+    assert "torque" in kinds
 
 
 def test_a_command_keeps_its_numbers_when_the_state_moves_on() -> None:
