@@ -70,10 +70,7 @@ class Rollout:
         return self.stances[i] if self.stances else self.contacts
 
     def force(self, contact: str, kind: Literal["measured", "planned"] = "measured") -> Array:
-        """The force of one contact through time, shape (n, 3), N, world; of a flat foot the resultant of its corners.
-
-        contact: its name, as "FL_foot". kind: "measured" or "planned". Raises `UnknownNameError` for other names.
-        """
+        """The force of a contact, such as "FL_foot", through time, shape (n, 3), N, world: of a flat foot the resultant."""
         if kind not in ("measured", "planned"):
             raise unknown_name("kind of force", kind, ("measured", "planned"))
         return self.contacts.force_of(self.measured if kind == "measured" else self.planned, contact)
