@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
+from contextlib import closing
 
 import floatbase as fb
 
@@ -47,15 +48,13 @@ def _view(options: argparse.Namespace) -> int:
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         robot = fb.load(options.robot)
-        playground = Playground(robot, friction=options.friction, background=options.background, port=options.port)
-        try:
-            playground.start()
-            print(f"{options.robot} at {playground.view.url} (end with Ctrl-C)", flush=True)
+        page = Playground(robot, friction=options.friction, background=options.background, port=options.port)
+        with closing(page):
+            page.start()
+            print(f"{options.robot} at {page.view.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
-                playground.view.window.open()
+                page.view.window.open()
             ended.wait()
-        finally:
-            playground.close()
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

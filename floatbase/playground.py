@@ -8,6 +8,8 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
+from typing import Any
 
 import floatbase as fb
 from floatbase.errors import ViewerError
@@ -61,20 +63,20 @@ class Playground:
     def _add_controls(self) -> None:
         view, weight = self.view, self.robot.weight
         view.button("run", self.run.start)
-        view.button("pause", self._pause)
+        view.button("pause", self.run.pause)
         view.button("reset", self.run.reset)
         view.slider("speed", self.run.slow_motion, 1.0, 0.05, 1.0, 0.05)
-        view.slider("push [N]", self._set_force, self.force, 0.0, 0.5 * weight, 1.0)
-        view.slider("push towards [°]", self._turn, self.towards, -180.0, 180.0, 5.0)
+        view.slider("push [N]", partial(setattr, self, "force"), self.force, 0.0, 0.5 * weight, 1.0)
+        view.slider("push towards [°]", partial(setattr, self, "towards"), self.towards, -180.0, 180.0, 5.0)
         view.button("push", self._push)
         if not self.robot.is_floating:
             return
         for axis, name in enumerate("xyz"):
-            view.slider(f"CoM {name} [m]", lambda x, axis=axis: self._move(axis, x), 0.0, -0.08, 0.08, 0.005)  # type: ignore[misc]
-        view.slider("friction believed", self._believe, self.mu, 0.1, 1.5, 0.05)
+            view.slider(f"CoM {name} [m]", partial(self._change, self.shift, axis), 0.0, -0.08, 0.08, 0.005)
+        view.slider("friction believed", partial(self._change, vars(self), "mu"), self.mu, 0.1, 1.5, 0.05)
         view.slider("facets", self._cut, self.facets, 3, 16, 1)
         for foot in self.stance:
-            view.checkbox(f"on {foot}", lambda on, foot=foot: self._stand(foot, on), True)  # type: ignore[misc]
+            view.checkbox(f"on {foot}", partial(self._change, self.stance, foot), True)
 
     def _controller(self) -> fb.WholeBodyController:
         """The controller that the controls request."""
@@ -83,49 +85,26 @@ class Playground:
         if self.robot.is_floating:
             rotation = standing.frame_pose("base").rotation
             tasks = (fb.CoMTask(standing.com + self.shift), fb.OrientationTask("base", rotation), *tasks)
-        return fb.WholeBodyController(self.robot, self._contacts(), tasks, facets=self.facets)
-
-    def _contacts(self) -> fb.Contacts:
         lifted = [frame for frame, stands in self.stance.items() if not stands]
-        return fb.Contacts.feet(self.robot, self.mu).without(*lifted)
+        contacts = fb.Contacts.feet(self.robot, self.mu).without(*lifted)
+        return fb.WholeBodyController(self.robot, contacts, tasks, facets=self.facets)
 
-    def _change(self) -> None:
-        """Hand a new controller to the run, or say why there is none."""
+    def _change(self, values: Any, key: Any, value: Any) -> None:
+        """Set one of the values, and hand a new controller to the run, or say why there is none."""
+        values[key] = value
         try:
             self.run.use(self._controller())
             self.note = ""
         except fb.FloatbaseError as error:
             self.note = str(error)
 
-    def _set_force(self, force: float) -> None:
-        self.force = force
-
-    def _turn(self, towards: float) -> None:
-        self.towards = towards
-
     def _push(self) -> None:
         angle = math.radians(self.towards)
         self.run.push([self.force * math.cos(angle), self.force * math.sin(angle), 0.0], frame=self.pushed)
 
-    def _pause(self) -> None:
-        self.run.pause()
-
-    def _move(self, axis: int, distance: float) -> None:
-        self.shift[axis] = distance
-        self._change()
-
-    def _believe(self, mu: float) -> None:
-        self.mu = mu
-        self._change()
-
     def _cut(self, facets: float) -> None:
-        self.facets = round(facets)
-        self.view.painter = self.view.painter.replace(self.facets)
-        self._change()
-
-    def _stand(self, foot: str, on: bool) -> None:
-        self.stance[foot] = on
-        self._change()
+        self.view.painter = self.view.painter.replace(round(facets))
+        self._change(vars(self), "facets", round(facets))
 
     def _show(self, record: fb.Rollout) -> None:
         """Draw the last row of a slice."""

@@ -31,9 +31,8 @@ class Hydraulics:
 
     Sources: bore 16 mm, rod 10 mm, 160 bar, 145 N·m and the Moog E024 valve of 250 Hz: Semini et al., Design of HyQ, a
     hydraulically and electrically actuated quadruped robot, Proc. IMechE Part I 225, 2011. The crank follows from them:
-    160 bar on the bore gives 3217 N, and 145 N·m need 45 mm. Nominal, not measured on HyQ: base (along a link of 0.35 m),
-    dead volume (0.4 m of hose of 5 mm), β_e of oil with a little air, leakage (0.02 l/min at 160 bar), flow (7.5 l/min at
-    70 bar), return pressure, and the loop's 50 Hz, a fifth of the valve's.
+    160 bar on the bore gives 3217 N, and 145 N·m need 45 mm. The others are nominal, not measured on HyQ: a dead volume of
+    0.4 m of hose of 5 mm, leakage of 0.02 l/min at 160 bar, flow of 7.5 l/min at 70 bar, a loop of a fifth of the valve's.
     Raises `InputError` for values that make no cylinder.
     """
 
@@ -52,16 +51,13 @@ class Hydraulics:
     loop_bandwidth: float = 50.0
 
     def __post_init__(self) -> None:
-        may_be_zero = ("tank_pressure", "leakage")
-        for field in fields(self):
-            name = field.name.replace("_", " ")
-            positive(f"{name} of the cylinder", getattr(self, field.name), allow_zero=field.name in may_be_zero)
-        for small, large in (("rod", "bore"), ("crank", "base"), ("tank_pressure", "supply_pressure")):
-            if getattr(self, small) >= getattr(self, large):
-                raise InputError(
-                    f"{small} of the cylinder is {getattr(self, small):g}; it must be less than {large}, "
-                    f"{getattr(self, large):g}.".replace("_", " ")
-                )
+        parts = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
+        for name, value in parts.items():
+            positive(f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage"))
+        for small, large in (("rod", "bore"), ("crank", "base"), ("tank pressure", "supply pressure")):
+            if parts[small] >= parts[large]:
+                size, bound = parts[small], parts[large]
+                raise InputError(f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}.")
         if self.weakest_torque <= 0.0:
             raise InputError("the tank pressure on the bore holds off the supply on the ring: it must be lower.")
 
@@ -134,9 +130,9 @@ class Cylinders:
 
     hydraulics: the cylinder of size 1.
     size: (d,), each cylinder's torque as a multiple of that one's. Lengths are multiplied by size^(1/3), hence volumes, flow,
-        leakage and torque by size, so that all joints behave alike in units of their strength.
-    centre: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and cylinder stand square. L is a cosine
-        near it, and zero, without any torque, where they line up. The stroke 2 b lets a joint turn full circle.
+        leakage and torque by size.
+    centre: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and cylinder stand square. L is zero
+        where they line up. The stroke 2 b lets a joint turn full circle.
 
     In the methods x is the valves' opening, shape (d,), -1 to 1; pressures those of the chambers A and B, shape (2, d), Pa;
     pose from `pose(q)`; v the joints' velocities, shape (d,), rad/s.
@@ -168,13 +164,8 @@ class Cylinders:
         out = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
         volumes = self._dead + self.areas * np.array([out, 2.0 * self.crank - out])
         compliance = volumes / self.hydraulics.bulk_modulus
-        return Pose(
-            length=read_only(length),
-            lever=read_only(self.base * self.crank * np.sin(gamma) / length),
-            volumes=read_only(volumes),
-            compliance=read_only(compliance),
-            stiffness=read_only(np.sum(self.areas**2 / compliance, axis=0)),
-        )
+        lever, stiffness = self.base * self.crank * np.sin(gamma) / length, np.sum(self.areas**2 / compliance, axis=0)
+        return Pose(*map(read_only, (length, lever, volumes, compliance, stiffness)))
 
     def force(self, pressures: Array) -> Array:
         """F = p_A A_A - p_B A_B, shape (d,), N."""
@@ -182,8 +173,8 @@ class Cylinders:
 
     def force_limits(self) -> Array:
         """The least and the largest F that supply and tank allow, shape (2, d), N."""
-        supply, tank = self.hydraulics.supply_pressure, self.hydraulics.tank_pressure
-        return np.array([self.force(np.array([[tank], [supply]])), self.force(np.array([[supply], [tank]]))])
+        lines = np.array([[self.hydraulics.tank_pressure], [self.hydraulics.supply_pressure]])
+        return np.array([self.force(lines), self.force(lines[::-1])])
 
     def line(self, x: Array) -> Array:
         """Pressure of the line that each chamber is open to, shape (2, d), Pa, when the valve opens towards x."""
@@ -209,16 +200,14 @@ class Cylinders:
     def pressure_decay(self, x: Array, pressures: Array, pose: Pose) -> Array:
         """-∂ṗ/∂p of each chamber by itself, shape (2, d), 1/s, never negative: how stiff the oil's equations are."""
         drop = self.line(x) - pressures
-        size = np.hypot(drop, _LAMINAR)
-        slope = self._flow * (0.5 * drop**2 + _LAMINAR**2) / (size**2 * np.sqrt(size))
+        slope = self._flow * (0.5 * drop**2 + _LAMINAR**2) / np.hypot(drop, _LAMINAR) ** 2.5
         return (np.abs(x) * slope + self._leakage) / pose.compliance
 
     def opening_for(self, force_rate: Array, pressures: Array, pose: Pose, v: Array) -> Array:
         """The opening, shape (d,), that makes the force change by force_rate, (d,) N/s, while the joints move with v.
 
-        Ḟ = x g - k ℓ̇ with k the oil's stiffness and g the change of force at the valve all open. So x = (Ḟ + k ℓ̇) / g feeds
-        the piston's velocity forward and divides the valve's curve out; leakage is left to the loop's integral. The opening
-        may be beyond -1 to 1, which a valve cannot give.
+        Ḟ = x g - k ℓ̇ with k the oil's stiffness and g the change of force at the valve all open, so x = (Ḟ + k ℓ̇) / g: it
+        feeds the piston's velocity forward. Leakage is left to the loop's integral. x may be beyond -1 to 1.
         """
         by_valve = force_rate + pose.stiffness * pose.lever * v
         full = self.edge_flow(self.line(by_valve) - pressures) / pose.compliance
@@ -227,12 +216,7 @@ class Cylinders:
     def power(self, x: Array, pressures: Array, pose: Pose, v: Array) -> Power:
         """Where the power goes at an instant: see `Power`."""
         flows, line = self.flows(x, pressures), self.line(x)
-        rates = self.pressure_rates(x, pressures, pose, v)
-        stored = pose.compliance * pressures * rates
-        return Power(
-            pump=read_only(np.sum(line * flows, axis=0)),
-            joint=read_only(self.force(pressures) * pose.lever * v),
-            valve=read_only(np.sum((line - pressures) * flows, axis=0)),
-            leakage=read_only(np.sum(pressures * self.leak(pressures), axis=0)),
-            stored=read_only(np.sum(stored, axis=0)),
-        )
+        stored = pose.compliance * pressures * self.pressure_rates(x, pressures, pose, v)
+        lost = pressures * self.leak(pressures)
+        pump, valve, leakage, stored = (np.sum(p, axis=0) for p in (line * flows, (line - pressures) * flows, lost, stored))
+        return Power(*map(read_only, (pump, self.force(pressures) * pose.lever * v, valve, leakage, stored)))

@@ -1,7 +1,4 @@
-"""App. B: the force loop that drives the cylinders, so that one layer up the torque can be taken for granted.
-
-That holds while the torque changes more slowly than the loop's bandwidth and stays within what the supply pressure gives.
-"""
+"""App. B: the force loop that drives the cylinders, so that one layer up the torque can be taken for granted."""
 
 from __future__ import annotations
 
@@ -45,18 +42,14 @@ class HydraulicActuators:
 
     The loop desires Ḟ = ω (e + ω_i ∫e dt) with e = F_desired - F, ω = 2π times the loop's bandwidth and ω_i a twentieth of
     it, and gives the valve the opening for it (`Cylinders.opening_for`); the integral rests while the valve is all open. The
-    torque's amplitude follows to at least the stated bandwidth, as long as that lies below the valve's.
+    torque follows up to the loop's bandwidth, as long as that lies below the valve's.
 
     Sizes: each cylinder is HyQ's, scaled until the supply pressure gives the robot's torque limit at the lever's best angle
-    and in the weaker direction, rod going in. Going out it gives 1.7 times as much. Friction of the pistons is left out, as
-    joint friction is in (1)-(7). A load that pulls the rod out fast starves chamber A, as the valve's edges are alike and the
-    areas are not: its oil boils, and torque is missing until the chamber is full again.
+    and in the weaker direction, rod going in. Friction of the pistons is left out. A load that pulls the rod out fast starves
+    chamber A: its oil boils, and torque is missing until the chamber is full again.
 
-    robot: its torque limits are what the cylinders are made for.
-    hydraulics: the cylinder that is scaled; HyQ's by default.
-    centre: (d,) rad, the angles at which the levers are longest; the joints of `robot.standing()` by default.
-
-    `state` is the present `OilState`, `cylinders` the equations.
+    hydraulics: the cylinder that is scaled, HyQ's by default; centre: (d,) rad, the angles at which the levers are longest,
+    those of `robot.standing()` by default. `state` is the present `OilState`, `cylinders` the equations.
     Source of the loop: Boaventura et al., Model-based hydraulic impedance control for dynamic robots, IEEE T-RO 31, 2015.
     Raises `InputError` for a joint without a torque limit and for joints that slide.
     """
@@ -74,8 +67,8 @@ class HydraulicActuators:
     def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
         """Close the valves, with pressures that give the joints torques tau, as far as the supply goes.
 
-        tau: (d,) N·m, zero by default. q_joints: (d,) rad, the centre by default. A rollout does not reset actuators, so that
-        it can go on where another ended; a robot that is to stand from the start needs the torques that it stands with.
+        tau: (d,) N·m, zero by default. q_joints: (d,) rad, the centre by default. A rollout does not reset actuators; a robot
+        that is to stand from the start needs the torques that it stands with.
         """
         cylinders = self.cylinders
         tau = checked("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
@@ -89,19 +82,14 @@ class HydraulicActuators:
         """The torques that the oil makes at joint angles, shape (d,) rad: L F, shape (d,), N·m."""
         return self.cylinders.pose(q_joints).lever * self.cylinders.force(self.state.pressures)
 
-    def torque_limits(self, q_joints: npt.ArrayLike) -> Array:
-        """The least and the largest torque that the supply pressure gives at joint angles, (d,) rad: shape (2, d), N·m."""
-        return read_only(np.sort(self.cylinders.pose(q_joints).lever * self.cylinders.force_limits(), axis=0))
-
     def step(self, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike, dt: float) -> Array:
         """Let time pass; the joints' torques at its end, shape (d,), N·m.
 
         tau_desired: (d,) N·m.
         q_joints, v_joints: (d,) rad and rad/s at the start. The oil's spring answers to them and acts on the next ones, which
-            neither adds energy nor takes any (symplectic Euler) as long as √(L² k / inertia) dt < 2. At 1 ms that is at most
-            1.7 in the catalogue, at the last wrist of anymal_kinova.
+            is stable (symplectic Euler) for √(L² k / inertia) dt < 2; at 1 ms the catalogue's robots reach 1.7.
         dt: s. The oil is integrated in equal steps of 0.2 ms at most: the spool exactly, the pressures by a linearly implicit
-            Euler step, stable however small the chambers and the drops of pressure are.
+            Euler step.
         """
         cylinders = self.cylinders
         tau = checked("tau_desired", tau_desired, (cylinders.d,), "N·m")

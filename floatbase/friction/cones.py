@@ -1,7 +1,6 @@
 """Friction (28): a force's normal and tangential parts, the exact cone, and the polyhedron with n facets in its place.
 
-Everything here is about one contact force f, shape (3,), N, world: what the ground does to the robot. The normal
-points out of the ground. Source: the document, §4.2 and Figure 3.
+A force is what the ground does to the robot, shape (3,), N, world. Normals point out of the ground. Source: the document, §4.2.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from floatbase._arrays import Array, checked, positive, read_only, unit_vector
 from floatbase.errors import InputError
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
-NEAR = 0.02  # part of the friction limit μ α_⊥ within which a force counts as on the surface: planned forces reach it exactly,
-# measured ones scatter by a percent or two
+NEAR = 0.02  # part of the friction limit μ α_⊥ within which a force counts as on the surface: measured ones scatter
 
 Status: TypeAlias = Literal["inside", "active", "outside"]
 
@@ -26,8 +24,7 @@ Status: TypeAlias = Literal["inside", "active", "outside"]
 def tangents(normal: npt.ArrayLike) -> Array:
     """Two unit vectors t1, t2 with t1 × t2 = normal, as rows, shape (2, 3).
 
-    normal: shape (3,), world, out of the ground, made unit. t1 is the world's x axis projected onto the surface (its y axis
-    where x is nearly normal to it), so pictures and rows do not jump.
+    normal: shape (3,), world, made unit. t1 is the world's x axis projected onto the surface; y where x is nearly normal to it.
     """
     n = unit_vector("normal", normal)
     axis = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
@@ -68,8 +65,7 @@ def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
 class FrictionCone:
     """(28) The forces that Coulomb friction can make: α_∥ ≤ μ α_⊥, a round cone about the normal.
 
-    normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. (28) also says that the ground
-    only pushes: α_⊥ ≥ α_∥ / μ ≥ 0. Source: the document, §4.2.
+    normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. The ground only pushes: α_⊥ ≥ 0.
     """
 
     normal: Array
@@ -87,8 +83,8 @@ class FrictionCone:
     def margin(self, force: npt.ArrayLike) -> float:
         """The slack of (28), N: μ α_⊥ - α_∥, negative outside.
 
-        It is the tangential force that may be added, whatever its direction, before the foot slips. The distance from
-        a force inside to the cone's surface is margin / √(1 + μ²).
+        It is the tangential force that may be added, whatever its direction, before the foot slips; divided by √(1 + μ²) it
+        is the distance to the cone's surface.
         """
         parts = decompose(force, self.normal)
         return self.mu * parts.alpha_perp - parts.alpha_par
@@ -105,16 +101,14 @@ class FrictionCone:
     def project(self, force: npt.ArrayLike) -> Array:
         """The force of the cone nearest to the one given, shape (3,), N: the Euclidean projection.
 
-        A force inside stays. A force of the polar cone, μ α_∥ ≤ -α_⊥, makes no acute angle with any of the cone and gives 0.
-        Any other is projected at a right angle onto the line n + μ f_par / α_∥ of the surface.
+        A force inside stays, one of the polar cone, μ α_∥ ≤ -α_⊥, gives 0. Any other is projected at a right angle onto the
+        line n + μ f_par / α_∥ of the surface.
         """
         parts = decompose(force, self.normal)
         if parts.alpha_par <= self.mu * parts.alpha_perp:
             return checked("force", force, (3,), "N")
-        if self.mu * parts.alpha_par <= -parts.alpha_perp:
-            return read_only(np.zeros(3))
-        along = (parts.alpha_perp + self.mu * parts.alpha_par) / (1.0 + self.mu**2)
-        return read_only(along * (self.normal + self.mu * parts.f_par / parts.alpha_par))
+        along = max(0.0, parts.alpha_perp + self.mu * parts.alpha_par) / (1.0 + self.mu**2)
+        return read_only(along * (self.normal + self.mu * parts.f_par / parts.alpha_par)) if along else read_only(np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +120,6 @@ class FrictionPolyhedron:
     facets: n ≥ 3.
     inside: whether the polyhedron lies inside the cone (safe: it allows no force that slips) or outside it, touching it
         (optimistic). Inside, the middle of a facet allows μ cos(π/n) and only the edges reach μ.
-
-    Source: the document, §4.2.
     """
 
     normal: Array
@@ -155,26 +147,17 @@ class FrictionPolyhedron:
     def rows(self) -> Array:
         """Rows, shape (n, 3), with rows @ f ≤ 0 for f in the polyhedron; each is d_i - μ_facet · normal.
 
-        d_i is the unit tangent that facet i faces; facet 0 faces t1 of `tangents`. All rows together also imply
-        normal · f ≥ 0.
+        d_i is the unit tangent that facet i faces; facet 0 faces t1 of `tangents`. Together they imply normal · f ≥ 0.
         """
         return read_only(self._directions(0.0) - self.mu_facet * self.normal)
 
     @cached_property
     def rays(self) -> Array:
-        """The edges, shape (n, 3), each with normal component 1; ray i lies between facets i and i + 1.
-
-        The forces of the polyhedron are the sums of its rays with weights ≥ 0.
-        """
-        reach = self.mu_facet / float(np.cos(np.pi / self.facets))
-        return read_only(self.normal + reach * self._directions(0.5))
+        """The edges, shape (n, 3), each with normal component 1; ray i lies between facets i and i + 1."""
+        return read_only(self.normal + self.mu_facet / np.cos(np.pi / self.facets) * self._directions(0.5))
 
     def margin(self, force: npt.ArrayLike) -> float:
-        """How far inside its facets a force is, N: the smallest of -rows @ f; negative outside.
-
-        It is the tangential force that may be added towards the nearest facet before that facet is reached, as
-        `FrictionCone.margin` is for the cone.
-        """
+        """The tangential force that may be added before a facet is reached, N: the smallest of -rows @ f; negative outside."""
         return float(np.min(-self.rows @ checked("force", force, (3,), "N")))
 
     def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
@@ -187,10 +170,7 @@ class FrictionPolyhedron:
         return _status(float(slides.max()), limit)
 
     def active_facets(self, force: npt.ArrayLike) -> tuple[int, ...]:
-        """Numbers of the facets that a force, shape (3,), N, has reached (within `NEAR` of their limit) or passed.
-
-        Empty for a force that does not push on the ground: it has no limit to reach.
-        """
+        """Numbers of the facets that a force has reached (within `NEAR` of their limit) or passed; none where it pulls."""
         slides, limit = self._slides(force)
         return tuple(np.flatnonzero(slides > (1.0 - NEAR) * limit).tolist()) if limit > 0.0 else ()
 
@@ -199,11 +179,10 @@ class FrictionPolyhedron:
         from scipy.optimize import nnls  # slow to load, and seldom needed
 
         f = checked("force", force, (3,), "N")
-        size = float(np.linalg.norm(f))
-        if size == 0.0 or self.margin(f) >= 0.0:
+        if self.margin(f) >= 0.0:
             return f
-        weights, _ = nnls(self.rays.T, f / size)
-        return read_only(size * (self.rays.T @ weights))
+        size = np.linalg.norm(f)
+        return read_only(size * (self.rays.T @ nnls(self.rays.T, f / size)[0]))
 
     def _slides(self, force: npt.ArrayLike) -> tuple[Array, float]:
         """The force along each facet's d_i, shape (n,), N, and what they all may be at most, μ_facet α_⊥, N."""
@@ -219,7 +198,7 @@ class FrictionPolyhedron:
 
 
 def _status(slide: float, limit: float) -> Status:
-    """slide: a tangential force, N. limit: the largest that friction allows, N; negative where the force pulls."""
+    """Of a tangential force and the largest that friction allows, N; that is negative where the force pulls."""
     if slide > (1.0 + NEAR) * limit:
         return "outside"
     return "active" if slide > (1.0 - NEAR) * limit else "inside"

@@ -1,7 +1,6 @@
 """Geometry of cones and polytopes that `wrenches` needs: facets from rays, vertices from farthest points.
 
-Nothing here knows of robots. qhull only says which rays or points belong to a facet; the numbers are computed from
-those again, so that its own tolerances do not stay in the answer.
+qhull only says which rays or points belong to a facet; its numbers are computed again, so that its tolerances do not stay.
 """
 
 from __future__ import annotations
@@ -32,9 +31,8 @@ def cone_rows(rays: Array) -> tuple[Array, Array]:
     """The cone {Σ w_j ray_j, w ≥ 0} as rows: (G, E) with G x ≤ 0 and E x = 0, each row of unit length.
 
     rays: shape (n, N), one ray a column. E, shape (n - r, n), spans the directions that no ray reaches, r being the rays'
-    rank. Where some rays together point in opposite directions the cone contains whole lines; G is zero along them, and has
-    no rows where the cone is a subspace. Source: facets of a cone are facets of its cross-section, whose convex
-    hull qhull finds (Barber, Dobkin, Huhdanpaa, The Quickhull algorithm for convex hulls, 1996).
+    rank. Where the cone contains whole lines G is zero along them. Source: facets of a cone are facets of its cross-section,
+    whose convex hull qhull finds (Barber, Dobkin, Huhdanpaa, The Quickhull algorithm for convex hulls, 1996).
     """
     rays = rays / np.linalg.norm(rays, axis=0)  # length does not matter in a cone
     span, E = _span(rays)
@@ -48,14 +46,10 @@ def cone_rows(rays: Array) -> tuple[Array, Array]:
 def vertices(farthest: Callable[[Array], Array], n: int, size: float) -> Array:
     """The vertices of a bounded convex polytope in R^n, n ≤ 3, shape (k, n), from its farthest points.
 
-    farthest: direction (n,) -> a point of the set with the largest direction · x.
-    n: dimension of the space.
-    size: a length of the set; `_FLAT` of it counts as zero.
-
-    The hull of the known points grows at each of its facets until no point lies beyond any, so the answer is exact, not a
-    sampling. In the plane the vertices come counter-clockwise. A flat set gives one point, the two ends of a segment, or a
-    polygon in space. Source: for the support region, Bretl and Lall, Testing static equilibrium for legged robots, IEEE
-    Transactions on Robotics, 2008.
+    farthest: direction (n,) -> a point of the set with the largest direction · x. size: a length of the set; 1e-9 of it counts
+    as zero. The hull of the known points grows at each of its facets until no point lies beyond any: the answer is exact. In
+    the plane the vertices come counter-clockwise. A flat set gives one point, the two ends of a segment, or a polygon in space.
+    Source: Bretl and Lall, Testing static equilibrium for legged robots, IEEE Transactions on Robotics, 2008.
     """
     tolerance = _FLAT * size
     basis, points = _affine_hull(farthest, n, tolerance)
@@ -83,10 +77,7 @@ def _span(rays: Array) -> tuple[Array, Array]:
 
 
 def _supporting_direction(rays: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """A c with c · ray ≥ 0 for every ray, = 0 only for rays on lines of the cone, and which these are.
-
-    The t_j of the program can all be 1 at once but for those: the c that serve different rays can be added up.
-    """
+    """A c with c · ray ≥ 0 for every ray, = 0 only for rays on lines of the cone, and which these are."""
     n, N = rays.shape
     result = linear_program(
         np.concatenate([np.zeros(n), -np.ones(N)]),

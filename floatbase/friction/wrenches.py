@@ -1,13 +1,13 @@
 """The wrenches that a stance can produce: the sum of its friction cones (28) by (20) and (21), and slices of it.
 
 A wrench is w = (f_c, τ_c), shape (6,): the total contact force, N, and its moment about the centre of mass, N·m, both
-world: τ_c = Σ (x_i - x_c) × f_i. Which torques the motors would need, and whether they have them, is no part of these
-sets: they say what the ground allows, with friction polyhedra in place of the cones. Sources: the document, §3.1 and
-§4.2; Caron, Pham and Nakamura, Leveraging cone double description for multi-contact stability of humanoids, RSS 2015.
+world: τ_c = Σ (x_i - x_c) × f_i. Sources: the document, §3.1 and §4.2; Caron, Pham and Nakamura, Leveraging cone double
+description for multi-contact stability of humanoids, RSS 2015.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,15 +24,13 @@ from floatbase.qp import INFEASIBLE, UNBOUNDED, linear_program
 from floatbase.robots import State
 
 TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets: what a linear program leaves
-_ROUNDING = 1e-12  # part of the largest gain along a direction that may be rounding
 
 
 @dataclass(frozen=True, eq=False)
 class WrenchSet:
-    """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i) with every f_i in its friction polyhedron: the contact wrench
-    cone (CWC), also called gravito-inertial wrench cone, of the stance.
+    """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i), f_i in its friction polyhedron: the contact wrench cone (CWC).
 
-    `wrench_set` makes it from a state and its contacts.
+    `wrench_set` makes it from a state and its contacts. The torque limits of the joints do not enter.
 
     points: x_i, shape (P, 3), m, world.
     cones: a `FrictionPolyhedron` for each point.
@@ -40,8 +38,6 @@ class WrenchSet:
     weight: of the robot, N; (0, 0, weight) is the force that `torques` and `support_region` assume.
     max_normal_force: shape (P,), N, +inf where there is no limit. Without limits the set is a cone; with a limit on every
         point it is bounded.
-
-    The torque limits of the joints do not enter.
     """
 
     points: Array
@@ -70,19 +66,15 @@ class WrenchSet:
 
     @cached_property
     def rays(self) -> Array:
-        """The edges of all cones as wrenches, shape (6, N), point after point, each with normal component 1 N.
-
-        Without limits the set is their sums with weights ≥ 0. Some may be sums of others.
-        """
+        """The edges of all cones as wrenches, shape (6, N), point after point, each with normal component 1 N."""
         at = np.split(grasp_matrix(self.points, self.about), len(self.points), axis=1)
         return read_only(np.hstack([grasp @ cone.rays.T for grasp, cone in zip(at, self.cones, strict=True)]))
 
     @cached_property
     def rows(self) -> Array:
-        """Facets of the set, shape (m, 6): rows @ w ≤ 0, beside equalities @ w = 0. Scaled so that rows @ w is in N.
+        """Facets of the set, shape (m, 6): rows @ w ≤ 0, beside equalities @ w = 0. Empty where every wrench is produced.
 
-        A row (a, b) has ‖a‖² + ‖arm b‖² = 1. Only for a set without limits on the normal force; `InputError`
-        otherwise. Empty where contacts that face each other produce every wrench.
+        A row (a, b) has ‖a‖² + ‖arm b‖² = 1, so rows @ w is in N. `InputError` for a set with limits on the normal force.
         """
         return self._halfspaces[0]
 
@@ -90,17 +82,15 @@ class WrenchSet:
     def equalities(self) -> Array:
         """What no contact force can produce, shape (m, 6): equalities @ w = 0, scaled as `rows`.
 
-        Empty as soon as three points are not in line. Two point feet cannot twist about the line through them (1
-        row), one foot makes no torque about itself (3 rows).
+        Two point feet cannot twist about the line through them (1 row), one foot makes no torque about itself (3 rows).
         """
         return self._halfspaces[1]
 
     def margin(self, wrench: npt.ArrayLike) -> float:
         """How far inside its facets every contact force can be, N, when together they make the wrench, shape (6,).
 
-        The largest t for which there are f_i with margin ≥ t each, and t below the normal force's limit; negative
-        where the facets must be passed. -inf where no forces at all make the wrench (see `equalities`), +inf where
-        contacts that face each other can be squeezed as hard as one likes.
+        The largest t for which there are f_i with margin ≥ t each, and t below the normal force's limit. -inf where no forces
+        make the wrench (see `equalities`), +inf where contacts that face each other can be squeezed as hard as one likes.
         """
         w = checked("wrench", wrench, (6,))
         scale = float(np.linalg.norm(self._to_newton @ w)) or self.weight
@@ -113,26 +103,14 @@ class WrenchSet:
         return np.inf if result.status == UNBOUNDED else -scale * float(result.fun)
 
     def contains(self, wrench: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
-        """Whether contact forces in their polyhedra, and within their limits, make the wrench, shape (6,).
-
-        tolerance: N, by which each of them may pass its facets.
-        """
+        """Whether contact forces that pass their facets and limits by a tolerance, N, at most make the wrench, shape (6,)."""
         return self.margin(wrench) >= -positive("tolerance", tolerance, "N", allow_zero=True)
-
-    def support(self, direction: npt.ArrayLike) -> float:
-        """The largest direction · w over the set, direction of shape (6,); +inf where it grows without limit."""
-        gains = checked("direction", direction, (6,)) @ self.rays
-        ends = np.cumsum([cone.facets for cone in self.cones])
-        best = np.array([np.max(part) for part in np.split(gains, ends[:-1])])
-        helps = best > _ROUNDING * float(np.max(np.abs(gains)))
-        return float(np.sum(best[helps] * self.max_normal_force[helps]))
 
     def reach(self, direction: npt.ArrayLike, start: npt.ArrayLike | None = None) -> float:
         """The largest s with start + s · direction in the set: how hard the stance can push in just this direction.
 
-        direction, start: wrenches of shape (6,); start is 0 by default. (0, 0, weight, 0, 0, 0) as start asks what is
-        left while the weight is carried. +inf where there is no end, negative where the set lies behind. Raises
-        `InfeasibleError` when the line misses it.
+        direction, start: wrenches of shape (6,); start is 0 by default, (0, 0, weight, 0, 0, 0) while the weight is carried.
+        +inf where there is no end, negative where the set lies behind. Raises `InfeasibleError` when the line misses it.
         """
         d = checked("direction", direction, (6,))
         if not np.any(d):
@@ -152,9 +130,8 @@ class WrenchSet:
     def torques(self, force: npt.ArrayLike | None = None) -> Array:
         """The slice at a total force: vertices, shape (k, 3), N·m, of the torques τ_c that can go with it.
 
-        force: f_c, shape (3,), N, world; by default (0, 0, weight), which carries the robot. No rows when no contact
-        forces add up to it. Raises `InputError` when the slice has no end, as where walls that face each other can be
-        squeezed.
+        force: f_c, shape (3,), N, world; by default (0, 0, weight), which carries the robot. No rows when no contact forces
+        add up to it. Raises `InputError` when the slice has no end, as where walls that face each other can be squeezed.
         """
         f = checked("force", (0.0, 0.0, self.weight) if force is None else force, (3,), "N")
         size = float(np.linalg.norm(f)) * self.arm
@@ -164,9 +141,8 @@ class WrenchSet:
         """Where the CoM may be for the robot to stand still: vertices of a polygon, shape (k, 2), m, world x and y.
 
         All horizontal positions c for which forces in the polyhedra carry the weight without torque about c; its height and
-        `about` do not matter. The vertices come counter-clockwise. On level ground it is the convex hull of the feet;
-        on slopes it may be smaller, larger or elsewhere. Two rows are a segment, one is a point, none says that the
-        stance cannot carry the weight at all. Raises `InputError` when it has no end.
+        `about` do not matter. The vertices come counter-clockwise; on level ground they are those of the feet. Two rows are a
+        segment, one is a point, none says that the stance cannot carry the weight. Raises `InputError` when it has no end.
         """
         origin = self.points.mean(axis=0)
         rays = np.vstack([self.rays[:3], self.rays[3:] + np.cross(self.about - origin, self.rays[:3].T).T])
@@ -235,12 +211,7 @@ class WrenchSet:
 
 
 def wrench_set(
-    state: State,
-    contacts: Contacts,
-    *,
-    facets: int = 4,
-    inside: bool = True,
-    max_normal_force: npt.ArrayLike | None = None,
+    state: State, contacts: Contacts, *, facets: int = 4, inside: bool = True, max_normal_force: npt.ArrayLike | None = None
 ) -> WrenchSet:
     """(20)(21)(28) The wrenches about the centre of mass that a state's contacts can produce.
 
@@ -259,17 +230,15 @@ def wrench_set(
     if coneless:
         raise InputError(f"{', '.join(coneless)} has forces without a cone; leave it out: contacts.without(…).")
     cones = [FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True)]
-    limit = np.inf if max_normal_force is None else max_normal_force
-    limits = np.full(len(cones), limit) if np.ndim(limit) == 0 else limit
-    return WrenchSet(contacts.positions(state), tuple(cones), state.com, state.robot.weight, np.asarray(limits))
+    limits = np.asarray(np.inf if max_normal_force is None else max_normal_force)
+    limits = np.repeat(limits, len(cones)) if limits.ndim == 0 else limits
+    return WrenchSet(contacts.positions(state), tuple(cones), state.com, state.robot.weight, limits)
 
 
 def _limits(limits: npt.ArrayLike, n: int) -> Array:
     """Limits of the normal force, shape (n,); +inf is allowed, so `checked` will not do."""
-    try:
+    with suppress(TypeError, ValueError):
         values = read_only(limits)
-    except (TypeError, ValueError):
-        values = read_only([])
-    if values.shape != (n,) or not np.all(values > 0):
-        raise InputError(f"max_normal_force must be one number > 0 or {n} of them, one for each contact point (N).")
-    return values
+        if values.shape == (n,) and np.all(values > 0):
+            return values
+    raise InputError(f"max_normal_force must be one number > 0 or {n} of them, one for each contact point (N).")

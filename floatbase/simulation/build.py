@@ -52,18 +52,26 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = _IMPEDANCE_RATIO
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    contact = spec.default.geom
+    contact.condim, contact.friction = 3, [ground.mu, 0.0, 0.0]  # no resistance to spinning or rolling
+    contact.solref, contact.solimp = [_CONTACT_TIME, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
-    for joint in spec.joints:
-        if joint.name in robot.joint_names:
-            joint.armature = float(robot.model.armature[robot.model.idx_vs[robot.model.getJointId(joint.name)]])
-            joint.damping[:] = 0.0
-            joint.frictionloss = 0.0
-    _add_ground(spec, ground)
-    for foot, contact in zip(robot.feet, Contacts.feet(robot), strict=True):
-        _add_foot(spec, foot, contact.point_names, ground.mu)
     for name, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
-        _add_motor(spec, name, float(limit))
+        joint = spec.joint(name)
+        joint.armature = float(robot.model.armature[robot.model.idx_vs[robot.model.getJointId(name)]])
+        joint.damping[:] = 0.0
+        joint.frictionloss = 0.0
+        motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        motor.set_to_motor()
+        if np.isfinite(limit):
+            motor.ctrlrange = [-limit, limit]
+    quat = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quat, np.array(ground.normal))
+    plane, size = mujoco.mjtGeom.mjGEOM_PLANE, [0.0, 0.0, 0.05]
+    spec.worldbody.add_geom(name="ground", type=plane, size=size, quat=quat, contype=1, conaffinity=0)
+    for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
+        _add_foot(spec, foot, feet.point_names)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -77,7 +85,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
 
 
 def body_name(link: str) -> str:
-    """Name in MuJoCo of a floating robot's link: its own, but for "world", which is what MuJoCo calls the ground."""
+    """Name in MuJoCo of a floating robot's link: its own, but for "world": MuJoCo would weld it to the ground."""
     return "world of the robot" if link == "world" else link
 
 
@@ -85,7 +93,10 @@ def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
     """The URDF as MuJoCo reads it, welded links fused into one body, every inertia one that MuJoCo accepts."""
     root = ElementTree.parse(robot.urdf).getroot()
     if robot.is_floating:
-        _rename_links(root)
+        for link in root.findall("link"):
+            link.set("name", body_name(link.get("name", "")))
+        for end in (*root.findall("joint/parent"), *root.findall("joint/child")):
+            end.set("link", body_name(end.get("link", "")))
     for link in root.findall("link"):
         for shape in link.findall("visual") + link.findall("collision"):
             link.remove(shape)
@@ -98,14 +109,6 @@ def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
         if not _has_valid_inertia(body):
             _move_inertia_to_neighbour(body)
     return spec
-
-
-def _rename_links(root: ElementTree.Element) -> None:
-    """Give every link its `body_name`: MuJoCo would weld a link called world to the ground."""
-    for link in root.findall("link"):
-        link.set("name", body_name(link.get("name", "")))
-    for end in (*root.findall("joint/parent"), *root.findall("joint/child")):
-        end.set("link", body_name(end.get("link", "")))
 
 
 def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
@@ -147,16 +150,7 @@ def _placement(body: mujoco.MjsBody) -> pin.SE3:
     return pin.SE3(rotation_matrix(body.quat), np.array(body.pos))
 
 
-def _add_ground(spec: mujoco.MjSpec, ground: Ground) -> None:
-    quat = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quat, np.array(ground.normal))
-    plane = spec.worldbody.add_geom(
-        name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05], quat=quat, contype=1, conaffinity=0
-    )
-    _set_contact(plane, ground.mu)
-
-
-def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...], mu: float) -> None:
+def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
     """A ball for each of the foot's contact points, so that the ball's lowest point is the contact point."""
     body = spec.body(body_name(foot.frame))
     if body is None:
@@ -167,22 +161,4 @@ def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...], mu: float
         centres, radius = foot.corners + [0.0, 0.0, _CORNER_RADIUS], _CORNER_RADIUS
     for name, centre in zip(names, centres, strict=True):
         sphere, size = mujoco.mjtGeom.mjGEOM_SPHERE, [radius, 0.0, 0.0]
-        ball = body.add_geom(name=name, type=sphere, size=size, pos=centre, mass=0.0, contype=0, conaffinity=1)
-        _set_contact(ball, mu)
-
-
-def _set_contact(geom: mujoco.MjsGeom, mu: float) -> None:
-    """Coulomb friction, no resistance to spinning or rolling, a stiff contact."""
-    geom.condim = 3
-    geom.friction = [mu, 0.0, 0.0]
-    geom.solref = [_CONTACT_TIME, 1.0]
-    geom.solimp = _CONTACT_IMPEDANCE
-
-
-def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
-    """A motor on a joint, torque within ± limit, N·m."""
-    motor = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    motor.set_to_motor()
-    if np.isfinite(limit):
-        motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        motor.ctrlrange = [-limit, limit]
+        body.add_geom(name=name, type=sphere, size=size, pos=centre, mass=0.0, contype=0, conaffinity=1)

@@ -11,23 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array
-from floatbase.errors import SimulationError
 from floatbase.robots import Robot
 
 
 class Conversion:
-    """Maps q and v of a robot to qpos and qvel of a MuJoCo model of it, and back.
-
-    Raises `SimulationError` for a model that lacks one of the robot's joints.
-    """
+    """Maps q and v of a robot to qpos and qvel of a MuJoCo model of it, and back."""
 
     def __init__(self, robot: Robot, model: mujoco.MjModel):
         self._robot = robot
         self._floating = 6 if robot.is_floating else 0
-        ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in robot.joint_names]
-        missing = [name for name, i in zip(robot.joint_names, ids, strict=True) if i < 0]
-        if missing:
-            raise SimulationError(f"MuJoCo's model of {robot.name} has no joint {missing[0]!r}.")
+        ids = [model.joint(name).id for name in robot.joint_names]
         self._qpos = np.array([model.jnt_qposadr[i] for i in ids], dtype=int)
         self._qvel = np.array([model.jnt_dofadr[i] for i in ids], dtype=int)
         joints = [robot.model.getJointId(name) for name in robot.joint_names]
@@ -40,22 +33,18 @@ class Conversion:
         self._q_from[self._q] = self._qpos
         self._q_from[self._cos + 1] = self._qpos[self._unlimited]
         self._v_from = np.concatenate([np.arange(self._floating), self._qvel])
-        self._inverse = np.zeros(4)
 
     def q(self, qpos: Array) -> Array:
         """Our q, shape (nq,), for MuJoCo's qpos."""
         q = qpos[self._q_from]
-        if self._cos.size:
-            q[self._cos] = np.cos(q[self._cos])
-            q[self._cos + 1] = np.sin(q[self._cos + 1])
+        q[self._cos], q[self._cos + 1] = np.cos(q[self._cos]), np.sin(q[self._cos + 1])
         return q
 
     def v(self, qpos: Array, qvel: Array) -> Array:
         """Our v, shape (nv,), for MuJoCo's qpos and qvel."""
         v = qvel[self._v_from]
         if self._floating:
-            mujoco.mju_negQuat(self._inverse, qpos[3:7])
-            mujoco.mju_rotVecQuat(v[:3], qvel[:3], self._inverse)
+            v[:3] = rotation_matrix(qpos[3:7]).T @ qvel[:3]
         return v
 
     def joints(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
@@ -69,12 +58,10 @@ class Conversion:
         """MuJoCo's qpos and qvel for our q and v."""
         qpos, qvel = np.empty(self._robot.d + (7 if self._floating else 0)), np.empty(self._robot.nv)
         if self._floating:
-            qpos[:3] = q[:3]
-            qpos[3], qpos[4:7] = q[6], q[3:6]
-            qvel[:3] = rotation_matrix(qpos[3:7]) @ v[:3]
-            qvel[3:6] = v[3:6]
-        angles = q[self._q].copy()
-        angles[self._unlimited] = np.arctan2(q[self._q[self._unlimited] + 1], angles[self._unlimited])
+            qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
+            qvel[:3], qvel[3:6] = rotation_matrix(qpos[3:7]) @ v[:3], v[3:6]
+        angles = q[self._q]
+        angles[self._unlimited] = np.arctan2(q[self._cos + 1], q[self._cos])
         qpos[self._qpos] = angles
         qvel[self._qvel] = v[self._floating :]
         return qpos, qvel

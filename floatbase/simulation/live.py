@@ -27,10 +27,8 @@ def advice(status: str) -> str:
 class Live:
     """Runs `rollout` in slices of a 30th of a second, in a thread of its own, and hands each slice to `show`.
 
-    sim, controller: as for `rollout`.
+    sim, controller, control_period (s), actuators: as for `rollout`.
     show: called with each slice's record, in that thread; its `pushes` are those that act or ended less than `SEEN` s ago.
-    control_period: s.
-    actuators: as for `rollout`.
     after_reset: called after each reset, in that thread, to reset what has a memory of its own, such as the actuators.
     idle: s without any call here after which the run pauses by itself, so that a forgotten page costs nothing.
 
@@ -92,11 +90,7 @@ class Live:
         self._run(reset=True)
 
     def push(self, force: npt.ArrayLike, duration: float = 0.1, frame: str = "base") -> None:
-        """Push now, and run.
-
-        force: (3,) N, world. duration: s. frame: name of a frame of the robot.
-        A fallen robot is put back on its feet first: the push begins with it, at 0 s.
-        """
+        """Push now, and run: as `Push`. A fallen robot is put back on its feet first, and the push begins with it, at 0 s."""
         self._run(push=Push(force, 0.0, duration, frame))  # type: ignore[arg-type]
 
     def use(self, controller: Controller) -> None:
@@ -126,8 +120,8 @@ class Live:
                 self._requested.append(push)
             if self._stop.is_set():
                 self._stop = threading.Event()
-                work = (self._stop, self._thread)
-                self._thread = threading.Thread(target=self._loop, args=work, name="floatbase-live", daemon=True)
+                args = (self._stop, self._thread)
+                self._thread = threading.Thread(target=self._loop, args=args, name="floatbase-live", daemon=True)
                 self._thread.start()
             changed = self._become("running")
         self._tell(changed)
@@ -178,15 +172,15 @@ class Live:
     def _conclude(self, outcome: str, stop: threading.Event) -> None:
         """Go on, or stop because of a slice's outcome or because nobody has called for long."""
         with self._lock:
-            changed = False
             if self._reset_requested:  # the outcome is about a robot that is put back next
-                pass
-            elif outcome != "completed" and stop is not self._stop:  # paused and started again meanwhile
+                return
+            if outcome == "completed":
+                if stop.is_set() or time.monotonic() - self._last_call <= self._idle:
+                    return
+                outcome = "paused"
+            elif stop is not self._stop:  # paused and started again meanwhile
                 self._reset_requested = True
-            elif outcome != "completed":
-                stop.set()
-                changed = self._become(outcome)
-            elif not stop.is_set() and time.monotonic() - self._last_call > self._idle:
-                stop.set()
-                changed = self._become("paused")
+                return
+            stop.set()
+            changed = self._become(outcome)
         self._tell(changed)

@@ -22,7 +22,6 @@ _FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))  # of the base's tilt since the
 _LEAST_STATURE = 1e-3  # m: a base that begins lower than this lies on the ground, and its height measures no fall
 _CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
 _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
-_NORMAL_AND_TANGENTS = np.arange(3)  # places of a contact's forces in the solver's, from its address on
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +55,8 @@ class Simulation:
     each joint a torque motor with the robot's limit and rotor inertia, the ground a plane with friction. Joint friction and
     damping are off, as in (1)-(7); the URDF's joint limits are on. Only feet and ground touch.
 
-    robot: as from `fb.load`.
-    ground: a `Ground`, or the coefficient of friction of a level one.
-    timestep: s.
-
-    `model` and `data` are MuJoCo's own; `feet` are the robot's feet as `Contacts`.
-    Raises `SimulationError` when MuJoCo cannot build the robot.
+    robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s. `model` and
+    `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
     """
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
@@ -83,7 +78,6 @@ class Simulation:
         # views into MuJoCo's memory
         self._base_position = self.data.xpos[self._base]
         self._base_vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
-        self._fatal_warnings = self.data.warning.number[_FATAL:]
         self.reset()
 
     @property
@@ -120,8 +114,8 @@ class Simulation:
     def diverged(self) -> bool:
         """Whether positions, velocities, accelerations or torques became infinite, NaN or larger than MuJoCo takes."""
         qpos, qvel = self.data.qpos, self.data.qvel
-        finite = isfinite(qpos @ qpos) and isfinite(qvel @ qvel)  # MuJoCo itself finds out only in the next step
-        return not finite or bool(self._fatal_warnings.any())
+        # MuJoCo itself finds out only in the next step
+        return not isfinite(qpos @ qpos + qvel @ qvel) or bool(self.data.warning.number[_FATAL:].any())
 
     @property
     def fallen(self) -> bool:
@@ -141,10 +135,10 @@ class Simulation:
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
-        self._start_height, self._start_vertical = self._base_height(), self._base_vertical.copy()
-        # what a fall is measured by, m: where the base begins on the ground, its distance from the centre of mass
-        lies = self._start_height <= _LEAST_STATURE
-        self._stature = float(np.linalg.norm(state.com - self._base_position)) if lies else self._start_height
+        self._start_height = self._stature = self._base_height()
+        self._start_vertical = self._base_vertical.copy()
+        if self._stature <= _LEAST_STATURE:  # it lies: a fall is measured by the way to the centre of mass
+            self._stature = float(np.linalg.norm(state.com - self._base_position))
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
@@ -168,7 +162,7 @@ class Simulation:
         forces = np.zeros((len(self._balls), 3))
         if self.data.ncon:
             contact = self.data.contact
-            in_frame = self.data.efc_force[contact.efc_address[:, None] + _NORMAL_AND_TANGENTS]
+            in_frame = self.data.efc_force[contact.efc_address[:, None] + np.arange(3)]
             # one plane (geom 0), so one frame for all contacts: its rows are normal and tangents, from the plane to the ball
             forces[self._point_of_geom[contact.geom[:, 1]]] = in_frame @ contact.frame[0].reshape(3, 3)
         return forces
@@ -178,10 +172,7 @@ class Simulation:
         return self.data.geom_xpos[self._balls] - self._below
 
     def pushed_body(self, push: Push) -> int:
-        """MuJoCo's number of the body that a push acts on.
-
-        Raises `UnknownNameError` for a frame that the robot lacks, `InputError` for one that is bolted to the ground.
-        """
+        """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted to the ground."""
         frame = self.robot.model.frames[self.robot.frame_id(push.frame)]
         joint = self.robot.model.names[frame.parentJoint]
         if joint in self.robot.joint_names:

@@ -70,10 +70,7 @@ class Rollout:
         return self.stances[i] if self.stances else self.contacts
 
     def force(self, contact: str, kind: Literal["measured", "planned"] = "measured") -> Array:
-        """The force of one contact through time, shape (n, 3), N, world; of a flat foot the resultant of its corners.
-
-        contact: its name, as "FL_foot". kind: "measured" or "planned". Raises `UnknownNameError` for other names.
-        """
+        """The force of a contact, such as "FL_foot", through time, shape (n, 3), N, world: of a flat foot the resultant."""
         if kind not in ("measured", "planned"):
             raise unknown_name("kind of force", kind, ("measured", "planned"))
         return self.contacts.force_of(self.measured if kind == "measured" else self.planned, contact)
@@ -105,10 +102,7 @@ class Rollout:
 
 
 class Recorder:
-    """Collects the rows of a rollout of at most `ticks` ticks: `before` and `during` each tick, `finished` at the end.
-
-    stance: the controller's contacts at the start.
-    """
+    """Collects the rows of a rollout of at most `ticks` ticks that begins in a stance: `before` and `during` each tick."""
 
     def __init__(self, sim: Simulation, stance: Contacts, ticks: int):
         self._sim, self._first, self._n = sim, stance, 0
@@ -126,13 +120,7 @@ class Recorder:
         self._positions[n] = self._sim.contact_positions()
 
     def during(self, tau: Array, tau_desired: Array, forces: Array, stance: Contacts, planned: Array | None) -> None:
-        """Complete the row.
-
-        tau, tau_desired: (d,) N·m, as in `Rollout`.
-        forces: (points, 3) N, world, the physics' mean forces at its points.
-        stance: the controller's contacts.
-        planned: (k,) N, world, the controller's forces at the stance, or None.
-        """
+        """Complete the row: torques as in `Rollout`, the physics' forces (points, 3), planned ones (k,) at the stance."""
         n = self._n
         self._rows["tau"][n], self._rows["tau_desired"][n], self._forces[n] = tau, tau_desired, forces
         self._stances.append(stance)

@@ -36,8 +36,7 @@ class Actuators(Protocol):
         """The torques of the next dt s, shape (d,), N·m.
 
         tau_desired: (d,) N·m, the controller's.
-        q_joints: (d,) rad, angles of the joints now.
-        v_joints: (d,) rad/s, their velocities.
+        q_joints, v_joints: (d,) rad and rad/s, of the joints now.
         dt: s.
         """
 
@@ -67,30 +66,34 @@ def rollout(
     for a controller that cannot be called as controller(q, v, t), and for an answer without `.tau`.
     """
     _check(sim, controller, pushes)
+    pushes = tuple(pushes)
     period = sim.timestep if control_period is None else control_period
     substeps = _multiple("control_period", period, "the simulation's timestep", sim.timestep)
     ticks = _multiple("duration", duration, "the control period", substeps * sim.timestep)
-    loop = _Loop(sim, controller, tuple(pushes), actuators)
-    record = Recorder(sim, loop.stance(), ticks)
+    record = Recorder(sim, _stance(sim, controller), ticks)
     for _ in range(ticks):
-        failure = loop.tick(substeps, record)
-        if failure is not None:
-            return record.finished(loop.pushes, "controller failed", failure)
+        q, v = sim.q, sim.v
+        record.before(q, v)
+        try:
+            command = controller(q, v, sim.time)
+        except FloatbaseError as failure:
+            return record.finished(pushes, "controller failed", failure)
+        stance = _stance(sim, controller)
+        planned = _planned(command, stance)
+        try:
+            torques_and_forces = _act(sim, _desired(sim, command), substeps, pushes, actuators)
+        except _NotFinite as failure:
+            return record.finished(pushes, "controller failed", failure)
+        record.during(*torques_and_forces, stance, planned)
         if sim.diverged:
-            return record.finished(loop.pushes, "diverged")
+            return record.finished(pushes, "diverged")
         if sim.fallen:
-            return record.finished(loop.pushes, "fell")
-    return record.finished(loop.pushes, "completed")
+            return record.finished(pushes, "fell")
+    return record.finished(pushes, "completed")
 
 
 def _multiple(name: str, time: float, unit: str, period: float) -> int:
-    """How many periods, s, make up a time, s.
-
-    name, time: of what is checked.
-    unit, period: what the period is of, and how long.
-
-    Raises `InputError` where it is no whole number of them.
-    """
+    """How many periods, s, make up a time, s: `InputError` where it is no whole number of them."""
     time = positive(name, time, "s")
     count = round(time / period)
     if count < 1 or abs(count * period - time) > _PERIOD_ERROR * period + _TIME_ERROR * time:
@@ -139,71 +142,45 @@ class _NotFinite(InputError):
     """NaN or infinite torques: they end the rollout, where other mistakes in a controller are raised."""
 
 
-class _Loop:
-    """One tick after the other."""
+def _stance(sim: Simulation, controller: Controller) -> Contacts:
+    """The controller's contacts now; all feet when it names none."""
+    contacts = getattr(controller, "contacts", None)
+    return contacts if isinstance(contacts, Contacts) else sim.feet
 
-    def __init__(self, sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None):
-        self._sim, self._controller, self._actuators, self.pushes = sim, controller, actuators, pushes
 
-    def tick(self, substeps: int, record: Recorder) -> FloatbaseError | None:
-        """Ask the controller once, go on for that many timesteps, and record it; the error where there are no torques."""
-        sim = self._sim
-        q, v = sim.q, sim.v
-        record.before(q, v)
-        try:
-            command = self._controller(q, v, sim.time)
-        except FloatbaseError as failure:
-            return failure
-        try:
-            self._apply(command, substeps, record)
-        except _NotFinite as failure:
-            return failure
-        return None
+def _act(
+    sim: Simulation, desired: Array, substeps: int, pushes: tuple[Push, ...], actuators: Actuators | None
+) -> tuple[Array, Array, Array]:
+    """Go on for a control period: the mean of the torques given, those desired, the mean of the contact forces."""
+    applied, forces, tau = np.zeros(sim.robot.d), np.zeros((len(sim.point_names), 3)), desired
+    for _ in range(substeps):
+        if actuators is not None:
+            tau = _torques(sim, "the actuators' torques", actuators.step(desired, *sim.joints, sim.timestep))
+        sim.advance(tau, pushes)
+        applied += sim.torques()
+        forces += sim.contact_forces()
+    return applied / substeps, desired, forces / substeps
 
-    def stance(self) -> Contacts:
-        """The controller's contacts now; all feet when it names none."""
-        contacts = getattr(self._controller, "contacts", None)
-        return contacts if isinstance(contacts, Contacts) else self._sim.feet
 
-    def _apply(self, command: Any, substeps: int, record: Recorder) -> None:
-        """Let a command act for its period, and record it."""
-        sim, stance = self._sim, self.stance()
-        desired, planned = self._desired(command), _planned(command, stance)
-        forces, applied = np.zeros((len(sim.point_names), 3)), np.zeros(sim.robot.d)
-        for _ in range(substeps):
-            sim.advance(self._actuated(desired), self.pushes)
-            forces += sim.contact_forces()
-            applied += sim.torques()
-        record.during(applied / substeps, desired, forces / substeps, stance, planned)
+def _desired(sim: Simulation, command: Any) -> Array:
+    """The torques of a command, shape (d,), N·m."""
+    if not hasattr(command, "tau"):
+        raise InputError(
+            f"a controller must answer with .tau, shape ({sim.robot.d},), N·m, as a Command does; got {command!r}. Any "
+            f"object with .tau will do: types.SimpleNamespace(tau=…)."
+        )
+    return _torques(sim, "the controller's torques", command.tau)
 
-    def _desired(self, command: Any) -> Array:
-        """The torques of a command, shape (d,), N·m."""
-        if not hasattr(command, "tau"):
-            d = self._sim.robot.d
-            raise InputError(
-                f"a controller must answer with .tau, shape ({d},), N·m, as a Command does; got {command!r}. Any object "
-                f"with .tau will do: types.SimpleNamespace(tau=…)."
-            )
-        return self._checked("the controller's torques", command.tau)
 
-    def _actuated(self, desired: Array) -> Array:
-        """The torques that the joints get in the next timestep, shape (d,), N·m."""
-        if self._actuators is None:
-            return desired
-        tau = self._actuators.step(desired, *self._sim.joints, self._sim.timestep)
-        return self._checked("the actuators' torques", tau)
-
-    def _checked(self, name: str, tau: Any) -> Array:
-        """Torques as a read-only array, shape (d,). Raises `_NotFinite`, or `InputError` for another shape."""
-        sim = self._sim
-        try:
-            return checked(name, tau, (sim.robot.d,), "N·m")
-        except InputError:
-            if np.shape(tau) != (sim.robot.d,):
-                raise
-            i = int(np.argmin(np.isfinite(tau)))
-            joint = sim.robot.joint_names[i]
-            raise _NotFinite(f"{name} hold {np.asarray(tau)[i]} at {joint} at {sim.time:.3f} s.") from None
+def _torques(sim: Simulation, name: str, tau: Any) -> Array:
+    """Torques as a read-only array, shape (d,). Raises `_NotFinite`, or `InputError` for another shape."""
+    try:
+        return checked(name, tau, (sim.robot.d,), "N·m")
+    except InputError:
+        if np.shape(tau) != (sim.robot.d,):
+            raise
+        i = int(np.argmin(np.isfinite(tau)))
+        raise _NotFinite(f"{name} hold {np.asarray(tau)[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
 
 
 def _planned(command: Any, stance: Contacts) -> Array | None:

@@ -330,7 +330,7 @@ def test_at_the_standing_angles_the_supply_gives_each_joint_its_torque_limit(nam
     robot = judges.load(name)
     actuators = HydraulicActuators(robot)
     standing = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
-    pull, push = actuators.torque_limits(standing)
+    pull, push = actuators.cylinders.pose(standing).lever * actuators.cylinders.force_limits()
     assert np.allclose(-pull, robot.torque_limits)
     assert np.allclose(push / robot.torque_limits, 1.66, atol=0.01)
 
@@ -339,10 +339,9 @@ def test_at_the_standing_angles_the_supply_gives_each_joint_its_torque_limit(nam
 def test_torque_saturates_where_the_pressure_says_and_never_beyond(turn: float) -> None:
     actuators = joints(replace(HYQ, leakage=0.0))
     q, still = actuators.cylinders.centre + turn, np.zeros(12)
-    limits = actuators.torque_limits(q)
-    h, pose = HYQ, actuators.cylinders.pose(q)
+    high, low = HYQ.supply_pressure, HYQ.tank_pressure
     A, B = actuators.cylinders.areas
-    assert np.allclose(limits[1], pose.lever * (A * h.supply_pressure - B * h.tank_pressure))
+    limits = actuators.cylinders.pose(q).lever * np.array([A * low - B * high, A * high - B * low])
     for sign, limit in zip((-1.0, 1.0), limits, strict=True):
         out = np.array([actuators.step(sign * 5.0 * np.abs(limits[1]), q, still, 1e-3) for _ in range(300)])
         assert np.allclose(out[-1], limit, rtol=2e-3)
