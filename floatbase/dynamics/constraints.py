@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
-from floatbase.dynamics.contact import DEFAULT_MU, UP, point_jacobian
+from floatbase._arrays import Array, checked, cross, positive, unit_vector
+from floatbase.dynamics.contact import DEFAULT_MU, UP, OnePoint, check_ground
 from floatbase.errors import InputError
 from floatbase.robots import State
 
@@ -69,7 +69,7 @@ class LinearConstraint:
 
 
 @dataclass(frozen=True, eq=False)
-class RollingWheel:
+class RollingWheel(OnePoint):
     """(6) A wheel or disc that rolls on a plane without slipping: the nonholonomic case.
 
     g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest, where c is the wheel's centre
@@ -86,66 +86,30 @@ class RollingWheel:
     `positions` and `constraint` raise `InputError` for a wheel that lies flat: it has no lowest point.
     """
 
-    frame: str
     axis: Array
     radius: float
     normal: Array = field(default_factory=lambda: UP)
     mu: float = DEFAULT_MU
-    k: ClassVar[int] = 3
-    row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
-    J_is_A: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        check_ground(self)
         object.__setattr__(self, "axis", unit_vector(f"axis of {self.frame}", self.axis))
-        object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
         object.__setattr__(self, "radius", positive(f"radius of {self.frame}", self.radius, "m"))
-        object.__setattr__(self, "mu", positive(f"friction coefficient mu of {self.frame}", self.mu))
-
-    @property
-    def name(self) -> str:
-        """The frame's name."""
-        return self.frame
-
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """The frame's name: one point."""
-        return (self.frame,)
-
-    def positions(self, state: State) -> Array:
-        """World position of the contact point, shape (1, 3), m."""
-        return read_only([state.point(self.frame) + self._arm(state)])
 
     def slip(self, state: State) -> Array:
         """g(q, q̇), shape (3,), m/s, world: the velocity of the touching point, zero when the wheel rolls."""
         return self.jacobian(state) @ state.v
 
-    def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """∂g/∂q̇, shape (3, nv): also brings the contact force into (4)."""
-        return read_only(point_jacobian(state, self.frame, self._arm(state)))
-
-    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(6) A = ∂g/∂q̇, shape (3, nv), and b = -(∂g/∂q) q̇, shape (3,), m/s²."""
-        drift = state.frame_drift(self.frame)
-        omega = state.frame_velocity(self.frame)[3:]
-        u, u_dot = self._up(state)
-        b = -(drift[:3] + cross(drift[3:], -self.radius * u) + cross(omega, -self.radius * u_dot))
-        return read_only(point_jacobian(state, self.frame, -self.radius * u)), read_only(b)
-
-    def _arm(self, state: State) -> Array:
-        """From the centre to the contact point, shape (3,), m, world."""
-        return -self.radius * self._up(state)[0]
-
-    def _up(self, state: State) -> tuple[Array, Array]:
-        """u and u̇: the normal laid into the wheel's plane, which turns with the axle; shapes (3,), world."""
+    def _arm(self, state: State) -> tuple[Array, Array]:
+        """-r u, where u is the normal laid into the wheel's plane, which turns with the axle."""
         n, axle = self.normal, state.frame_pose(self.frame).rotation @ self.axis
-        axle_dot = cross(state.frame_velocity(self.frame)[3:], axle)
+        axle_rate = cross(state.frame_velocity(self.frame)[3:], axle)
         w = n - (n @ axle) * axle
         length = float(np.linalg.norm(w))
         if length < _FLAT_WHEEL:
             raise InputError(f"wheel {self.frame} lies flat on its side; it has no single lowest point to roll on.")
-        w_dot = -(n @ axle_dot) * axle - (n @ axle) * axle_dot
-        u = w / length
-        return u, (w_dot - u * (u @ w_dot)) / length
+        u, w_rate = w / length, -(n @ axle_rate) * axle - (n @ axle) * axle_rate
+        return -self.radius * u, -self.radius / length * (w_rate - u * (u @ w_rate))
 
 
 def fixed_frame(frame: str) -> LinearConstraint:

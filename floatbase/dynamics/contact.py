@@ -24,35 +24,31 @@ DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry c
 
 @runtime_checkable
 class Contact(Protocol):
-    """What every contact offers; `point_names` is empty for a constraint whose forces have no friction cone."""
+    """What every contact offers.
+
+    name: in messages, active rows and pictures.
+    mu: coefficient of friction.
+    normal: unit normal out of the ground, shape (3,), world.
+    point_names: one for each point that carries a force; empty for a constraint whose forces have no friction cone.
+    k: number of force components.
+    row_names: one for each row of (5).
+    J_is_A: whether each force component acts along one row of (5), so that J = A.
+    """
 
     @property
-    def name(self) -> str:
-        """Name in messages, active rows and pictures."""
-
+    def name(self) -> str: ...
     @property
-    def mu(self) -> float:
-        """Coefficient of friction."""
-
+    def mu(self) -> float: ...
     @property
-    def normal(self) -> Array:
-        """Unit normal out of the ground, shape (3,), world."""
-
+    def normal(self) -> Array: ...
     @property
-    def point_names(self) -> tuple[str, ...]:
-        """One name for each point that carries a force."""
-
+    def point_names(self) -> tuple[str, ...]: ...
     @property
-    def k(self) -> int:
-        """Number of force components."""
-
+    def k(self) -> int: ...
     @property
-    def row_names(self) -> tuple[str, ...]:
-        """One name for each row of (5)."""
-
+    def row_names(self) -> tuple[str, ...]: ...
     @property
-    def J_is_A(self) -> bool:
-        """Whether each force component acts along one row of (5), so that J = A."""
+    def J_is_A(self) -> bool: ...
 
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n, 3), m."""
@@ -65,33 +61,13 @@ class Contact(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class PointContact:
-    """A point of the robot that does not move on the ground: A = J, b = -J̇ q̇ (5).
-
-    The contact point is the lowest point of a ball: centre - radius · normal. As the ball rolls, that point moves on the
-    ball, which b takes into account.
-
-    frame: name of the frame that carries the point.
-    normal: shape (3,), world, out of the ground; it is scaled to unit length.
-    mu: coefficient of friction.
-    radius: of the ball, m; 0 for a point of the frame's body.
-    centre: of the ball, shape (3,), m, in the frame.
-    """
+class OnePoint:
+    """What contacts at one point of a frame's body share; `_arm` says where the point is and how it moves on the body."""
 
     frame: str
-    normal: Array = field(default_factory=lambda: UP)
-    mu: float = DEFAULT_MU
-    radius: float = 0.0
-    centre: Array = field(default_factory=lambda: np.zeros(3))
     k: ClassVar[int] = 3
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
     J_is_A: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
-        object.__setattr__(self, "mu", positive(f"friction coefficient mu of {self.frame}", self.mu))
-        object.__setattr__(self, "radius", positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True))
-        object.__setattr__(self, "centre", checked(f"centre of {self.frame}", self.centre, (3,), "m"))
 
     @property
     def name(self) -> str:
@@ -105,25 +81,52 @@ class PointContact:
 
     def positions(self, state: State) -> Array:
         """World position of the contact point, shape (1, 3), m."""
-        return read_only([state.point(self.frame, self.centre) - self.radius * self.normal])
+        return read_only([state.point(self.frame) + self._arm(state)[0]])
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """Jacobian of the contact point, shape (3, nv), world-aligned."""
-        return read_only(point_jacobian(state, self.frame, self._arm(state)))
+        """Jacobian of the body's point at the contact, shape (3, nv), world-aligned."""
+        return _jacobian(state, self.frame, self._arm(state)[0])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) A = J and b = -J̇ q̇, shapes (3, nv) and (3,), m/s²: the contact point does not accelerate."""
-        drift = state.frame_drift(self.frame)
-        omega = state.frame_velocity(self.frame)[3:]
-        arm = self._arm(state)
-        # J v = v_o + ω × (R c - r n): only R c turns with the foot, the contact point stays below the centre
-        turning = cross(omega, cross(omega, arm + self.radius * self.normal))
-        J_dot_v = drift[:3] + cross(drift[3:], arm) + turning
-        return read_only(point_jacobian(state, self.frame, arm)), read_only(-J_dot_v)
+        """(5) A = J and b = -J̇ q̇, shapes (3, nv) and (3,), m/s², where J q̇ = v_frame + ω × arm."""
+        arm, arm_rate = self._arm(state)
+        drift, omega = state.frame_drift(self.frame), state.frame_velocity(self.frame)[3:]
+        b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))
+        return _jacobian(state, self.frame, arm), read_only(b)
 
-    def _arm(self, state: State) -> Array:
-        """From the frame's origin to the contact point, shape (3,), m, world."""
-        return state.frame_pose(self.frame).rotation @ self.centre - self.radius * self.normal
+    def _arm(self, state: State) -> tuple[Array, Array]:
+        """From the frame's origin to the contact point, m, and its derivative, m/s; shapes (3,), world."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class PointContact(OnePoint):
+    """A point of the robot that does not move on the ground: A = J, b = -J̇ q̇ (5).
+
+    The contact point is the lowest point of a ball: centre - radius · normal. As the ball rolls, that point moves on the
+    ball, which b takes into account.
+
+    frame: name of the frame that carries the point.
+    normal: shape (3,), world, out of the ground; it is scaled to unit length.
+    mu: coefficient of friction.
+    radius: of the ball, m; 0 for a point of the frame's body.
+    centre: of the ball, shape (3,), m, in the frame.
+    """
+
+    normal: Array = field(default_factory=lambda: UP)
+    mu: float = DEFAULT_MU
+    radius: float = 0.0
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        check_ground(self)
+        object.__setattr__(self, "radius", positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True))
+        object.__setattr__(self, "centre", checked(f"centre of {self.frame}", self.centre, (3,), "m"))
+
+    def _arm(self, state: State) -> tuple[Array, Array]:
+        """R c - r n. Only R c turns with the foot, the contact point stays below the centre."""
+        to_centre = state.frame_pose(self.frame).rotation @ self.centre
+        return to_centre - self.radius * self.normal, cross(state.frame_velocity(self.frame)[3:], to_centre)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +150,7 @@ class FlatFootContact:
     J_is_A: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "normal", unit_vector(f"normal of {self.frame}", self.normal))
-        object.__setattr__(self, "mu", positive(f"friction coefficient mu of {self.frame}", self.mu))
+        check_ground(self)
         corners = checked(f"corners of {self.frame}", self.corners, (None, 3), "m")
         object.__setattr__(self, "corners", spread_corners(self.frame, corners))
 
@@ -173,8 +175,7 @@ class FlatFootContact:
 
     def generators(self, state: State) -> Array:
         """Corner forces to their wrench at the frame's origin, shape (6, k), N and N·m, world-aligned: J = generatorsᵀ A."""
-        R = state.frame_pose(self.frame).rotation
-        return read_only(np.hstack([np.vstack([np.eye(3), pin.skew(R @ corner)]) for corner in self.corners]))
+        return grasp_matrix(self.corners @ state.frame_pose(self.frame).rotation.T, np.zeros(3))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """Jacobian of the corners, shape (k, nv), world-aligned; its rank is at most 6."""
@@ -185,7 +186,22 @@ class FlatFootContact:
         return state.frame_jacobian(self.frame), read_only(-state.frame_drift(self.frame))
 
 
-def point_jacobian(state: State, frame: str, arm: Array) -> Array:
+def grasp_matrix(points: Array, about: Array) -> Array:
+    """(20)(21) G_f above G_τ, shape (6, 3n): forces at points, shape (n, 3), m, to their wrench about a point, shape (3,).
+
+    Known as the grasp matrix in manipulation. N and N·m, world.
+    """
+    blocks = [np.vstack([np.eye(3), pin.skew(point - about)]) for point in points]
+    return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
+
+
+def check_ground(contact: Contact) -> None:
+    """Check a new contact's friction coefficient and normal, and scale the normal to unit length."""
+    object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))
+    object.__setattr__(contact, "mu", positive(f"friction coefficient mu of {contact.name}", contact.mu))
+
+
+def _jacobian(state: State, frame: str, arm: Array) -> Array:
     """Jacobian of the point of a frame's body at `arm` (m, world) from its origin, shape (3, nv), world-aligned."""
     J = state.frame_jacobian(frame)
-    return J[:3] - pin.skew(arm) @ J[3:]
+    return read_only(J[:3] - pin.skew(arm) @ J[3:])
