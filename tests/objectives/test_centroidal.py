@@ -79,10 +79,10 @@ def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> Non
     """(20)(21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i; no points give a matrix without columns."""
     rng = np.random.default_rng(0)
     points, about, forces = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=(5, 3))
-    wrench = objectives.grasp_matrix(points, about) @ forces.ravel()
+    wrench = dynamics.grasp_matrix(points, about) @ forces.ravel()
     assert np.allclose(wrench[:3], forces.sum(axis=0))
     assert np.allclose(wrench[3:], np.cross(points - about, forces).sum(axis=0))
-    assert objectives.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
+    assert dynamics.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
 
 
 # (20)(21) ----------------------------------------------------------------------------------------------------------------

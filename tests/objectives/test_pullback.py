@@ -125,7 +125,7 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
     space = dynamics.feasible_space(eom)
     rng = np.random.default_rng(0)
     A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
-    seen = objectives.pullback(Quadratic.from_residual(A, r), space.map)
+    seen = Quadratic.from_residual(A, r).pullback(space.map)
     beta = rng.normal(size=space.dimension)
     assert seen(beta) == pytest.approx(0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10)
 
