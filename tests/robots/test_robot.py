@@ -106,14 +106,6 @@ def test_random_states_are_the_same_for_the_same_seed_and_differ_for_others(robo
     assert not np.allclose(robot.random_state(3).v, robot.random_state(4).v)
 
 
-def test_nothing_in_a_robot_can_be_written_to(robot) -> None:
-    for array in (robot.S, robot.torque_limits, robot.posture):
-        with pytest.raises(ValueError, match="read-only"):
-            array[...] = 0.0
-    with pytest.raises(AttributeError):
-        robot.name = "another"
-
-
 def test_any_quadruped_of_example_robot_data_loads_once_its_feet_are_given() -> None:
     robot = fb.load("anymal", feet=["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"], foot_radius=0.03)
     assert [foot.radius for foot in robot.feet] == [0.03] * 4
