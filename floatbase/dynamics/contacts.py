@@ -55,7 +55,7 @@ class Contacts:
         normals: world, out of the ground: (3,) for all, (n, 3) in the order of the frames, or a mapping from frame to (3,);
             straight up by default.
         """
-        return Contacts([_point(*each) for each in _feet(robot, frames, mu, normals)])
+        return Contacts([_contact(*each, flat=False) for each in _feet(robot, frames, mu, normals)])
 
     @staticmethod
     def flat_feet(
@@ -69,7 +69,7 @@ class Contacts:
                     f"{foot.frame} of {robot.name} is not a flat foot; use fb.Contacts.points, or load the robot with "
                     "feet=[floatbase.robots.Foot(frame, corners=…)]."
                 )
-        return Contacts([_flat_or_point(*one) for one in each])
+        return Contacts([_contact(*one) for one in each])
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU) -> Contacts:
@@ -77,7 +77,7 @@ class Contacts:
 
         mu: as for `points`.
         """
-        return Contacts([_flat_or_point(*each) for each in _feet(robot, None, mu, None)] if robot.feet else [])
+        return Contacts([_contact(*each) for each in _feet(robot, None, mu, None)] if robot.feet else [])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -193,12 +193,10 @@ class Contacts:
         return f"Contacts({', '.join(self.names)}; k={self.k})"
 
 
-def _point(foot: Foot, mu: float, normal: Array) -> Contact:
+def _contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:
+    if flat and foot.corners is not None:
+        return FlatFootContact(foot.frame, foot.corners, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
-
-
-def _flat_or_point(foot: Foot, mu: float, normal: Array) -> Contact:
-    return _point(foot, mu, normal) if foot.corners is None else FlatFootContact(foot.frame, foot.corners, normal, mu)
 
 
 def _feet(robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals) -> list[tuple[Foot, float, Array]]:

@@ -1,10 +1,8 @@
-"""Tasks: what a controller should bring about, each a weighted affine residual in q̈, τ or λ.
+"""Tasks: what a controller should bring about, each a weighted affine residual, actual - desired, in q̈, τ or λ.
 
-Residual = actual - desired. A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the
-errors of position and velocity, so its residual is J q̈ + J̇ q̇ - a. Its cost is (weight / 2) ‖residual‖², a term of ψ
-in (26).
-
-A target is a value, or a function of the time t in s that gives one.
+A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of position and velocity. Its
+residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term of ψ in (26). A target is a value, or a function of the
+time t in s that gives one.
 """
 
 from __future__ import annotations
@@ -96,10 +94,8 @@ class CoMTask:
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_com q̈ + J̇_com q̇ - a, shape (3,), m/s²."""
         state = eom.state
-        e = state.com - _value("position", self.position, t, (3,))
-        e_dot = state.com_velocity - _value("velocity", self.velocity, t, (3,))
-        feed = _value("acceleration", self.acceleration, t, (3,))
-        return _motion_residual(self, state.com_jacobian, state.com_drift, feed, e, e_dot)
+        x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
+        return _motion_residual(self, state.com_jacobian, state.com_drift, a, state.com - x, state.com_velocity - v)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,11 +174,9 @@ class FrameTask:
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J q̈ + J̇ q̇ - a, shape (3,), m/s², world-aligned."""
         state = eom.state
-        e = state.point(self.frame) - _value("position", self.position, t, (3,))
-        e_dot = state.frame_velocity(self.frame)[:3] - _value("velocity", self.velocity, t, (3,))
-        feed = _value("acceleration", self.acceleration, t, (3,))
+        x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
         J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
-        return _motion_residual(self, J, drift, feed, e, e_dot)
+        return _motion_residual(self, J, drift, a, state.point(self.frame) - x, state.frame_velocity(self.frame)[:3] - v)
 
 
 @dataclass(frozen=True, eq=False)
