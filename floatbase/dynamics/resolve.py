@@ -79,8 +79,8 @@ def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
 
 def _check_fit(eom: EquationsOfMotion, w: Array) -> None:
     """Check that forces can hold every resolved row and act along rows of A only; w: singular values of rows M⁻¹ Jᵀ."""
-    if np.any(w <= RANK_TOLERANCE * w.max(initial=0.0)):
-        reached = int(np.sum(w > RANK_TOLERANCE * w[0]))
+    reached = int(np.sum(w > RANK_TOLERANCE * w.max(initial=0.0)))
+    if reached < w.size:
         raise InputError(f"the contacts hold {w.size} directions of motion, but forces reach {reached}: A and J do not fit.")
     beside = eom.J - eom.J @ np.linalg.pinv(eom.A, rcond=RANK_TOLERANCE) @ eom.A
     if np.max(np.abs(beside), initial=0.0) > _FIT_TOLERANCE * np.max(np.abs(eom.J), initial=0.0):
