@@ -22,8 +22,8 @@ Algorithm
 
 At a degenerate point (more rows meet than there are coordinates) steps of length 0 can follow one another. As long as
 they do, both choices fall on the row with the least index (Bland's rule), which keeps a working set from coming back.
-A direction without curvature has no minimiser: p then is the slope along it and α may be as long as it likes; if no row
-blocks, the objective has no minimum.
+A direction without curvature, along which the objective falls, has no minimiser: p then is the way down and α may be as
+long as it likes; if no row blocks, the objective has no minimum.
 
 Source: the document, Appendix C; Nocedal and Wright, Numerical Optimization (2006), ch. 16.5; for Bland's rule on
 quadratic programs Chang and Cottle, Math. Programming 18 (1980).
@@ -100,10 +100,10 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
     """App. C: solve a convex QP by the active-set method of this module, keeping a record of every iteration.
 
     qp: the problem.
-    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. Without one, the method starts from
-        the minimiser of the objective on the rows of `working`, as if there were no other rows.
-    working: names of inequality rows to start with in W, such as the last run's `working`: a warm start. Rows that depend
-        on earlier ones are left out.
+    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. By default the minimiser on the rows
+        of `working`, as if there were no others.
+    working: names of inequality rows to start with in W, such as the last run's `working`; those that depend on earlier
+        ones are left out.
 
     Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum or is
     not convex, `UnknownNameError` for a row that does not exist, `InputError` for a start of another shape.
@@ -131,15 +131,8 @@ def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (
     row is active and might be an equality.
     """
     centre, H = checked("minimum", minimum, (2,), "m"), np.diag(checked("curvature", curvature, (2,)))
-    return QP(
-        H=H,
-        g=-H @ centre,
-        A=np.zeros((0, 2)),
-        b=np.zeros(0),
-        G=np.array([[0.0, -1.0]]),
-        h=np.zeros(1),
-        inequality_names=("table",),
-    )
+    G, h = np.array([[0.0, -1.0]]), np.zeros(1)  # -up ≤ 0
+    return QP(H, -H @ centre, np.zeros((0, 2)), np.zeros(0), G, h, inequality_names=("table",))
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,15 +212,14 @@ def _feasible_start(problem: QP, y: Array, rows: list[int]) -> _Walk:
 def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
     """The direction p to the minimiser on the rows of W, and how far along it to go: 1, or inf where there is none.
 
-    With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u.
-    Its curvatures are the eigenvalues of Zᵀ H Z. A direction of zero curvature along which the objective falls leads to
-    infinity.
+    With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u,
+    whose curvatures are the eigenvalues of Zᵀ H Z.
     """
     Z = null_space(problem.G[rows] / problem.row_lengths[rows, None])
     curvature, modes = np.linalg.eigh(Z.T @ problem.H @ Z)
     flat_below = _ROUNDING * float(np.max(np.abs(problem.H), initial=0.0))
     if np.any(curvature < -_COUNTS * flat_below):
-        raise not_convex(problem, float(np.linalg.eigvalsh(problem.H)[0]))
+        raise not_convex(problem, problem.H)
     modes, curved = Z @ modes, curvature > flat_below
     slope = modes.T @ (problem.H @ x + problem.g)
     falling = ~curved & (np.abs(slope) > _COUNTS * _slope_rounding(problem, x))

@@ -49,10 +49,10 @@ def unbounded(problem: object) -> SolverError:
     )
 
 
-def not_convex(problem: object, curvature: float) -> SolverError:
-    """The error for a problem, told by its repr, whose objective curves downwards; curvature: the smallest, < 0."""
+def not_convex(problem: object, H: Array) -> SolverError:
+    """The error for a problem, told by its repr, whose objective curves downwards; H: where the equalities hold."""
     return SolverError(
-        f"{problem!r} is not convex: along one direction its curvature is {curvature:.3g}. "
+        f"{problem!r} is not convex: along one direction its curvature is {np.linalg.eigvalsh(H)[0]:.3g}. "
         "H must be positive semidefinite where the equalities hold; weights must be ≥ 0."
     )
 

@@ -15,7 +15,6 @@ from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_rows, infe
 from floatbase.qp.problem import QP
 from floatbase.qp.solution import Solution, with_equality_multipliers
 
-_DAQP_INFINITY = 1e30  # what DAQP takes for no bound
 _CLARABEL = (1e-12, 1e-10, 1e-8)  # tolerances to ask Clarabel for; now and then it makes no progress on the way to the first
 _CONVEX = 1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
 _POLISHABLE = 1e-4  # part of the largest variable that polishing may move any: beyond it, it mends no last digits
@@ -70,7 +69,7 @@ def _daqp(qp: QP) -> Solution | None:
         inner.g / scale,
         inner.G / size[:, None],
         inner.h / size,
-        np.full(rows, -_DAQP_INFINITY),
+        np.full(rows, -1e30),  # what DAQP takes for no bound
         np.zeros(rows, dtype=np.int32),
         primal_tol=FEASIBILITY_TOLERANCE,
         eps_prox=-1.0,
@@ -80,7 +79,7 @@ def _daqp(qp: QP) -> Solution | None:
     if flag == -3:
         raise unbounded(qp)
     if flag == -5:
-        raise not_convex(qp, _least_curvature(qp))
+        raise not_convex(qp, inner.H)
     mu = np.maximum(np.asarray(info["lam"], dtype=np.float64)[:rows] * scale, 0.0) / size
     polished = _polished(qp, np.asarray(y), mu) if flag in (1, 2) else None  # otherwise it cycled, or took too many iterations
     if polished is None:
@@ -102,9 +101,8 @@ def _cvxpy(qp: QP) -> Solution | None:
     import cvxpy as cp
 
     inner = qp.reduced
-    curvature = _least_curvature(qp)
-    if curvature < -_CONVEX * np.max(np.abs(inner.H), initial=0.0):  # Clarabel takes convexity on trust
-        raise not_convex(qp, curvature)
+    if np.any(np.linalg.eigvalsh(inner.H) < -_CONVEX * np.max(np.abs(inner.H), initial=0.0)):  # Clarabel does not check
+        raise not_convex(qp, inner.H)
     # written around the optimum without inequalities: Clarabel's gap is relative to an objective that is then small,
     # which is what lets it see weights of 1e-6 beside weights of 10
     origin = qp.equality_space(np.linalg.lstsq(inner.H, -inner.g, rcond=None)[0])
@@ -113,8 +111,8 @@ def _cvxpy(qp: QP) -> Solution | None:
     step = cp.Variable(qp.n)
     equalities = [qp.A @ step == qp.b - qp.A @ origin] if len(qp.A) else []
     inequalities = [qp.G @ step <= qp.h - qp.G @ origin] if len(qp.G) else []
-    objective = cp.Minimize(0.5 * cp.quad_form(step, cp.psd_wrap(H)) + slope @ step)
-    problem = cp.Problem(objective, equalities + inequalities)
+    objective = 0.5 * cp.quad_form(step, cp.psd_wrap(H)) + slope @ step
+    problem = cp.Problem(cp.Minimize(objective), equalities + inequalities)
     for tolerance in _CLARABEL:
         with suppress(cp.error.SolverError), warnings.catch_warnings():
             # at its last digits Clarabel calls itself inaccurate; how accurate it was, Solution.residuals says
@@ -129,8 +127,7 @@ def _cvxpy(qp: QP) -> Solution | None:
     if step.value is None:
         raise SolverError(f"Clarabel did not converge on {qp!r}: it ended with status {problem.status!r}.")
     mu = np.maximum(np.atleast_1d(inequalities[0].dual_value) * scale, 0.0) if inequalities else np.zeros(0)
-    iterations = int(problem.solver_stats.num_iters or 0)
-    return with_equality_multipliers(qp, origin + np.asarray(step.value), mu, "cvxpy", iterations)
+    return with_equality_multipliers(qp, origin + step.value, mu, "cvxpy", int(problem.solver_stats.num_iters or 0))
 
 
 _BACK_ENDS: dict[str, Callable[[QP], Solution | None]] = {"daqp": _daqp, "cvxpy": _cvxpy, "active_set": _active_set}
@@ -164,11 +161,6 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
     polished = np.zeros_like(mu)
     polished[active] = np.maximum(found[n:].astype(np.float64), 0.0)
     return space(found[:n].astype(np.float64)), polished
-
-
-def _least_curvature(qp: QP) -> float:
-    """The smallest curvature of the objective where the equalities hold."""
-    return float(np.min(np.linalg.eigvalsh(qp.reduced.H), initial=np.inf))
 
 
 def _objective_size(qp: QP) -> float:
