@@ -1,8 +1,4 @@
-"""The two values that everything else is written in: `Affine` maps and `Quadratic` costs.
-
-A task is a residual `Affine` with a weight; the space of motions is an `Affine` from β to (q̈, τ, λ); a cost seen from
-another space, (15) and (18), *is* composition.
-"""
+"""The two values that everything else is written in: `Affine` maps and `Quadratic` costs."""
 
 from __future__ import annotations
 
@@ -191,10 +187,7 @@ class Quadratic:
         return self.H @ checked("x", x, (self.n,)) + self.g
 
     def pullback(self, f: Affine) -> Quadratic:
-        """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)).
-
-        f: an `Affine` whose output is this cost's variable. Source: the document, §3.
-        """
+        """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)). Source: the document, §3."""
         if f.n_out != self.n:
             raise InputError(f"cannot pull back: the map gives {f.n_out} numbers, the cost takes {self.n}.")
         return Quadratic(f.A.T @ self.H @ f.A, f.A.T @ (self.H @ f.b + self.g), self(f.b))
@@ -206,8 +199,7 @@ class Quadratic:
     def minimised_over(self, N: npt.ArrayLike) -> Affine:
         """x -> the point of least cost on x + span N; N: orthonormal columns, shape (n, p).
 
-        The cost there, `self.pullback(self.minimised_over(N))`, is the partial minimisation of this one; where N spans some
-        of the variables, its H on the others is the Schur complement. A direction that costs nothing is left alone. Raises
+        The cost there is `self.pullback(self.minimised_over(N))`. A direction that costs nothing is left alone. Raises
         `InputError` where the cost falls for ever along a column of N: negative curvature, or slope without curvature.
         """
         N = checked("N", N, (self.n, None))

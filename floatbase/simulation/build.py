@@ -1,7 +1,6 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-The URDF's shapes are left out: only the ground's plane and balls at the feet touch. Where MuJoCo refuses a link's inertia that
-the robot's own model accepts, the inertia goes to the link that it is welded to.
+Only the ground's plane and balls at the feet touch. An inertia that MuJoCo refuses goes to the link that its link is welded to.
 """
 
 from __future__ import annotations
@@ -42,9 +41,8 @@ class Ground:
 
 
 def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
-    """The robot on the ground as a MuJoCo model with a timestep, s: see `Simulation`.
+    """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact points, motors as joints.
 
-    The geoms of contact points are called as in `Contacts.feet(robot).point_names`, motors as their joints.
     Raises `SimulationError` when MuJoCo cannot build it.
     """
     spec = _urdf_without_shapes(robot)

@@ -48,10 +48,7 @@ class Conversion:
         return v
 
     def joints(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
-        """Angles, rad (or m), and velocities of the actuated joints in the order of τ, shape (d,) each.
-
-        The angle of a joint without limits grows beyond π from turn to turn.
-        """
+        """Angles (of joints without limits beyond π too), rad or m, and velocities, in the order of τ, shape (d,) each."""
         return qpos[self._qpos], qvel[self._qvel]
 
     def to_mujoco(self, q: Array, v: Array) -> tuple[Array, Array]:

@@ -33,7 +33,7 @@ class Live:
     idle: s without any call here after which the run pauses by itself, so that a forgotten page costs nothing.
 
     `status` is "running", "paused", or why the run stopped: "fell", "diverged", "controller failed: …", "stopped: …" for an
-    exception, which `error` holds. Calls act between slices, and none but `close` waits. While paused there is no thread.
+    exception, which `error` holds. Calls act between slices, and none but `close` waits.
     """
 
     def __init__(

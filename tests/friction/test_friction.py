@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cvxpy as cp
-import judges
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -44,11 +43,6 @@ def test_the_two_parts_of_figure_3_add_up_and_are_at_right_angles(seed: int) -> 
     assert abs(parts.f_perp @ parts.f_par) <= 1e-12 * size**2
     assert parts.alpha_perp**2 + parts.alpha_par**2 == pytest.approx(size**2)
     assert parts.alpha_par >= 0
-
-
-def test_a_force_that_pulls_has_a_negative_normal_component() -> None:
-    parts = decompose([3.0, 4.0, -2.0], UP)
-    assert (parts.alpha_perp, parts.alpha_par) == (-2.0, 5.0)
 
 
 def test_the_cone_opens_by_arctan_mu() -> None:
@@ -109,6 +103,7 @@ def test_rows_and_rays_describe_the_same_set(seed: int, n: int, mu: float, insid
 
 def test_a_ray_lies_on_the_two_facets_beside_it_and_a_force_in_the_middle_on_none() -> None:
     polyhedron = FrictionPolyhedron([0.2, -0.3, 0.9], 0.7, 5)
+    assert np.allclose(polyhedron.rays @ polyhedron.normal, 1.0)
     for i, ray in enumerate(polyhedron.rays):
         assert set(polyhedron.active_facets(100.0 * ray)) == {i, (i + 1) % 5}
     for force in (polyhedron.normal, np.zeros(3), -polyhedron.normal):
@@ -128,6 +123,65 @@ def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_i
     inner, outer = FrictionPolyhedron(UP, 0.6, 4, inside=True), FrictionPolyhedron(UP, 0.6, 4, inside=False)
     assert (inner.status(force), FrictionCone(UP, 0.6).status(force), outer.status(force)) == ("outside", "inside", "inside")
     assert (inner.active_facets(force), outer.active_facets(force)) == ((0,), ())
+
+
+def slips(force: Array, normal: Array, mu: float) -> float:
+    """α∥ - μ α⊥ of (28), N: how far a force is outside the exact cone."""
+    pressing = float(normal @ force)
+    return float(np.linalg.norm(force - pressing * normal)) - mu * pressing
+
+
+@given(seeds, facets, mus)
+def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(seed: int, n: int, mu: float) -> None:
+    rng, normal = np.random.default_rng(seed), any_normal(np.random.default_rng(seed))
+    cone = FrictionPolyhedron(normal, mu, n)
+    for weights in rng.exponential(size=(20, n)):
+        force = cone.rays.T @ weights
+        assert slips(force, normal, mu) <= 1e-9 * np.linalg.norm(force)
+        assert cone.margin(force) >= -1e-9 * np.linalg.norm(force)
+
+
+@given(seeds, facets, mus)
+def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(seed: int, n: int, mu: float) -> None:
+    rng, normal = np.random.default_rng(seed), any_normal(np.random.default_rng(seed))
+    cone, (t1, t2) = FrictionPolyhedron(normal, mu, n, inside=False), tangents(normal)
+    for angle, part in zip(rng.uniform(0, 2 * np.pi, 50), rng.uniform(0, 1, 50), strict=True):
+        force = normal + part * mu * (np.cos(angle) * t1 + np.sin(angle) * t2)
+        assert cone.margin(force) >= -1e-12
+
+
+@given(seeds, facets, mus)
+def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_between(seed: int, n: int, mu: float) -> None:
+    normal = any_normal(np.random.default_rng(seed))
+    inner, outer = FrictionPolyhedron(normal, mu, n), FrictionPolyhedron(normal, mu, n, inside=False)
+    for ray in inner.rays:
+        assert slips(ray, normal, mu) == pytest.approx(0.0, abs=1e-9)
+    for direction in inner.rows + inner.mu_facet * normal:
+        assert np.linalg.norm(direction) == pytest.approx(1.0)
+        assert inner.margin(normal + mu * np.cos(np.pi / n) * direction) == pytest.approx(0.0, abs=1e-9)
+        assert outer.margin(normal + mu * direction) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_margin_is_the_force_that_may_be_added_along_the_nearest_facet() -> None:
+    cone = FrictionPolyhedron([0.0, 0.0, 1.0], 0.5, 4, inside=False)
+    assert cone.margin([0.0, 0.0, 10.0]) == pytest.approx(5.0)
+    assert cone.margin([3.0, 0.0, 10.0]) == pytest.approx(2.0)
+    assert cone.margin([0.0, -7.0, 10.0]) == pytest.approx(-2.0)
+    assert cone.margin([0.0, 0.0, -1.0]) < 0
+
+
+def test_facet_0_looks_along_the_worlds_x_and_the_next_one_along_y() -> None:
+    cone = FrictionPolyhedron([0.0, 0.0, 1.0], 1.0, 4, inside=False)
+    assert np.allclose(cone.rows[0], [1.0, 0.0, -1.0])
+    assert np.allclose(cone.rows[1], [0.0, 1.0, -1.0])
+
+
+@given(seeds)
+def test_tangents_are_right_handed_with_the_normal(seed: int) -> None:
+    normal = any_normal(np.random.default_rng(seed))
+    t1, t2 = tangents(normal)
+    assert np.allclose(np.cross(t1, t2), normal, atol=1e-12)
+    assert np.allclose([t1 @ t1, t2 @ t2, t1 @ t2, t1 @ normal], [1.0, 1.0, 0.0, 0.0], atol=1e-12)
 
 
 def nearest_in_cone() -> tuple[cp.Problem, cp.Parameter, cp.Parameter, cp.Parameter, cp.Variable]:
@@ -174,25 +228,6 @@ def test_a_projection_stays_put_and_what_it_takes_away_pulls_against_the_whole_c
     gone = decompose(f - FrictionCone(polyhedron.normal, mu).project(f), polyhedron.normal)
     assert mu * gone.alpha_par + gone.alpha_perp <= 1e-12 * size
     assert rest.alpha_perp <= 1e-12 * size  # what is taken away never pushes
-
-
-def test_projections_on_the_polyhedra_close_in_on_the_cones() -> None:
-    cone, f = FrictionCone([0.1, 0.2, 1.0], 0.7), np.array([30.0, -40.0, 20.0])
-    for n in (4, 16, 64, 256):
-        inner, outer = (FrictionPolyhedron(cone.normal, 0.7, n, inside).project(f) for inside in (True, False))
-        distances = [np.linalg.norm(p - f) for p in (outer, cone.project(f), inner)]
-        assert distances == sorted(distances)  # the larger the set, the nearer its nearest force
-        assert distances[2] - distances[0] < 50.0 * (1 - np.cos(np.pi / n))
-
-
-@given(seeds, mus)
-def test_turning_normal_and_force_together_turns_the_answers(seed: int, mu: float) -> None:
-    rng = np.random.default_rng(seed)
-    n, f, R = any_normal(rng), rng.normal(size=3), judges.rotation(rng.normal(size=3))
-    cone, turned = FrictionCone(n, mu), FrictionCone(R @ n, mu)
-    assert turned.margin(R @ f) == pytest.approx(cone.margin(f), abs=1e-12)
-    assert np.allclose(turned.project(R @ f), R @ cone.project(f), atol=1e-12)
-    assert np.allclose(decompose(R @ f, R @ n).f_par, R @ decompose(f, n).f_par, atol=1e-12)
 
 
 def test_results_cannot_be_written_to() -> None:

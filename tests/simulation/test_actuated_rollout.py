@@ -174,12 +174,6 @@ def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torque
     assert sway(hydraulic) == pytest.approx(sway(ideal), abs=1e-4)
 
 
-def test_go2_falls_at_0_8_hz_without_any_push(sim: fb.Simulation, controller: fb.WholeBodyController) -> None:
-    rollout = stand(sim, controller, 0.8)
-    assert rollout.outcome == "fell"
-    assert rollout.time[-1] < 2.0
-
-
 def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(
     sim: fb.Simulation, controller: fb.WholeBodyController
 ) -> None:

@@ -49,12 +49,6 @@ def test_it_runs_pauses_and_goes_on_where_it_was(run: Live, slices: list[fb.Roll
     assert slices[count].time[0] == pytest.approx(slices[count - 1].time[-1] + 0.002)
 
 
-def test_a_push_moves_the_robot(run: Live, slices: list[fb.Rollout]) -> None:
-    run.start()
-    run.push([0.0, 40.0, 0.0])
-    until(lambda: any(abs(s.final.com[1]) > 2e-3 for s in slices))
-
-
 @pytest.mark.parametrize("error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")])
 def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slices: list[fb.Rollout], error: Exception) -> None:
     def broken(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:

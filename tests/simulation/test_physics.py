@@ -217,13 +217,6 @@ def test_measured_forces_belong_to_the_points_they_are_named_after() -> None:
         assert np.all(np.abs(np.delete(extra, i)) < 8.0)
 
 
-def test_nothing_is_measured_where_nothing_touches(name: str) -> None:
-    sim = fb.Simulation(judges.load(name))
-    sim.reset(flying(name, height=0.5))
-    sim.step(np.zeros(sim.robot.d))
-    assert np.array_equal(sim.contact_forces(), np.zeros((len(sim.point_names), 3)))
-
-
 def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_one_holds_it() -> None:
     """A robot whose joints are held slides on a slope of tan θ > μ and stays on one of tan θ < μ: Coulomb's law."""
     robot = judges.load("go2")
@@ -298,12 +291,3 @@ def test_resetting_gives_the_same_run_again() -> None:
         runs.append(fb.rollout(sim, controller, 0.05, [fb.Push([30.0, 0.0, 0.0], duration=0.02)]))
     assert np.array_equal(runs[0].q, runs[1].q)
     assert np.array_equal(runs[0].measured, runs[1].measured)
-
-
-def test_a_state_put_into_the_physics_is_the_state_read_back(name: str) -> None:
-    state = judges.load(name).random_state(7)
-    sim = fb.Simulation(state.robot)
-    sim.reset(state)
-    assert np.allclose(sim.q, state.q, atol=1e-12)
-    assert np.allclose(sim.v, state.v, atol=1e-12)
-    assert np.allclose(sim.state.com, state.com, atol=1e-12)

@@ -48,12 +48,6 @@ def test_planned_and_measured_vertical_forces_agree_at_rest(record: fb.Rollout) 
     assert np.allclose(measured, planned, rtol=0.05)
 
 
-def test_both_forces_sum_to_the_weight(record: fb.Rollout) -> None:
-    for rows in (record.planned, record.measured):
-        total = rows[-1].reshape(-1, 3).sum(axis=0)
-        assert np.allclose(total, [0.0, 0.0, record.robot.weight], atol=0.01 * record.robot.weight)
-
-
 def test_torques_and_forces_settle(record: fb.Rollout) -> None:
     late = slice(-200, None)
     assert np.ptp(record.tau[late], axis=0).max() < 0.01 * np.abs(record.tau[late]).max()
