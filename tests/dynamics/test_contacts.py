@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics import PointContact
+from floatbase.dynamics import FlatFootContact, PointContact
 from floatbase.robots import Foot
 from floatbase.simulation import Ground
 
@@ -95,6 +95,7 @@ def test_corner_forces_make_the_wrench_of_their_generators(name: str) -> None:
 def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None:
     for state in judges.states(name, N):
         for contact in judges.stance(state.robot):
+            assert isinstance(contact, FlatFootContact)
             A, b = contact.constraint(state)
             assert contact.k == 3 * len(contact.corners) > 6
             assert A.shape == (6, state.robot.nv)
