@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics import PointContact
+from floatbase.dynamics import FlatFootContact, PointContact
 from floatbase.robots import Foot
 from floatbase.simulation import Ground
 
@@ -96,6 +96,7 @@ def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None
     for state in judges.states(name, N):
         for contact in judges.stance(state.robot):
             A, b = contact.constraint(state)
+            assert isinstance(contact, FlatFootContact)
             assert contact.k == 3 * len(contact.corners) > 6
             assert A.shape == (6, state.robot.nv)
             assert b.shape == (6,)
