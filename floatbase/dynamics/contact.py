@@ -146,8 +146,7 @@ class FlatFootContact:
 
     def __post_init__(self) -> None:
         check_ground(self)
-        corners = checked(f"corners of {self.frame}", self.corners, (None, 3), "m")
-        object.__setattr__(self, "corners", spread_corners(self.frame, corners))
+        object.__setattr__(self, "corners", spread_corners(self.frame, self.corners))
 
     @property
     def name(self) -> str:

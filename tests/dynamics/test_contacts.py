@@ -97,6 +97,7 @@ def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None
         for contact in judges.stance(state.robot):
             assert isinstance(contact, FlatFootContact)
             A, b = contact.constraint(state)
+            assert isinstance(contact, FlatFootContact)
             assert contact.k == 3 * len(contact.corners) > 6
             assert A.shape == (6, state.robot.nv)
             assert b.shape == (6,)
