@@ -103,7 +103,7 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
     a: one number for all points or shape (n,).
     """
     N = _normals(contacts)
-    each = checked("the nominal normal force a", [a] * contacts.n_points if np.ndim(a) == 0 else a, (N.shape[1],), "N")
+    each = checked("the nominal normal force a", [a] * N.shape[1] if np.ndim(a) == 0 else a, (N.shape[1],), "N")
     return Quadratic.from_residual(N @ N.T, N @ each)
 
 
