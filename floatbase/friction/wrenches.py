@@ -56,7 +56,13 @@ class WrenchSet:
         object.__setattr__(self, "cones", cones)
         object.__setattr__(self, "about", checked("about", self.about, (3,), "m"))
         object.__setattr__(self, "weight", positive("weight", self.weight, "N"))
-        object.__setattr__(self, "max_normal_force", _limits(self.max_normal_force, len(points)))
+        with suppress(TypeError, ValueError):  # +inf is allowed, so `checked` will not do
+            limits = read_only(self.max_normal_force)
+            if limits.shape == (len(points),) and np.all(limits > 0):
+                object.__setattr__(self, "max_normal_force", limits)
+                return
+        count = f"one number > 0 or {len(points)} of them, one for each contact point (N)"
+        raise InputError(f"max_normal_force must be {count}.")
 
     @cached_property
     def arm(self) -> float:
@@ -232,12 +238,3 @@ def wrench_set(
     limits = np.asarray(np.inf if max_normal_force is None else max_normal_force)
     limits = np.repeat(limits, len(cones)) if limits.ndim == 0 else limits
     return WrenchSet(contacts.positions(state), tuple(cones), state.com, state.robot.weight, limits)
-
-
-def _limits(limits: npt.ArrayLike, n: int) -> Array:
-    """Limits of the normal force, shape (n,); +inf is allowed, so `checked` will not do."""
-    with suppress(TypeError, ValueError):
-        values = read_only(limits)
-        if values.shape == (n,) and np.all(values > 0):
-            return values
-    raise InputError(f"max_normal_force must be one number > 0 or {n} of them, one for each contact point (N).")

@@ -120,7 +120,7 @@ def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
 
 def _has_valid_inertia(body: mujoco.MjsBody) -> bool:
     """Whether some mass distribution has this inertia: principal values positive, none larger than the two others' sum."""
-    if np.isnan(body.fullinertia[0]):
+    if not np.isfinite(body.fullinertia[0]):
         return True  # the URDF gives none
     smallest, middle, largest = np.linalg.eigvalsh(_inertia(body).inertia)
     return bool(smallest > _SMALLEST_INERTIA and smallest + middle >= largest * (1.0 - _ROUNDING))

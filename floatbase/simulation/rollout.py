@@ -33,7 +33,12 @@ class Actuators(Protocol):
     """What stands between the torques that a controller desires and those that the joints get; it may have a memory."""
 
     def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
-        """The torques of the next dt s for the controller's, joint angles, rad, and velocities, rad/s, now; shapes (d,), N·m."""
+        """The torques of the next dt s, shape (d,), N·m.
+
+        tau_desired: (d,) N·m, the controller's.
+        q_joints, v_joints: (d,) rad and rad/s, of the joints now.
+        dt: s.
+        """
 
 
 def rollout(
