@@ -51,14 +51,13 @@ class Hydraulics:
     loop_bandwidth: float = 50.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name = field.name.replace("_", " ")
-            positive(f"{name} of the cylinder", getattr(self, field.name), allow_zero=name in ("tank pressure", "leakage"))
-        for small, large in (("rod", "bore"), ("crank", "base"), ("tank_pressure", "supply_pressure")):
-            size, bound = getattr(self, small), getattr(self, large)
-            if size >= bound:
-                names = f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}."
-                raise InputError(names.replace("_", " "))
+        parts = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
+        for name, value in parts.items():
+            positive(f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage"))
+        for small, large in (("rod", "bore"), ("crank", "base"), ("tank pressure", "supply pressure")):
+            if parts[small] >= parts[large]:
+                size, bound = parts[small], parts[large]
+                raise InputError(f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}.")
         if self.weakest_torque <= 0.0:
             raise InputError("the tank pressure on the bore holds off the supply on the ring: it must be lower.")
 
