@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import floatbase as fb
@@ -106,32 +107,24 @@ class Playground:
         self.view.painter = self.view.painter.replace(round(facets))
         self._change(vars(self), "facets", round(facets))
 
-    def _show(self, record: fb.Rollout) -> None:
-        """Draw the last row of a slice."""
-        self.last = record
-        self._draw()
-
     def _tell(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
         self.outcome = "" if status == "running" else advice(status)
         with suppress(ViewerError):  # the window may be closed already
-            self._draw()
+            if self.last is not None:
+                self._show(self.last)
 
-    def _draw(self) -> None:
-        record = self.last
-        if record is None:
-            return
+    def _show(self, record: fb.Rollout) -> None:
+        """Draw the last row of a slice, under the time, the part of real time that this machine reaches, and messages."""
+        self.last, now = record, float(record.time[-1])
         with self._drawing:
+            speed = self.pace.update(now)
+            pace = "" if speed is None else f", {speed:.0%} of real time"
+            headline = f"{self.robot.name}, {now:.1f} s{pace}, control every {1e3 * self.period:g} ms"
             self.view.show(
                 record.final, record.contacts, record.measured[-1], record.planned[-1], push=push_at(record, -1, SEEN),
-                support=True, title="\n".join(filter(None, [self._headline(float(record.time[-1])), self.outcome, self.note])),
+                support=True, title="\n".join(filter(None, [headline, self.outcome, self.note])),
             )  # fmt: skip
-
-    def _headline(self, now: float) -> str:
-        """Robot, time, the part of real time that this machine reaches, and the control period."""
-        speed = self.pace.update(now)
-        pace = "" if speed is None else f", {speed:.0%} of real time"
-        return f"{self.robot.name}, {now:.1f} s{pace}, control every {1e3 * self.period:g} ms"
 
 
 class Pace:
@@ -158,12 +151,10 @@ def control_period(sim: fb.Simulation, controller: fb.WholeBodyController, share
 
     The rest of the time is for pictures. Leaves the simulation reset.
     """
-    shortest, ticks = PERIODS[0], 10
-    tries = []
+    ticks, clock = 10, [time.perf_counter()]
     for _ in range(4):  # the first one warms up, and the best of the others is this machine when it is not interrupted
-        start = time.perf_counter()
-        fb.rollout(sim, controller, ticks * shortest, control_period=shortest)
-        tries.append((time.perf_counter() - start) / ticks)
+        fb.rollout(sim, controller, ticks * PERIODS[0], control_period=PERIODS[0])
+        clock.append(time.perf_counter())
     sim.reset()
-    tick = min(tries[1:])
+    tick = min(end - begin for begin, end in pairwise(clock[1:])) / ticks
     return next((period for period in PERIODS if tick <= share * period), PERIODS[-1])

@@ -58,7 +58,15 @@ class HydraulicActuators:
         hydraulics = Hydraulics() if hydraulics is None else hydraulics
         if not isinstance(hydraulics, Hydraulics):
             raise InputError(f"hydraulics must be a Hydraulics, as Hydraulics(loop_bandwidth=20.0), not {hydraulics!r}.")
-        _check_joints(robot)
+        for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
+            kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
+            if not kind.startswith("JointModelR"):
+                raise InputError(f"{joint} of {robot.name} slides ({kind}); hydraulic actuators here turn joints by a crank.")
+            if not np.isfinite(limit):
+                raise InputError(
+                    f"{joint} of {robot.name} has no torque limit, so its cylinder has no size: "
+                    f'load the robot with one, fb.load("{robot.name}", torque_limits=…).'
+                )
         if centre is None:  # the difference to the neutral configuration holds the joints' angles, where q has cos and sin
             centre = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
         self.cylinders = Cylinders(hydraulics, robot.torque_limits / hydraulics.weakest_torque, centre)
@@ -92,11 +100,10 @@ class HydraulicActuators:
             Euler step.
         """
         cylinders = self.cylinders
-        tau = checked("tau_desired", tau_desired, (cylinders.d,), "N·m")
-        v = checked("v_joints", v_joints, (cylinders.d,), "rad/s")
         pose = cylinders.pose(q_joints)
+        force = self._force_for(checked("tau_desired", tau_desired, (cylinders.d,), "N·m"), pose)
+        v = checked("v_joints", v_joints, (cylinders.d,), "rad/s")
         steps = max(1, int(np.ceil(positive("dt", dt, "s") / _LONGEST_STEP - _STEP_ROUNDING)))
-        force = self._force_for(tau, pose)
         for _ in range(steps):
             self.state = self._advance(force, pose, v, dt / steps)
         return pose.lever * cylinders.force(self.state.pressures)
@@ -121,16 +128,3 @@ class HydraulicActuators:
         change = step * cylinders.pressure_rates(halfway, now.pressures, pose, v)
         change /= 1.0 + step * cylinders.pressure_decay(halfway, now.pressures, pose)
         return OilState(opening, np.maximum(now.pressures + change, VACUUM), integral)
-
-
-def _check_joints(robot: Robot) -> None:
-    """Raise `InputError` for joints that no crank can turn and for joints without a torque limit."""
-    for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
-        kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
-        if not kind.startswith("JointModelR"):
-            raise InputError(f"{joint} of {robot.name} slides ({kind}); hydraulic actuators here turn joints by a crank.")
-        if not np.isfinite(limit):
-            raise InputError(
-                f"{joint} of {robot.name} has no torque limit, so its cylinder has no size: "
-                f'load the robot with one, fb.load("{robot.name}", torque_limits=…).'
-            )

@@ -13,7 +13,6 @@ from floatbase.dynamics.contact import DEFAULT_MU, UP, OnePoint, check_ground
 from floatbase.errors import InputError
 from floatbase.robots import State
 
-Rows = Callable[[State, float], tuple[Array, Array]]
 _FLAT_WHEEL = 1e-6  # sine of the angle between axle and normal; below it rounding alone chooses the lowest point
 
 
@@ -31,7 +30,7 @@ class LinearConstraint:
 
     name: str
     m: int
-    rows: Rows
+    rows: Callable[[State, float], tuple[Array, Array]]
     mu: ClassVar[float] = np.inf  # there is no friction to run out of
     normal: ClassVar[Array] = UP  # plays no part
     point_names: ClassVar[tuple[str, ...]] = ()
@@ -62,10 +61,7 @@ class LinearConstraint:
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), checked."""
         A, b = self.rows(state, t)
-        return (
-            checked(f"A of {self.name}", A, (self.m, state.robot.nv)),
-            checked(f"b of {self.name}", b, (self.m,)),
-        )
+        return checked(f"A of {self.name}", A, (self.m, state.robot.nv)), checked(f"b of {self.name}", b, (self.m,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +113,7 @@ def fixed_frame(frame: str) -> LinearConstraint:
 
     With a floating base bolted by it, λ is what the document's Figure 1 (left) calls the reaction of the ground.
     """
-
-    def rows(state: State, t: float) -> tuple[Array, Array]:
-        return state.frame_jacobian(frame), -state.frame_drift(frame)
-
-    return LinearConstraint(f"bolts of {frame}", 6, rows)
+    return LinearConstraint(f"bolts of {frame}", 6, lambda state, t: (state.frame_jacobian(frame), -state.frame_drift(frame)))
 
 
 def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:

@@ -117,10 +117,7 @@ class Contacts:
         return entries
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one radius below its centre.
-
-        A `FrameTask` follows the frame's origin instead, which for most ball feet is the ball's centre.
-        """
+        """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one radius below its centre."""
         return read_only(np.vstack([np.zeros((0, 3)), *(contact.positions(state) for contact in self.items)]))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
@@ -129,16 +126,14 @@ class Contacts:
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
-        return self.rows(state, t)[1:]
+        parts = [contact.constraint(state, t) for contact in self.items]
+        b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
+        return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
     def rows(self, state: State, t: float = 0.0) -> tuple[Array, Array, Array]:
         """J of (4), shape (k, nv), with A, shape (m, nv), and b, shape (m,), of (5), all at time t, s."""
-        parts = [contact.constraint(state, t) for contact in self.items]
-        A = self._stacked(state, [part[0] for part in parts])
-        b = read_only(np.concatenate([np.zeros(0), *(part[1] for part in parts)]))
-        if all(contact.J_is_A for contact in self.items):
-            return A, A, b
-        return self.jacobian(state, t), A, b
+        A, b = self.constraint(state, t)
+        return A if all(contact.J_is_A for contact in self.items) else self.jacobian(state, t), A, b
 
     def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
         return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))

@@ -142,14 +142,9 @@ def seen_from_turning_frame(
         raise InputError("omega is a function of time; give its derivative too, omega_rate=lambda t: …, rad/s².")
     turn, rate = _as_function("omega", omega), _as_function("omega_rate", np.zeros(3) if omega_rate is None else omega_rate)
     R, start, v = _rotations(time, turn), checked("position", position, (3,), "m"), checked("velocity", velocity, (3,), "m/s")
-
-    def seen(vectors: Array) -> Array:
-        """Vectors of the world, shape (n, 3), in the frame's axes: Rᵀ x for each row."""
-        return np.einsum("nji,nj->ni", R, vectors)
-
-    p = seen(start + np.outer(time - time[0], v))
-    w, w_rate = seen(np.array([turn(t) for t in time])), seen(np.array([rate(t) for t in time]))
-    p_rate = seen(np.tile(v, (time.size, 1))) - np.cross(w, p)
+    world = [[start + (t - time[0]) * v, v, turn(t), rate(t)] for t in time]
+    p, v_turned, w, w_rate = np.einsum("nji,nkj->kni", R, world)  # Rᵀ x: in the frame's axes
+    p_rate = v_turned - np.cross(w, p)
     return TurningView(
         time=time,
         rotation=read_only(R),

@@ -51,7 +51,12 @@ def contact_space(eom: EquationsOfMotion) -> ContactSpace:
     """
     U, s, rows = _resolved(eom)
     P, w, Qt = np.linalg.svd(rows @ np.linalg.solve(eom.M, eom.J.T))
-    _check_fit(eom, w)
+    reached = int(np.sum(w > RANK_TOLERANCE * w.max(initial=0.0)))
+    if reached < w.size:
+        raise InputError(f"the contacts hold {w.size} directions of motion, but forces reach {reached}: A and J do not fit.")
+    beside = eom.J - eom.J @ np.linalg.pinv(eom.A, rcond=RANK_TOLERANCE) @ eom.A
+    if np.max(np.abs(beside), initial=0.0) > _FIT_TOLERANCE * np.max(np.abs(eom.J), initial=0.0):
+        raise InputError("forces act along motions that the contacts do not hold: A and J do not fit.")
     return ContactSpace(
         rows=read_only(rows),
         b=read_only((U.T @ eom.b) / s),
@@ -74,13 +79,3 @@ def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
     U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
     r = int(np.sum(s > MOTION_TOLERANCE * s.max(initial=0.0)))
     return U[:, :r], s[:r], Vt[:r]
-
-
-def _check_fit(eom: EquationsOfMotion, w: Array) -> None:
-    """Check that forces can hold every resolved row and act along rows of A only; w: singular values of rows M⁻¹ Jᵀ."""
-    reached = int(np.sum(w > RANK_TOLERANCE * w.max(initial=0.0)))
-    if reached < w.size:
-        raise InputError(f"the contacts hold {w.size} directions of motion, but forces reach {reached}: A and J do not fit.")
-    beside = eom.J - eom.J @ np.linalg.pinv(eom.A, rcond=RANK_TOLERANCE) @ eom.A
-    if np.max(np.abs(beside), initial=0.0) > _FIT_TOLERANCE * np.max(np.abs(eom.J), initial=0.0):
-        raise InputError("forces act along motions that the contacts do not hold: A and J do not fit.")

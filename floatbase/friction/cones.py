@@ -56,9 +56,8 @@ def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
     """
     f, n = checked("force", force, (3,), "N"), unit_vector("normal", normal)
     alpha = float(n @ f)
-    f_perp = alpha * n
-    f_par = f - f_perp
-    return Decomposition(read_only(f_perp), read_only(f_par), alpha, float(np.linalg.norm(f_par)))
+    f_par = f - alpha * n
+    return Decomposition(read_only(alpha * n), read_only(f_par), alpha, float(np.linalg.norm(f_par)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +129,10 @@ class FrictionPolyhedron:
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("normal", self.normal))
         object.__setattr__(self, "mu", positive("friction coefficient mu", self.mu))
-        object.__setattr__(self, "facets", _whole_facets(self.facets))
+        number = float(self.facets) if isinstance(self.facets, (int, float, np.number)) else np.nan
+        if not number.is_integer() or number < 3:
+            raise InputError(f"facets is {self.facets!r}; a polyhedron around a cone needs a whole number ≥ 3.")
+        object.__setattr__(self, "facets", int(number))
 
     @property
     def mu_facet(self) -> float:
@@ -202,11 +204,3 @@ def _status(slide: float, limit: float) -> Status:
     if slide > (1.0 + NEAR) * limit:
         return "outside"
     return "active" if slide > (1.0 - NEAR) * limit else "inside"
-
-
-def _whole_facets(facets: object) -> int:
-    """The number of facets, checked."""
-    number = float(facets) if isinstance(facets, (int, float, np.number)) else np.nan
-    if not number.is_integer() or number < 3:
-        raise InputError(f"facets is {facets!r}; a polyhedron around a cone needs a whole number ≥ 3.")
-    return int(number)

@@ -61,7 +61,8 @@ def vertices(farthest: Callable[[Array], Array], n: int, size: float) -> Array:
         return points[[int(np.argmin(flat)), int(np.argmax(flat))]]
     for _ in range(_ROUNDS):
         hull = _hull(flat)
-        normals, offsets = _facets(hull)
+        _, first = np.unique(np.round(hull.equations, _DIGITS), axis=0, return_index=True)
+        normals, offsets = hull.equations[first, :-1], hull.equations[first, -1]
         found = np.array([(farthest(basis @ normal) - origin) @ basis for normal in normals])
         beyond = np.einsum("ij,ij->i", normals, found) + offsets > tolerance
         if not np.any(beyond):
@@ -98,25 +99,18 @@ def _pointed_rows(rays: Array, c: Array) -> Array:
     section = ((plane @ rays) / (c @ rays)).T
     if n == 2:
         on_facets = {frozenset([int(np.argmin(section))]), frozenset([int(np.argmax(section))])}
-    else:
-        on_facets = _rays_on_facets(section)
+    else:  # all points on each facet of their convex hull
+        equations = _hull(section).equations
+        near = np.abs(section @ equations[:, :-1].T + equations[:, -1]) < _QHULL * float(np.max(np.abs(section)))
+        on_facets = {frozenset(np.flatnonzero(column).tolist()) for column in near.T}
     rows = [_row_through(rays, sorted(chosen)) for chosen in sorted(on_facets, key=sorted)]
     return np.array([row for row in rows if row is not None])
-
-
-def _rays_on_facets(section: Array) -> set[frozenset[int]]:
-    """For each facet of the convex hull of the points, all the points that lie on it."""
-    equations = _hull(section).equations
-    distance = section @ equations[:, :-1].T + equations[:, -1]
-    near = np.abs(distance) < _QHULL * float(np.max(np.abs(section)))
-    return {frozenset(np.flatnonzero(column).tolist()) for column in near.T}
 
 
 def _row_through(rays: Array, chosen: list[int]) -> Array | None:
     """The unit row that is 0 on the rays chosen and ≤ 0 on the others; None where they do not fix it (a sliver)."""
     U, s, _ = np.linalg.svd(rays[:, chosen])
-    n = len(rays)
-    if np.sum(s > _SLIVER * s[0]) != n - 1:
+    if np.sum(s > _SLIVER * s[0]) != len(rays) - 1:
         return None
     row = U[:, -1]
     return -np.sign(row @ rays.sum(axis=1)) * row
@@ -146,12 +140,6 @@ def _hull(points: Array) -> ConvexHull:
         return ConvexHull(points)
     except QhullError as error:
         raise SolverError(f"qhull found no hull of {len(points)} points in R^{points.shape[1]}: {error}") from None
-
-
-def _facets(hull: ConvexHull) -> tuple[Array, Array]:
-    """Unit normals, shape (m, n), and offsets, shape (m,), of the hull's facets; triangles of one facet count once."""
-    _, first = np.unique(np.round(hull.equations, _DIGITS), axis=0, return_index=True)
-    return hull.equations[first, :-1], hull.equations[first, -1]
 
 
 def _corners(hull: ConvexHull, points: Array, normals: Array, offsets: Array, tolerance: float) -> list[int]:

@@ -7,7 +7,6 @@ description for multi-contact stability of humanoids, RSS 2015.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -56,7 +55,11 @@ class WrenchSet:
         object.__setattr__(self, "cones", cones)
         object.__setattr__(self, "about", checked("about", self.about, (3,), "m"))
         object.__setattr__(self, "weight", positive("weight", self.weight, "N"))
-        object.__setattr__(self, "max_normal_force", _limits(self.max_normal_force, len(points)))
+        limits = np.asarray(self.max_normal_force)  # +inf is allowed
+        if limits.shape != (len(points),) or limits.dtype.kind not in "fi" or not np.all(limits > 0):
+            count = f"one number > 0 or {len(points)} of them, one for each contact point (N)"
+            raise InputError(f"max_normal_force must be {count}.")
+        object.__setattr__(self, "max_normal_force", read_only(limits))
 
     @cached_property
     def arm(self) -> float:
@@ -66,8 +69,8 @@ class WrenchSet:
     @cached_property
     def rays(self) -> Array:
         """The edges of all cones as wrenches, shape (6, N), point after point, each with normal component 1 N."""
-        at = np.split(grasp_matrix(self.points, self.about), len(self.points), axis=1)
-        return read_only(np.hstack([grasp @ cone.rays.T for grasp, cone in zip(at, self.cones, strict=True)]))
+        parts = [grasp_matrix(x[None], self.about) @ cone.rays.T for x, cone in zip(self.points, self.cones, strict=True)]
+        return read_only(np.hstack(parts))
 
     @cached_property
     def rows(self) -> Array:
@@ -133,8 +136,7 @@ class WrenchSet:
         add up to it. Raises `InputError` when the slice has no end, as where walls that face each other can be squeezed.
         """
         f = checked("force", (0.0, 0.0, self.weight) if force is None else force, (3,), "N")
-        size = float(np.linalg.norm(f)) * self.arm
-        return self._slice(self.rays[3:], self.rays[:3], f, size or self.arm)
+        return self._slice(self.rays[3:], self.rays[:3], f, (float(np.linalg.norm(f)) or 1.0) * self.arm)
 
     def support_region(self) -> Array:
         """Where the CoM may be for the robot to stand still: vertices of a polygon, shape (k, 2), m, world x and y.
@@ -159,10 +161,8 @@ class WrenchSet:
         def farthest(direction: Array) -> Array:
             result = linear_program(-(direction @ values), (fixed, at / scale), limits)
             if result.status == UNBOUNDED:
-                raise InputError(
-                    "this slice of the wrench set has no end: contacts can be squeezed against each other without "
-                    "limit. Give max_normal_force."
-                )
+                endless = "contacts can be squeezed against each other without limit"
+                raise InputError(f"this slice of the wrench set has no end: {endless}. Give max_normal_force.")
             if result.status == INFEASIBLE:
                 raise InfeasibleError("no contact forces add up to what was asked for.")
             return scale * (values @ result.x)
@@ -180,13 +180,10 @@ class WrenchSet:
     @cached_property
     def _force_rows(self) -> tuple[Array, Array]:
         """Facets and limits of all points on (λ, t): every slack at least t."""
-        P = len(self.points)
         rows, h = [], []
-        for i, (cone, limit) in enumerate(zip(self.cones, self.max_normal_force, strict=True)):
+        for at, cone, limit in zip(np.eye(len(self.points)), self.cones, self.max_normal_force, strict=True):
             own = np.vstack([cone.rows, cone.normal]) if np.isfinite(limit) else cone.rows
-            block = np.zeros((len(own), 3 * P + 1))
-            block[:, 3 * i : 3 * i + 3], block[:, -1] = own, 1.0
-            rows.append(block)
+            rows.append(np.hstack([np.kron(at, own), np.ones((len(own), 1))]))
             h.append(np.append(np.zeros(cone.facets), limit)[: len(own)])
         return np.vstack(rows), np.concatenate(h)
 
@@ -228,16 +225,7 @@ def wrench_set(
     coneless = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
     if coneless:
         raise InputError(f"{', '.join(coneless)} has forces without a cone; leave it out: contacts.without(…).")
-    cones = [FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True)]
+    cones = tuple(FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True))
     limits = np.asarray(np.inf if max_normal_force is None else max_normal_force)
     limits = np.repeat(limits, len(cones)) if limits.ndim == 0 else limits
-    return WrenchSet(contacts.positions(state), tuple(cones), state.com, state.robot.weight, limits)
-
-
-def _limits(limits: npt.ArrayLike, n: int) -> Array:
-    """Limits of the normal force, shape (n,); +inf is allowed, so `checked` will not do."""
-    with suppress(TypeError, ValueError):
-        values = read_only(limits)
-        if values.shape == (n,) and np.all(values > 0):
-            return values
-    raise InputError(f"max_normal_force must be one number > 0 or {n} of them, one for each contact point (N).")
+    return WrenchSet(contacts.positions(state), cones, state.com, state.robot.weight, limits)

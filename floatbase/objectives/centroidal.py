@@ -22,23 +22,18 @@ def momentum(state: State) -> Array:
     Linear m ẋ_c, angular Σ (x_i - x_c) × m_i ẋ_i over all particles: what (20)(21) say that outside forces change.
     """
     model = state.robot.model
-    found = pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v)
-    return read_only(np.concatenate([found.linear, found.angular]))
+    return read_only(pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v).vector)
 
 
 def momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
-    """Time derivative of `momentum` under the acceleration q̈, shape (6,), N and N·m, world.
+    """Time derivative of `momentum` under the acceleration q̈, shape (nv,), as v of `State`; shape (6,), N and N·m, world.
 
     Newton and Euler: (f_c + m g, τ_c), with the wrench (f_c, τ_c) of (20)(21) that the contact forces have about the centre of
     mass. Torques of the joints are internal and do not show up.
-
-    state: where the robot is and how it moves.
-    qdd: q̈, shape (nv,), base in the base frame, as v of `State`.
     """
     model = state.robot.model
     qdd = checked("qdd", qdd, (state.robot.nv,))
-    rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, qdd)
-    return read_only(np.concatenate([rate.linear, rate.angular]))
+    return read_only(pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, qdd).vector)
 
 
 def force_sum(contacts: Contacts) -> Array:
@@ -60,8 +55,7 @@ def com_wrench(state: State, contacts: Contacts) -> Affine:
     Only contacts whose forces act at points count. Raises `InputError` for others (`LinearConstraint`).
     """
     _only_points(contacts)
-    G_f, G_tau = force_sum(contacts), moment_sum(state, contacts)
-    return Affine.stack(force=Affine.linear(G_f), moment=Affine.linear(G_tau))
+    return Affine.stack(force=Affine.linear(force_sum(contacts)), moment=Affine.linear(moment_sum(state, contacts)))
 
 
 def wrench_objective(state: State, contacts: Contacts, force: npt.ArrayLike, moment: npt.ArrayLike) -> Quadratic:
@@ -83,9 +77,8 @@ def desired_wrench(
 
     com_acceleration: a, shape (3,), m/s². angular_momentum_rate: L̇ about the centre of mass, shape (3,), N·m.
     """
-    a = checked("com_acceleration", com_acceleration, (3,), "m/s²")
-    gravity = state.robot.model.gravity.linear
-    return read_only(state.robot.mass * (a - gravity)), checked("angular_momentum_rate", angular_momentum_rate, (3,))
+    free = checked("com_acceleration", com_acceleration, (3,), "m/s²") - state.robot.model.gravity.linear
+    return read_only(state.robot.mass * free), checked("angular_momentum_rate", angular_momentum_rate, (3,))
 
 
 def rotational_inertia(state: State) -> Array:
@@ -172,11 +165,10 @@ def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
 def _normals(contacts: Contacts) -> Array:
     """The normal of each point as a column, shape (k, n): the normal parts of λ are Nᵀ λ, and N Nᵀ λ as forces."""
     _only_points(contacts)
-    columns = np.eye(contacts.n_points)[:, None] * contacts.normals[:, :, None]
-    return columns.reshape(contacts.k, contacts.n_points)
+    return (np.eye(contacts.n_points)[:, None] * contacts.normals[:, :, None]).reshape(contacts.k, contacts.n_points)
 
 
 def _only_points(contacts: Contacts) -> None:
-    if contacts.k != 3 * contacts.n_points:
-        names = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
+    names = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
+    if names:
         raise InputError(f"{', '.join(names)} has forces that do not act at points; leave it out: contacts.without(…).")

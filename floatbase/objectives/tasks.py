@@ -29,26 +29,27 @@ _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing
 
 @runtime_checkable
 class Task(Protocol):
-    """A weighted residual on one block of x = (q̈, τ, λ)."""
+    """A weighted residual on one block of x = (q̈, τ, λ).
+
+    name: in messages and tables. weight: of ½‖residual‖² in the objective.
+    """
 
     block: ClassVar[Block]
 
     @property
-    def name(self) -> str:
-        """Name in messages and tables."""
-
+    def name(self) -> str: ...
     @property
-    def weight(self) -> float:
-        """Weight of ½‖residual‖² in the objective."""
-
+    def weight(self) -> float: ...
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """The residual as an `Affine` of the task's block at time t."""
 
 
-def _value(name: str, target: Target, t: float, shape: tuple[int, ...]) -> Array:
+def _value(name: str, target: Target | None, t: float, shape: tuple[int, ...]) -> Array:
     """A target at time t. One that does not move was checked when its task was made, but for the shape of a robot's own."""
     if isinstance(target, np.ndarray) and target.shape == shape:
         return target
+    if target is None:
+        return np.zeros(shape)
     return checked(name, target(t) if callable(target) else target, shape)
 
 
@@ -120,8 +121,8 @@ class OrientationTask:
     def __post_init__(self) -> None:
         _keep(self, (3,), "angular_velocity", "angular_acceleration")
         if not callable(self.rotation):
-            rotation = checked(f"rotation of {self.name}", self.rotation, (3, 3))
-            object.__setattr__(self, "rotation", read_only(nearest_rotation(self.name, rotation)))
+            rotation = nearest_rotation(self.name, checked(f"rotation of {self.name}", self.rotation, (3, 3)))
+            object.__setattr__(self, "rotation", rotation)
 
     @property
     def name(self) -> str:
@@ -199,12 +200,10 @@ class PostureTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
-        state, robot = eom.state, eom.robot
+        state, robot, zero = eom.state, eom.robot, np.zeros(eom.d)
         desired = _value("q of posture", self.q, t, (robot.nq,))
         check_unit_lengths(robot.model, "q of posture", desired, first=2 if robot.is_floating else 1)
-        e = state.difference(desired)[-robot.d :]
-        e_dot = state.v[-robot.d :]
-        return _motion_residual(self, robot.S.T, np.zeros(robot.d), np.zeros(robot.d), e, e_dot)
+        return _motion_residual(self, robot.S.T, zero, zero, state.difference(desired)[-robot.d :], state.v[-robot.d :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,8 +223,7 @@ class ForceTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """λ - target, shape (k,), N."""
-        target = np.zeros(eom.k) if self.target is None else _value("target forces", self.target, t, (eom.k,))
-        return Affine.identity(eom.k) - target
+        return Affine.identity(eom.k) - _value("target forces", self.target, t, (eom.k,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,8 +240,7 @@ class TorqueTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """τ - target, shape (d,), N·m."""
-        target = np.zeros(eom.d) if self.target is None else _value("target torques", self.target, t, (eom.d,))
-        return Affine.identity(eom.d) - target
+        return Affine.identity(eom.d) - _value("target torques", self.target, t, (eom.d,))
 
 
 def standing_tasks(state: State) -> tuple[Task, ...]:
@@ -254,8 +251,7 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
     """
     if not isinstance(state, State):
         raise InputError(f"standing_tasks needs a State, as robot.standing(), not {type(state).__name__}.")
-    rotation = state.frame_pose("base").rotation
-    return (CoMTask(state.com), OrientationTask("base", rotation), PostureTask(state.q))
+    return CoMTask(state.com), OrientationTask("base", state.frame_pose("base").rotation), PostureTask(state.q)
 
 
 def _motion_residual(
@@ -277,5 +273,4 @@ def nearest_rotation(name: str, R: Array) -> Array:
     if error < _ROTATION_ROUNDING:
         return R
     U, _, Vt = np.linalg.svd(R)
-    nearest: Array = U @ Vt
-    return nearest
+    return read_only(U @ Vt)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -32,17 +33,17 @@ def _balls(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0,
     return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
 
 
-def _soles(frames: Sequence[str], x: tuple[float, float], y: tuple[float, float]) -> tuple[Foot, ...]:
-    corners = np.array([[x[1], y[1], 0.0], [x[1], y[0], 0.0], [x[0], y[0], 0.0], [x[0], y[1], 0.0]])
-    return tuple(Foot(frame, corners=corners) for frame in frames)
-
-
-_SOLO_FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
-_SOLO_SOURCES = {
-    "foot radius": "half the width of the foot's mesh in example-robot-data",
-    "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular robot architecture, 2020 "
-    "(the URDF says 1000 N·m, which no motor of this size gives)",
-}
+_SOLE = np.array([[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]])  # of talos
+_solo = partial(
+    Entry,
+    feet=_balls(("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"), 0.016),
+    torque_limit=2.7,
+    sources={
+        "foot radius": "half the width of the foot's mesh in example-robot-data",
+        "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular robot architecture, 2020 "
+        "(the URDF says 1000 N·m, which no motor of this size gives)",
+    },
+)
 
 CATALOGUE: Mapping[str, Entry] = {
     "go2": Entry(
@@ -50,18 +51,8 @@ CATALOGUE: Mapping[str, Entry] = {
         _balls(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022),
         sources={"foot radius": "the foot's mesh in example-robot-data", "torque limits": "URDF"},
     ),
-    "solo12": Entry(
-        "small quadruped with 3 joints a leg, weak motors: torque limits are near",
-        _balls(_SOLO_FEET, 0.016),
-        torque_limit=2.7,
-        sources=_SOLO_SOURCES,
-    ),
-    "solo8": Entry(
-        "small quadruped with 2 joints a leg: fewer torques than contact forces",
-        _balls(_SOLO_FEET, 0.016),
-        torque_limit=2.7,
-        sources=_SOLO_SOURCES,
-    ),
+    "solo12": _solo("small quadruped with 3 joints a leg, weak motors: torque limits are near"),
+    "solo8": _solo("small quadruped with 2 joints a leg: fewer torques than contact forces"),
     "anymal_kinova": Entry(
         "quadruped with an arm: more torques than contact forces",
         _balls(("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), 0.031, (0.0, 0.0, 0.02325)),
@@ -69,7 +60,7 @@ CATALOGUE: Mapping[str, Entry] = {
     ),
     "talos": Entry(
         "humanoid with flat feet: each foot carries a wrench through its corners",
-        _soles(("left_sole_link", "right_sole_link"), (-0.1, 0.1), (-0.06, 0.06)),
+        tuple(Foot(frame, corners=_SOLE) for frame in ("left_sole_link", "right_sole_link")),
         sources={"sole": "20 cm × 12 cm, within the ankle's collision mesh", "torque limits": "URDF"},
     ),
     "ur5": Entry(

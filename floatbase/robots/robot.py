@@ -108,15 +108,12 @@ class Robot:
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the actuated joints, in the order of τ."""
-        first = 2 if self.is_floating else 1
-        return tuple(self.model.names[i] for i in range(first, self.model.njoints))
+        return tuple(self.model.names)[2 if self.is_floating else 1 :]
 
     @cached_property
     def S(self) -> Array:
         """(2)(3) The actuation matrix, shape (nv, d): S τ puts zeros where no motor acts. Source: the document, §2."""
-        S = np.zeros((self.nv, self.d))
-        S[self.nv - self.d :] = np.eye(self.d)
-        return read_only(S)
+        return read_only(np.eye(self.nv, self.d, self.d - self.nv))
 
     @cached_property
     def mass(self) -> float:
@@ -169,14 +166,13 @@ class Robot:
         """The state with all joints at zero and the base at the world's origin, at rest."""
         from floatbase.robots.state import State
 
-        return State(self, pin.neutral(self.model), np.zeros(self.nv))
+        return State(self, pin.neutral(self.model))
 
     def standing(self, height: float | None = None) -> State:
         """A state at rest with every foot on the ground z = 0.
 
-        height: how far above the ground the base's origin should be, m; by default as the posture has it. Found by
-        Gauss-Newton steps of smallest size from the robot's posture. Raises `InputError` when the feet cannot get
-        there. A fixed-base robot, or one without feet, gets its posture.
+        height: how far above the ground the base's origin should be, m; by default as the posture has it. Raises `InputError`
+        when the feet cannot get there. A fixed-base robot, or one without feet, gets its posture.
         """
         from floatbase.robots.standing import stand
 
@@ -194,13 +190,11 @@ class Robot:
         spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with
         that deviation in rad/s and m/s. Joints stay within their limits.
         """
-        from floatbase.robots.state import State
-
-        rng = np.random.default_rng(seed)
+        rng, standing = np.random.default_rng(seed), self.standing()
         spread = positive("spread", spread, allow_zero=True)
-        q = self.standing().integrate(rng.uniform(-spread, spread, self.nv))
+        q = standing.integrate(rng.uniform(-spread, spread, self.nv))
         q = np.clip(q, self.model.lowerPositionLimit, self.model.upperPositionLimit)
-        return State(self, q, spread * rng.standard_normal(self.nv))
+        return standing.replace(q, spread * rng.standard_normal(self.nv))
 
     def __repr__(self) -> str:
         base = "floating" if self.is_floating else "fixed"
@@ -208,9 +202,7 @@ class Robot:
 
 
 def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", first: int = 1) -> None:
-    """Check that quaternions, and (cos, sin) of joints without limits, have length 1 in a configuration.
-
-    Raises `InputError` with the entries, what to divide by, and the hint.
+    """Check that quaternions, and (cos, sin) of joints without limits, have length 1 in a configuration, else `InputError`.
 
     model: the Pinocchio model.
     name: of the configuration, for the message.

@@ -27,15 +27,14 @@ def stand(robot: Robot, height: float | None = None) -> State:
     state = State(robot, q)
     for _ in range(_STEPS):
         error, J = _gap(state, posture, height)
-        if np.max(np.abs(error)) < _TOLERANCE:
+        remains = np.max(np.abs(error))
+        if remains < _TOLERANCE:
             return state
         step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
         state = State(robot, pin.integrate(robot.model, state.q, np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)))
-    raise InputError(
-        f"{robot.name} cannot put all its feet on the ground"
-        + (f" with its base {height:g} m above it" if height is not None else "")
-        + f": {np.max(np.abs(error)):.2g} m remain. Ask for another height, or load it with another posture."
-    )
+    where = "" if height is None else f" with its base {height:g} m above it"
+    advice = "Ask for another height, or load it with another posture."
+    raise InputError(f"{robot.name} cannot put all its feet on the ground{where}: {remains:.2g} m remain. {advice}")
 
 
 def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Array]:
@@ -52,14 +51,10 @@ def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Arr
             up = R[:, 2]
             errors += [up[0], up[1]]
             rows += list((-pin.skew(up) @ J[3:])[:2])  # d(up)/dt = ω × up
-    R = state.frame_pose("base").rotation
-    J_base = np.eye(state.robot.nv)[:6]
-    errors += list(pin.log3(posture.frame_pose("base").rotation.T @ R))
-    rows += list(J_base[3:])
-    offset = state.q[:3] - [*posture.q[:2], 0.0 if height is None else height]
-    fixed = 2 if height is None else 3
-    errors += list(offset[:fixed])
-    rows += list((R @ J_base[:3])[:fixed])
+    R, J_base = state.frame_pose("base").rotation, np.eye(6, state.robot.nv)
+    target = posture.q[:2] if height is None else [*posture.q[:2], height]
+    errors += [*pin.log3(posture.frame_pose("base").rotation.T @ R), *(state.q[: len(target)] - target)]
+    rows += [*J_base[3:], *(R @ J_base[:3])[: len(target)]]
     return np.array(errors), np.array(rows)
 
 

@@ -64,10 +64,9 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         motor.set_to_motor()
         if np.isfinite(limit):
             motor.ctrlrange = [-limit, limit]
-    quat = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quat, np.array(ground.normal))
-    plane, size = mujoco.mjtGeom.mjGEOM_PLANE, [0.0, 0.0, 0.05]
-    spec.worldbody.add_geom(name="ground", type=plane, size=size, quat=quat, contype=1, conaffinity=0)
+    plane = spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0)
+    plane.size[2] = 0.05  # MuJoCo wants one, and does not use it
+    mujoco.mju_quatZ2Vec(plane.quat, np.array(ground.normal))
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
         _add_foot(spec, foot, feet.point_names)
     try:
@@ -129,10 +128,10 @@ def _has_valid_inertia(body: mujoco.MjsBody) -> bool:
 
 def _move_inertia_to_neighbour(body: mujoco.MjsBody) -> None:
     """Add a link's invalid inertia to that of the heaviest link welded to it: the robot moves by their sum alone."""
-    welded = {child.name: (child, _placement(child).inverse()) for child in body.bodies if not child.joints}
+    welded = [(child, _placement(child).inverse()) for child in body.bodies if not child.joints]
     if not body.joints and body.parent.name != "world":
-        welded[body.parent.name] = (body.parent, _placement(body))
-    neighbours = [found for found in welded.values() if np.isfinite(found[0].fullinertia[0])]
+        welded.append((body.parent, _placement(body)))
+    neighbours = [found for found in welded if np.isfinite(found[0].fullinertia[0])]
     if not neighbours:
         return  # MuJoCo names the body when it compiles
     neighbour, placement = max(neighbours, key=lambda found: float(found[0].mass))
@@ -157,6 +156,5 @@ def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
         centres, radius = foot.centre[None], max(foot.radius, _SMALLEST_BALL)
     else:
         centres, radius = foot.corners + [0.0, 0.0, _CORNER_RADIUS], _CORNER_RADIUS
-    for name, centre in zip(names, centres, strict=True):
-        sphere, size = mujoco.mjtGeom.mjGEOM_SPHERE, [radius, 0.0, 0.0]
-        body.add_geom(name=name, type=sphere, size=size, pos=centre, mass=0.0, contype=0, conaffinity=1)
+    for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
+        body.add_geom(name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1)

@@ -21,12 +21,10 @@ class Conversion:
         self._robot = robot
         self._floating = 6 if robot.is_floating else 0
         ids = [model.joint(name).id for name in robot.joint_names]
-        self._qpos = np.array([model.jnt_qposadr[i] for i in ids], dtype=int)
-        self._qvel = np.array([model.jnt_dofadr[i] for i in ids], dtype=int)
+        self._qpos, self._qvel = model.jnt_qposadr[ids], model.jnt_dofadr[ids]
         joints = [robot.model.getJointId(name) for name in robot.joint_names]
-        self._q = np.array([robot.model.idx_qs[j] for j in joints], dtype=int)
-        # Pinocchio stores the angle of a joint without limits as (cos, sin)
-        self._unlimited = np.array([robot.model.nqs[j] == 2 for j in joints], dtype=bool)
+        self._q = np.array(robot.model.idx_qs)[joints]
+        self._unlimited = np.array(robot.model.nqs)[joints] == 2  # Pinocchio stores the angle of such a joint as (cos, sin)
         self._cos = self._q[self._unlimited]
         base = [0, 1, 2, 4, 5, 6, 3] if self._floating else []
         self._q_from = np.array(base + [0] * (robot.nq - len(base)), dtype=int)  # index in qpos of each entry of q
@@ -57,10 +55,8 @@ class Conversion:
         if self._floating:
             qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
             qvel[:3], qvel[3:6] = rotation_matrix(qpos[3:7]) @ v[:3], v[3:6]
-        angles = q[self._q]
-        angles[self._unlimited] = np.arctan2(q[self._cos + 1], q[self._cos])
-        qpos[self._qpos] = angles
-        qvel[self._qvel] = v[self._floating :]
+        qpos[self._qpos], qvel[self._qvel] = q[self._q], v[self._floating :]
+        qpos[self._qpos[self._unlimited]] = np.arctan2(q[self._cos + 1], q[self._cos])
         return qpos, qvel
 
 

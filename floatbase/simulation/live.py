@@ -148,7 +148,7 @@ class Live:
             stop.wait(max(0.0, due - time.monotonic()))
 
     def _slice(self, stop: threading.Event) -> None:
-        """One slice of physics, shown."""
+        """One slice of physics, shown; then go on, or stop because of its outcome or because nobody has called for long."""
         with self._lock:
             controller, requested, reset = self._controller, self._requested, self._reset_requested
             self._requested, self._reset_requested = [], False
@@ -167,10 +167,6 @@ class Live:
             outcome = record.outcome if record.error is None else f"{record.outcome}: {record.error}"
         except Exception as error:  # whatever a learner's controller raises must show, or the picture just stands still
             outcome, self.error = f"stopped: {type(error).__name__}: {error}", error
-        self._conclude(outcome, stop)
-
-    def _conclude(self, outcome: str, stop: threading.Event) -> None:
-        """Go on, or stop because of a slice's outcome or because nobody has called for long."""
         with self._lock:
             if self._reset_requested:  # the outcome is about a robot that is put back next
                 return

@@ -75,8 +75,7 @@ class Simulation:
         self._point_of_geom[self._balls] = np.arange(len(self._balls))
         self._below = self.model.geom_size[self._balls, :1] * self.ground.normal
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
-        # views into MuJoCo's memory
-        self._base_position = self.data.xpos[self._base]
+        self._base_position = self.data.xpos[self._base]  # a view into MuJoCo's memory, as the next one
         self._base_vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
         self.reset()
 
@@ -113,8 +112,7 @@ class Simulation:
     @property
     def diverged(self) -> bool:
         """Whether positions, velocities, accelerations or torques became infinite, NaN or larger than MuJoCo takes."""
-        qpos, qvel = self.data.qpos, self.data.qvel
-        # MuJoCo itself finds out only in the next step
+        qpos, qvel = self.data.qpos, self.data.qvel  # MuJoCo itself finds out only in the next step
         return not isfinite(qpos @ qpos + qvel @ qvel) or bool(self.data.warning.number[_FATAL:].any())
 
     @property

@@ -130,8 +130,14 @@ class Recorder:
     def finished(self, pushes: tuple[Push, ...], outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
         """The record. Raises `InputError` where a contact was of one kind in one stance and of another in a later one."""
         contacts = self._first
-        for stance in dict.fromkeys(self._stances):
-            contacts = _joined(contacts, stance)
+        for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
+            if contact.name not in contacts.names:
+                contacts += Contacts([contact])
+            elif contact.k != contacts[contact.name].k:
+                raise InputError(
+                    f"contact {contact.name} had {contacts[contact.name].k} force numbers at first and now has {contact.k}; "
+                    "in one rollout it must stay a point, or a flat foot."
+                )
         measured, positions = self._at_contacts(contacts)
         return Rollout(
             self._sim.robot,
@@ -178,18 +184,3 @@ class Recorder:
             all_forces.append(forces)
             all_positions.append(positions)
         return read_only(np.concatenate(all_forces, axis=1)), read_only(np.concatenate(all_positions, axis=1))
-
-
-def _joined(contacts: Contacts, stance: Contacts) -> Contacts:
-    """The contacts and, after them, those of a stance whose names are not among them yet.
-
-    Raises `InputError` for a contact that has become one of another kind.
-    """
-    for contact in stance:
-        if contact.name in contacts.names and contact.k != contacts[contact.name].k:
-            raise InputError(
-                f"contact {contact.name} had {contacts[contact.name].k} force numbers at first and now has {contact.k}; "
-                "in one rollout it must stay a point, or a flat foot."
-            )
-    new = [contact for contact in stance if contact.name not in contacts.names]
-    return contacts + Contacts(new) if new else contacts

@@ -81,10 +81,11 @@ def rollout(
         stance = _stance(sim, controller)
         planned = _planned(command, stance)
         try:
-            torques_and_forces = _act(sim, _desired(sim, command), substeps, pushes, actuators)
+            desired = _desired(sim, command)
+            tau, forces = _act(sim, desired, substeps, pushes, actuators)
         except _NotFinite as failure:
             return record.finished(pushes, "controller failed", failure)
-        record.during(*torques_and_forces, stance, planned)
+        record.during(tau, desired, forces, stance, planned)
         if sim.diverged:
             return record.finished(pushes, "diverged")
         if sim.fallen:
@@ -108,7 +109,6 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
         raise InputError(f"rollout needs a Simulation first, as fb.Simulation(robot), not {sim!r}.")
     if not callable(controller):
         raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
-    _check_call(controller)
     robot = getattr(controller, "robot", sim.robot)
     if robot is not sim.robot:
         raise InputError(
@@ -120,14 +120,10 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
         if not isinstance(push, Push):
             raise InputError(f"pushes must hold fb.Push values; {push!r} is none.")
         sim.pushed_body(push)
-
-
-def _check_call(controller: Controller) -> None:
-    """Raise `InputError` for a controller that does not take (q, v, t). Compiled ones that hide their parameters pass."""
     try:
         signature = inspect.signature(controller)
     except (TypeError, ValueError):
-        return
+        return  # compiled functions hide their parameters
     try:
         signature.bind(None, None, 0.0)
     except TypeError as error:
@@ -150,8 +146,8 @@ def _stance(sim: Simulation, controller: Controller) -> Contacts:
 
 def _act(
     sim: Simulation, desired: Array, substeps: int, pushes: tuple[Push, ...], actuators: Actuators | None
-) -> tuple[Array, Array, Array]:
-    """Go on for a control period: the mean of the torques given, those desired, the mean of the contact forces."""
+) -> tuple[Array, Array]:
+    """Go on for a control period: the means of the torques given and of the contact forces."""
     applied, forces, tau = np.zeros(sim.robot.d), np.zeros((len(sim.point_names), 3)), desired
     for _ in range(substeps):
         if actuators is not None:
@@ -159,7 +155,7 @@ def _act(
         sim.advance(tau, pushes)
         applied += sim.torques()
         forces += sim.contact_forces()
-    return applied / substeps, desired, forces / substeps
+    return applied / substeps, forces / substeps
 
 
 def _desired(sim: Simulation, command: Any) -> Array:
