@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from floatbase._arrays import Array
-from floatbase.control.tick.tables import CONTACT_KINDS, TASK_KINDS, dynamics_of, tables_of
+from floatbase.control.tick.tables import CONTACT_KINDS, TASK_KINDS, UNIT, dynamics_of, tables_of
 from floatbase.errors import InputError
 from floatbase.objectives import Task, nearest_rotation
 from floatbase.robots import Robot
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 # joints whose axes stand still in their own frame
 _JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
-_UNIT = 1e-6  # part by which (cos, sin) in a posture may miss length 1, as for `State`
 
 
 @contextmanager
@@ -177,4 +176,4 @@ class Compiled:
     def _has_unit_turns(self, q: Array) -> bool:
         """Whether (cos, sin) of joints without limits have length 1."""
         turns = [first for _, _, _, first, count in self.dynamics.tree[1:] if count == 2]
-        return all(abs(np.hypot(q[first], q[first + 1]) - 1.0) <= _UNIT for first in turns)
+        return all(abs(np.hypot(q[first], q[first + 1]) - 1.0) <= UNIT for first in turns)

@@ -20,7 +20,7 @@ from floatbase.qp import FEASIBILITY_TOLERANCE
 INACCURATE, INFEASIBLE = -2, -3  # why there is no answer: it lacks digits, or there seems to be none
 FLAT_COST = 1e-13  # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
 PARALLEL = 1e-12  # part of a row, squared, outside the active rows: with less it depends on them
-NEWTON_STEPS = 3  # at most, each to half as many lost digits or better
+NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
 SETTLED = 1e-6  # part of β: what a step this small leaves is rounding
 UNSETTLED = 1e-4  # part of β that the last step may still move
 WRONG_SIGN = 1e-9  # part of the largest multiplier by which one may be negative through rounding

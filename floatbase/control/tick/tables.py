@@ -30,6 +30,7 @@ TASK_KINDS: dict[type, int] = {
 }  # fmt: skip
 POINT, FLAT = range(2)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
+UNIT = 1e-6  # part by which a quaternion or (cos, sin) may miss length 1, as for `State`
 _POSE = 12  # numbers of a pose: rotation column by column, then position
 
 

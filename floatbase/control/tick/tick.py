@@ -23,11 +23,11 @@ from floatbase.control.tick.inequalities import Inequalities, affine_value
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, count_motion_rows, forward_velocities
 from floatbase.control.tick.memory import all_finite, take_matrix, take_vector
+from floatbase.control.tick.tables import UNIT
 
 INVALID, STOPPED = -1, -4
 PARTS = 4  # of a tick: contact rows, elimination, costs, optimum
 FAR = 1e8  # m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
-UNIT = 1e-6  # part by which a quaternion or (cos, sin) may miss length 1, as for `State`
 
 
 @jit_inline
