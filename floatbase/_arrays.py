@@ -27,16 +27,14 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
     try:
         array = read_only(value)
     except (TypeError, ValueError):
-        required = f"numbers of shape {_shape_text(shape)}" if shape else "a number"
+        required = f"numbers of shape {_text(shape)}" if shape else "a number"
         raise InputError(f"{name} must be {required}, not {value!r}.") from None
     fits = array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
     if not fits:
-        unit_text = f" ({unit})" if unit else ""
-        raise InputError(f"{name} has shape {array.shape}; it must have shape {_shape_text(shape)}{unit_text}.")
+        raise InputError(f"{name} has shape {array.shape}; it must have shape {_text(shape)}{f' ({unit})' if unit else ''}.")
     if not np.all(np.isfinite(array)):
-        where = np.argwhere(~np.isfinite(array))[0]
-        at = ", ".join(str(i) for i in where)
-        raise InputError(f"{name} holds {array[tuple(where)]} at index [{at}]; every entry must be a finite number.")
+        where = np.argwhere(~np.isfinite(array))[0].tolist()
+        raise InputError(f"{name} holds {array[tuple(where)]} at index {where}; every entry must be a finite number.")
     return array
 
 
@@ -66,5 +64,5 @@ def cross(a: Array, b: Array) -> Array:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def _shape_text(shape: tuple[int | None, ...]) -> str:
-    return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+def _text(shape: tuple[int | None, ...]) -> str:
+    return str(shape).replace("None", "any")

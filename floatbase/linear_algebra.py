@@ -15,7 +15,7 @@ def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
 
     absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding altogether.
     """
-    return _rank(np.linalg.svd(np.asarray(A, dtype=np.float64), compute_uv=False), absolute)
+    return ranked_svd(A, absolute)[3]
 
 
 def ranked_svd(A: npt.ArrayLike, absolute: bool = False) -> tuple[Array, Array, Array, int]:
@@ -25,7 +25,8 @@ def ranked_svd(A: npt.ArrayLike, absolute: bool = False) -> tuple[Array, Array, 
     its last n - r rows span the null space of A.
     """
     U, s, Vt = np.linalg.svd(np.asarray(A, dtype=np.float64))
-    return U, s, Vt, _rank(s, absolute)
+    largest = 1.0 if absolute else float(s.max(initial=0.0))
+    return U, s, Vt, int(np.sum(s > RANK_TOLERANCE * largest))
 
 
 def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
@@ -38,9 +39,3 @@ def row_lengths(rows: Array) -> Array:
     """Euclidean length of each row, shape (m,), 1 for a row of zeros: the unit to compare violations of rows in."""
     size = np.linalg.norm(rows, axis=1)
     return np.where(size > 0.0, size, 1.0)
-
-
-def _rank(s: Array, absolute: bool) -> int:
-    """How many of the singular values count."""
-    largest = 1.0 if absolute else float(s.max(initial=0.0))
-    return int(np.sum(s > RANK_TOLERANCE * largest))

@@ -5,16 +5,18 @@ Lists of robots are collected from the package, so a robot that joins the catalo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
+from scipy.optimize import linprog
 
 import floatbase as fb
 from floatbase.dynamics import EquationsOfMotion
+from floatbase.qp import QP
 from floatbase.robots import Robot, State
 from floatbase.simulation import Conversion
 
@@ -192,3 +194,15 @@ def relative(found: npt.ArrayLike, wanted: npt.ArrayLike) -> float:
     """Largest difference, relative to the largest entry wanted."""
     found, wanted = np.asarray(found, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
     return float(np.max(np.abs(found - wanted), initial=0.0) / max(float(np.max(np.abs(wanted), initial=0.0)), 1e-12))
+
+
+def is_feasible(qp: QP, rows: list[int]) -> bool:
+    """Whether a point satisfies the equalities and these inequality rows, by a linear program on the whole problem."""
+    found = linprog(np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, bounds=(None, None), method="highs")
+    return bool(found.status == 0)
+
+
+def is_smallest_conflict(qp: QP, names: Iterable[str]) -> bool:
+    """Whether these inequality rows are impossible together, and possible without any one of them."""
+    rows = [qp.inequality_names.index(name) for name in names]
+    return not is_feasible(qp, rows) and all(is_feasible(qp, [i for i in rows if i != row]) for row in rows)

@@ -1,11 +1,4 @@
-"""One contact with the ground: the motion it holds and the points where its forces act (§2.1, (5)).
-
-A contact has three parts: the rows A q̈ = b of the motion it holds, the points where its forces act (their Jacobian J brings
-them into the equations of motion as Jᵀ λ), and the friction cone of each point. For a point contact A is J. A flat foot
-holds 6 rows and has forces at its corners.
-
-Forces are what the ground does to the robot, in the world-aligned frame, three numbers a point, stacked in order.
-"""
+"""One contact with the ground: the motion it holds and the points where its forces act (§2.1, (5))."""
 
 from __future__ import annotations
 
@@ -24,7 +17,9 @@ DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry c
 
 @runtime_checkable
 class Contact(Protocol):
-    """What every contact offers.
+    """What every contact offers: rows A q̈ = b of the motion it holds, points where its forces act, a friction cone for each.
+
+    Forces are what the ground does to the robot, world-aligned, three numbers a point, stacked in order.
 
     name: in messages, active rows and pictures.
     mu: coefficient of friction.
@@ -151,8 +146,7 @@ class FlatFootContact:
 
     def __post_init__(self) -> None:
         check_ground(self)
-        corners = checked(f"corners of {self.frame}", self.corners, (None, 3), "m")
-        object.__setattr__(self, "corners", spread_corners(self.frame, corners))
+        object.__setattr__(self, "corners", spread_corners(self.frame, self.corners))
 
     @property
     def name(self) -> str:

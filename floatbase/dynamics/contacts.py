@@ -21,9 +21,9 @@ Normals: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike] | None
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts:
-    """Contacts stacked in order, with their names. Immutable; `only`, `without` and `+` make new ones.
+    """Contacts stacked in order; none at all for free flight. `only`, `without` and `+` make new ones.
 
-    items: the contacts; none at all for free flight. Raises `InputError` for a name that stands twice.
+    Raises `InputError` for a name that stands twice.
     """
 
     items: Sequence[Contact]
@@ -55,7 +55,7 @@ class Contacts:
         normals: world, out of the ground: (3,) for all, (n, 3) in the order of the frames, or a mapping from frame to (3,);
             straight up by default.
         """
-        return Contacts([_point(*each) for each in _feet(robot, frames, mu, normals)])
+        return Contacts([_contact(*each, flat=False) for each in _feet(robot, frames, mu, normals)])
 
     @staticmethod
     def flat_feet(
@@ -69,7 +69,7 @@ class Contacts:
                     f"{foot.frame} of {robot.name} is not a flat foot; use fb.Contacts.points, or load the robot with "
                     "feet=[floatbase.robots.Foot(frame, corners=…)]."
                 )
-        return Contacts([_flat_or_point(*one) for one in each])
+        return Contacts([_contact(*one) for one in each])
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU) -> Contacts:
@@ -77,7 +77,7 @@ class Contacts:
 
         mu: as for `points`.
         """
-        return Contacts([_flat_or_point(*each) for each in _feet(robot, None, mu, None)] if robot.feet else [])
+        return Contacts([_contact(*each) for each in _feet(robot, None, mu, None)] if robot.feet else [])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -112,8 +112,7 @@ class Contacts:
     @cached_property
     def point_entries(self) -> npt.NDArray[np.intp]:
         """Which entries of λ are forces at points, shape (3 n,): all but those of a `LinearConstraint`."""
-        of_points = [np.full(contact.k, bool(contact.point_names)) for contact in self.items]
-        entries = np.flatnonzero(np.concatenate([np.zeros(0, dtype=bool), *of_points]))
+        entries = np.flatnonzero([bool(contact.point_names) for contact in self.items for _ in range(contact.k)])
         entries.flags.writeable = False
         return entries
 
@@ -146,9 +145,9 @@ class Contacts:
 
     def force_slice(self, name: str) -> slice:
         """Which entries of λ belong to a contact."""
-        at = self.items.index(self[name])
-        start = sum(contact.k for contact in self.items[:at])
-        return slice(start, start + self.items[at].k)
+        contact = self[name]
+        start = sum(before.k for before in self.items[: self.items.index(contact)])
+        return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
         """The force of one contact among λ, shape (3,), N, world: for a flat foot the resultant of its corners.
@@ -175,10 +174,9 @@ class Contacts:
         return Contacts([contact for contact in self.items if contact not in dropped])
 
     def __getitem__(self, name: str) -> Contact:
-        for contact in self.items:
-            if contact.name == name:
-                return contact
-        raise unknown_name("contact", name, self.names)
+        if name not in self.names:
+            raise unknown_name("contact", name, self.names)
+        return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
         if not isinstance(other, Contacts):
@@ -195,12 +193,10 @@ class Contacts:
         return f"Contacts({', '.join(self.names)}; k={self.k})"
 
 
-def _point(foot: Foot, mu: float, normal: Array) -> Contact:
+def _contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:
+    if flat and foot.corners is not None:
+        return FlatFootContact(foot.frame, foot.corners, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
-
-
-def _flat_or_point(foot: Foot, mu: float, normal: Array) -> Contact:
-    return _point(foot, mu, normal) if foot.corners is None else FlatFootContact(foot.frame, foot.corners, normal, mu)
 
 
 def _feet(robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals) -> list[tuple[Foot, float, Array]]:
@@ -220,9 +216,8 @@ def _feet(robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Norm
 def _each(argument: str, value: Any, names: Sequence[str], default: Any, shape: tuple[int, ...] = ()) -> list[Any]:
     """One value of this shape for each name: the same for all, one after the other, or by name with a default."""
     if isinstance(value, Mapping):
-        for name in value:
-            if name not in names:
-                raise unknown_name(f"contact frame in {argument}", name, names)
+        for name in set(value) - set(names):
+            raise unknown_name(f"contact frame in {argument}", name, names)
         return [value.get(name, default) for name in names]
     if np.ndim(value) == len(shape):
         return [value] * len(names)

@@ -22,14 +22,10 @@ _STEP = 1e-5  # m and rad to each side for central differences: curvature and ro
 
 @dataclass(frozen=True, eq=False)
 class BiasForces:
-    """h = gravity + centrifugal + coriolis, each of shape (nv,), in the units of h: N and N·m.
+    """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each (nv,), N and N·m as h.
 
     Which is which depends on the coordinates: v holds the base's velocity in the base frame, so ω × v of the base counts as
     Coriolis. Source: the document, Appendix A.
-
-    gravity: g(q).
-    centrifugal: the terms in v_i².
-    coriolis: the terms in v_i v_j, i ≠ j.
     """
 
     gravity: Array
@@ -38,7 +34,7 @@ class BiasForces:
 
     @property
     def fictitious(self) -> Array:
-        """The part that comes from moving along curved coordinates, shape (nv,): C(q, v) v."""
+        """The part that comes from moving along curved coordinates, shape (nv,): C v."""
         return read_only(self.centrifugal + self.coriolis)
 
     @property
@@ -48,11 +44,7 @@ class BiasForces:
 
 
 def bias_forces(state: State) -> BiasForces:
-    """App. A: h(q, v) taken apart.
-
-    The velocity part is a quadratic form, Σ_ij Γ_ij v_i v_j. Moving one coordinate alone gives Γ_ii; the rest of
-    h, without gravity and all Γ_ii v_i², are the products of two different velocities.
-    """
+    """App. A: h(q, v) taken apart. The velocity part is Σ_ij Γ_ij v_i v_j; moving one coordinate alone gives Γ_ii."""
     model = state.robot.model
     data = model.createData()
     g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
@@ -94,8 +86,7 @@ def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
     """App. A, the one-link robot: ω × (ω × r), shape (3,), m/s², of a point on a link that turns at constant rate.
 
     omega: (3,) rad/s; r: (3,) m, from a point of the axis to the point of the link, both in one frame, which is the
-    answer's too. It points at the axis and has the size ω² times the distance from it; the particles around the point
-    must pull it inward by that much times its mass.
+    answer's too. It points at the axis and has the size ω² times the distance from it.
     """
     omega = checked("omega", omega, (3,), "rad/s")
     return read_only(np.cross(omega, np.cross(omega, checked("r", r, (3,), "m"))))
@@ -149,10 +140,8 @@ def seen_from_turning_frame(
         raise InputError("time must hold at least one instant, and each must come after the one before.")
     if callable(omega) and omega_rate is None:
         raise InputError("omega is a function of time; give its derivative too, omega_rate=lambda t: …, rad/s².")
-    rate = _as_function("omega_rate", (0.0, 0.0, 0.0) if omega_rate is None else omega_rate)
-    turn = _as_function("omega", omega)
-    R = _rotations(time, turn)
-    start, v = checked("position", position, (3,), "m"), checked("velocity", velocity, (3,), "m/s")
+    turn, rate = _as_function("omega", omega), _as_function("omega_rate", np.zeros(3) if omega_rate is None else omega_rate)
+    R, start, v = _rotations(time, turn), checked("position", position, (3,), "m"), checked("velocity", velocity, (3,), "m/s")
 
     def seen(vectors: Array) -> Array:
         """Vectors of the world, shape (n, 3), in the frame's axes: Rᵀ x for each row."""

@@ -43,11 +43,10 @@ class ContactSpace:
 def contact_space(eom: EquationsOfMotion) -> ContactSpace:
     """The resolved part of the contacts of (7), by singular values of A (tolerance `MOTION_TOLERANCE`).
 
-    Where J loses rank (solo8 on four feet), nearby states have a singular value σ that is small and of no use: measured
-    angles and velocities are not good enough to tell it from 0, and ζ would multiply their noise in b by 1/σ². So such a
-    direction is left out altogether: no row holds it, no force is spent on it. The answer is exact for a robot whose A differs
-    by less than that part; Newton's law holds exactly for this one, and A q̈ - b is off by at most σ |q̈| beside the part of b
-    that A cannot meet. A stance well away from such places has no such direction, and nothing is left out.
+    Where J loses rank (solo8 on four feet), nearby states have a singular value σ that measured angles and velocities cannot
+    tell from 0, and ζ would multiply their noise in b by 1/σ². Such a direction is left out altogether: no row holds it, no
+    force is spent on it. Newton's law still holds exactly, and A q̈ - b is off by at most σ |q̈| beside the part of b that A
+    cannot meet. A stance well away from such places has no such direction.
     Raises `InputError` when forces and rows of a contact do not fit each other.
     """
     U, s, rows = _resolved(eom)
@@ -79,8 +78,8 @@ def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
 
 def _check_fit(eom: EquationsOfMotion, w: Array) -> None:
     """Check that forces can hold every resolved row and act along rows of A only; w: singular values of rows M⁻¹ Jᵀ."""
-    if np.any(w <= RANK_TOLERANCE * w.max(initial=0.0)):
-        reached = int(np.sum(w > RANK_TOLERANCE * w[0]))
+    reached = int(np.sum(w > RANK_TOLERANCE * w.max(initial=0.0)))
+    if reached < w.size:
         raise InputError(f"the contacts hold {w.size} directions of motion, but forces reach {reached}: A and J do not fit.")
     beside = eom.J - eom.J @ np.linalg.pinv(eom.A, rcond=RANK_TOLERANCE) @ eom.A
     if np.max(np.abs(beside), initial=0.0) > _FIT_TOLERANCE * np.max(np.abs(eom.J), initial=0.0):

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.dynamics.resolve import ContactSpace, contact_space
+from floatbase.dynamics.resolve import contact_space
 from floatbase.linear_algebra import null_space, rank
 
 
@@ -26,24 +26,18 @@ def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     """(9) ζ: τ -> λ, from (8) A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ).
 
-    Maps shape (d,), N·m, to (k,), N, world. λ is unique where `forces_are_unique`; elsewhere (solo8 on four feet, corners of
-    a flat foot) this is the smallest λ, as the pseudo-inverse has it. Directions of motion that the contacts resolve worse
+    Maps shape (d,), N·m, to (k,), N, world. λ is unique where J has full row rank k; elsewhere (solo8 on four feet, corners
+    of a flat foot) this is the smallest λ, as the pseudo-inverse has it. Directions of motion that the contacts resolve worse
     than `MOTION_TOLERANCE` count as not held, see `contact_space`. Source: the document, §2.2.1.
     """
     space = contact_space(eom)
-    return Affine.linear(space.lift) @ _acceleration_from_forces(eom, space)
-
-
-def forces_are_unique(eom: EquationsOfMotion) -> bool:
-    """Whether torques determine the contact forces, so that (9) needs no choice: J has full row rank k."""
-    return contact_space(eom).r == eom.k
+    # what forces must add to q̈ along the resolved rows: b - rows M⁻¹ (S τ - h)
+    missing = Affine(-space.rows @ np.linalg.solve(eom.M, eom.S), space.b + space.rows @ np.linalg.solve(eom.M, eom.h))
+    return Affine.linear(space.lift) @ missing
 
 
 def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
-    """(14) η: τ -> q̈ = M⁻¹ (S τ + Jᵀ ζ(τ) - h), shape (d,) to (nv,). Right whether or not λ is unique.
-
-    Source: the document, §3.
-    """
+    """(14) η: τ -> q̈ = M⁻¹ (S τ + Jᵀ ζ(τ) - h), shape (d,) to (nv,). Right whether or not λ is unique. Source: §3."""
     return _motion_of(eom, Affine.identity(eom.d), forces_from_torques(eom))
 
 
@@ -55,7 +49,7 @@ def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
     """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
-    return _orthonormal(_pairs(eom, contact_space(eom)))
+    return _orthonormal(_pairs(eom))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -111,7 +105,7 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the resolved part
     of the contacts (`contact_space`): the same space as by the SVD of B, and one of bounded numbers where J nearly loses rank.
     """
-    pairs = _pairs(eom, contact_space(eom))
+    pairs = _pairs(eom)
     qdd = _motion_of(eom, pairs["tau"], pairs["forces"])
     return FeasibleSpace(eom, _orthonormal(Affine.stack(qdd=qdd, tau=pairs["tau"], forces=pairs["forces"])))
 
@@ -121,11 +115,10 @@ def internal_forces(eom: EquationsOfMotion) -> Array:
 
     J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint columns.
     n = k - rank J_b: 6 for four point feet. With a fixed base every λ is internal. Where J has full rank torques can bring
-    all of them about, and only them, without moving anything: ζ answers -J_jᵀ λ with λ. Where J loses rank (solo8 on four
-    feet) the k - r directions of null(Jᵀ) are among them: they need no torques, and no torques can bring them about, which
-    leaves rank J - rank J_b that torques choose.
+    all of them about without moving anything: ζ answers -J_jᵀ λ with λ. Where J loses rank (solo8 on four feet) the k - r
+    directions of null(Jᵀ) are among them; no torques can bring those about, which leaves rank J - rank J_b to torques.
     """
-    return null_space(_base_columns(eom).T)
+    return null_space(eom.J[:, : eom.nv - eom.d].T)
 
 
 def undetermined_forces(eom: EquationsOfMotion) -> Array:
@@ -160,39 +153,33 @@ class Dimensions:
 def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Counts every dimension of §2.2 at this state.
 
-    The rank of J is decided once (`contact_space`). B and C are then counted, each by its own singular values, with the
-    resolved rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
+    The rank of J is decided once (`contact_space`). B and C are then counted by their own singular values, with the resolved
+    rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
     space = contact_space(eom)
     reactions = np.linalg.qr(eom.J.T @ space.lift)[0]
     B = np.block([[eom.M, -eom.S, -reactions], [space.rows, np.zeros((space.r, eom.d + space.r))]])
     C = space.rows @ np.linalg.solve(eom.M, np.hstack([eom.S, reactions]))
-    free = eom.k - space.r
+    internal, free = internal_forces(eom).shape[1], eom.k - space.r
     return Dimensions(
         nv=eom.nv,
         d=eom.d,
         k=eom.k,
         rank_J=space.r,
-        rank_J_base=rank(_base_columns(eom)),
+        rank_J_base=eom.k - internal,
         null_B=B.shape[1] - rank(B) + free,
         null_C=C.shape[1] - rank(C) + free,
-        internal=internal_forces(eom).shape[1],
-        undetermined=space.free.shape[1],
+        internal=internal,
+        undetermined=free,
         rank_V_qdd=rank(null_space(B)[: eom.nv], absolute=True),
     )
 
 
-def _acceleration_from_forces(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
-    """τ -> what forces must add to q̈ along the resolved rows, shape (r,): b - rows M⁻¹ (S τ - h)."""
-    return Affine(-space.rows @ np.linalg.solve(eom.M, eom.S), space.b + space.rows @ np.linalg.solve(eom.M, eom.h))
-
-
-def _pairs(eom: EquationsOfMotion, space: ContactSpace) -> Affine:
-    """(τ, z) -> (τ, λ): the smallest λ for τ, and any of the free ones with it."""
-    d, free = eom.d, space.free.shape[1]
-    smallest = Affine.linear(space.lift) @ _acceleration_from_forces(eom, space)
-    tau = Affine.linear(np.hstack([np.eye(d), np.zeros((d, free))]))
-    return Affine.stack(tau=tau, forces=Affine(np.hstack([smallest.A, space.free]), smallest.b))
+def _pairs(eom: EquationsOfMotion) -> Affine:
+    """(τ, z) -> (τ, λ): the smallest λ for τ, and any of the undetermined ones with it."""
+    smallest, free = forces_from_torques(eom), undetermined_forces(eom)
+    tau = Affine.linear(np.eye(eom.d, eom.d + free.shape[1]))
+    return Affine.stack(tau=tau, forces=Affine(np.hstack([smallest.A, free]), smallest.b))
 
 
 def _motion_of(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Affine:
@@ -205,8 +192,3 @@ def _orthonormal(f: Affine) -> Affine:
     """The values of f as v + V⊥ β: V⊥ orthonormal, v the smallest of them."""
     V = np.linalg.qr(f.A)[0]
     return Affine(V, f.b - V @ (V.T @ f.b), f.blocks)
-
-
-def _base_columns(eom: EquationsOfMotion) -> Array:
-    """J_b: the columns of J that belong to the base, shape (k, 6) or (k, 0)."""
-    return eom.J[:, : eom.nv - eom.d]

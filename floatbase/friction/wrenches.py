@@ -15,11 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, checked, positive, read_only
-from floatbase.dynamics import Contacts
+from floatbase.dynamics import Contacts, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction.cones import FrictionPolyhedron
 from floatbase.friction.polytopes import cone_rows, vertices
-from floatbase.objectives import grasp_matrix
 from floatbase.qp import INFEASIBLE, UNBOUNDED, linear_program
 from floatbase.robots import State
 

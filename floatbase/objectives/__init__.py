@@ -6,7 +6,6 @@ from floatbase.objectives.centroidal import (
     desired_wrench,
     force_bias,
     force_sum,
-    grasp_matrix,
     moment_sum,
     momentum,
     momentum_rate,
@@ -20,7 +19,6 @@ from floatbase.objectives.pullback import (
     best_coordinates,
     cost_on_space,
     cost_on_torques,
-    pullback,
     seen_from_best,
     seen_from_smallest,
     smallest_coordinates,
@@ -41,7 +39,7 @@ from floatbase.objectives.tasks import (
 __all__ = [
     "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask", "Task", "TorqueForForces", "TorqueTask",
     "best_coordinates", "com_wrench", "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "force_sum",
-    "grasp_matrix", "moment_sum", "momentum", "momentum_rate", "nearest_rotation", "normal_bias", "pullback",
-    "rotational_inertia", "seen_from_best", "seen_from_smallest", "smallest_coordinates", "standing_tasks", "tangential_bias",
-    "torque_for_forces", "wrench_objective",
+    "moment_sum", "momentum", "momentum_rate", "nearest_rotation", "normal_bias", "rotational_inertia", "seen_from_best",
+    "seen_from_smallest", "smallest_coordinates", "standing_tasks", "tangential_bias", "torque_for_forces",
+    "wrench_objective",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ import pinocchio as pin
 
 from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.affine import Affine, Quadratic
-from floatbase.dynamics import Contacts, EquationsOfMotion, resolved_motion, torque_force_space
+from floatbase.dynamics import Contacts, EquationsOfMotion, grasp_matrix, resolved_motion, torque_force_space
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space, rank
 from floatbase.robots import State
@@ -40,15 +39,6 @@ def momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
     qdd = checked("qdd", qdd, (state.robot.nv,))
     rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, qdd)
     return read_only(np.concatenate([rate.linear, rate.angular]))
-
-
-def grasp_matrix(points: Array, about: Array) -> Array:
-    """(20)(21) G_f above G_τ, shape (6, 3n): forces at points, shape (n, 3), m, to their wrench about a point, shape (3,).
-
-    Known as the grasp matrix in manipulation. N and N·m, world.
-    """
-    blocks = [np.vstack([np.eye(3), pin.skew(point - about)]) for point in points]
-    return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
 
 
 def force_sum(contacts: Contacts) -> Array:
@@ -110,7 +100,8 @@ def tangential_bias(contacts: Contacts) -> Quadratic:
 
     The document prints the norm without its square; only squared is it quadratic.
     """
-    return _per_point(contacts, lambda n: (np.eye(3) - np.outer(n, n), np.zeros(3)))
+    N = _normals(contacts)
+    return Quadratic.from_residual(np.eye(len(N)) - N @ N.T, np.zeros(len(N)))
 
 
 def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
@@ -118,9 +109,9 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
 
     a: one number for all points or shape (n,).
     """
-    count = contacts.n_points
-    values = iter(checked("the nominal normal force a", [a] * count if np.ndim(a) == 0 else a, (count,), "N"))
-    return _per_point(contacts, lambda n: (np.outer(n, n), next(values) * n))
+    N = _normals(contacts)
+    each = checked("the nominal normal force a", [a] * N.shape[1] if np.ndim(a) == 0 else a, (N.shape[1],), "N")
+    return Quadratic.from_residual(N @ N.T, N @ each)
 
 
 def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
@@ -178,16 +169,11 @@ def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
     )
 
 
-def _per_point(contacts: Contacts, part: Callable[[Array], tuple[Array, Array]]) -> Quadratic:
-    """Σ ½ ‖P f_i - r‖² over the points, where part(normal) gives (P, r)."""
+def _normals(contacts: Contacts) -> Array:
+    """The normal of each point as a column, shape (k, n): the normal parts of λ are Nᵀ λ, and N Nᵀ λ as forces."""
     _only_points(contacts)
-    H, g, c = np.zeros((contacts.k, contacts.k)), np.zeros(contacts.k), 0.0
-    for i, normal in enumerate(contacts.normals):
-        P, r = part(normal)
-        one = Quadratic.from_residual(P, r)
-        at = slice(3 * i, 3 * i + 3)
-        H[at, at], g[at], c = one.H, one.g, c + one.c
-    return Quadratic(H, g, c)
+    columns = np.eye(contacts.n_points)[:, None] * contacts.normals[:, :, None]
+    return columns.reshape(contacts.k, contacts.n_points)
 
 
 def _only_points(contacts: Contacts) -> None:

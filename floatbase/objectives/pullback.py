@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics import Block, EquationsOfMotion, FeasibleSpace, accelerations_from_torques
-from floatbase.linear_algebra import null_space, rank
-
-
-def pullback(cost: Quadratic, f: Affine) -> Quadratic:
-    """(15)(18) The cost seen from the space that f starts in: x -> cost(f(x)). Source: the document, §3."""
-    return cost.pullback(f)
+from floatbase.linear_algebra import null_space, ranked_svd
 
 
 def cost_on_torques(cost_on_qdd: Quadratic, eom: EquationsOfMotion) -> Quadratic:
@@ -20,14 +13,9 @@ def cost_on_torques(cost_on_qdd: Quadratic, eom: EquationsOfMotion) -> Quadratic
 
 
 def cost_on_space(
-    space: FeasibleSpace,
-    qdd: Quadratic | None = None,
-    tau: Quadratic | None = None,
-    forces: Quadratic | None = None,
+    space: FeasibleSpace, qdd: Quadratic | None = None, tau: Quadratic | None = None, forces: Quadratic | None = None
 ) -> Quadratic:
-    """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β.
-
-    A cost on all three at once is moved by `cost.pullback(space.map)`.
+    """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β; `cost.pullback(space.map)` moves one on all three.
 
     space: β -> (q̈, τ, λ), as from `feasible_space`.
     qdd, tau, forces: costs on vectors of shape (nv,), (d,) and (k,).
@@ -42,8 +30,7 @@ def cost_on_space(
 def smallest_coordinates(space: FeasibleSpace, block: Block) -> Affine:
     """The β that (19) takes: the smallest β that gives a value of the block, β = V† (x - v)."""
     f = space.map[block]
-    U, s, Vt = np.linalg.svd(f.A, full_matrices=False)
-    r = rank(f.A, absolute=True)  # rows of orthonormal columns: what is below the tolerance is rounding
+    U, s, Vt, r = ranked_svd(f.A, absolute=True)  # rows of orthonormal columns: what is below the tolerance is rounding
     V_pinv = (Vt[:r].T / s[:r]) @ U[:, :r].T
     return Affine(V_pinv, -V_pinv @ f.b)
 
@@ -67,9 +54,7 @@ def best_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> Aff
 
 
 def seen_from_best(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
-    """(19) made honest: the cost on β seen from one block, minimised over what the block leaves free.
-
-    A partial minimisation, that is a Schur complement: see `Quadratic.minimised_over`.
+    """(19) made honest: the cost on β seen from one block, minimised over what the block leaves free (a Schur complement).
 
     Answers "what does this motion cost at least?". Never above `seen_from_smallest`, and equal to it where V of the
     block has full column rank.

@@ -1,10 +1,8 @@
-"""Tasks: what a controller should bring about, each a weighted affine residual in q̈, τ or λ.
+"""Tasks: what a controller should bring about, each a weighted affine residual, actual - desired, in q̈, τ or λ.
 
-Residual = actual - desired. A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the
-errors of position and velocity, so its residual is J q̈ + J̇ q̇ - a. Its cost is (weight / 2) ‖residual‖², a term of ψ
-in (26).
-
-A target is a value, or a function of the time t in s that gives one.
+A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of position and velocity. Its
+residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term of ψ in (26). A target is a value, or a function of the
+time t in s that gives one.
 """
 
 from __future__ import annotations
@@ -54,18 +52,20 @@ def _value(name: str, target: Target, t: float, shape: tuple[int, ...]) -> Array
     return checked(name, target(t) if callable(target) else target, shape)
 
 
-def _set_gains(task: CoMTask | OrientationTask | FrameTask | PostureTask) -> None:
-    """Check gains and weight and keep them as plain numbers; kd is critically damped, 2 √kp, where none is given."""
-    kp = positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
-    kd = 2.0 * kp**0.5 if task.kd is None else positive(f"kd of {task.name}", task.kd, "1/s", allow_zero=True)
-    weight = positive(f"weight of {task.name}", task.weight, allow_zero=True)
-    for name, value in (("kp", kp), ("kd", kd), ("weight", weight)):
+def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
+    """Check gains and weight, and copy the targets that do not move; kd is critically damped, 2 √kp, by default."""
+    kept: dict[str, object] = {"weight": positive(f"weight of {task.name}", task.weight, allow_zero=True)}
+    if isinstance(task, CoMTask | OrientationTask | FrameTask | PostureTask):
+        kp = kept["kp"] = positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
+        kd = 2.0 * kp**0.5 if task.kd is None else task.kd
+        kept["kd"] = positive(f"kd of {task.name}", kd, "1/s", allow_zero=True)
+    for name in targets:
+        target = getattr(task, name)
+        if target is not None and not callable(target):
+            flat = np.ravel(target) if shape == (None,) else target  # forces may come as (n, 3)
+            kept[name] = checked(f"{name} of {task.name}", flat, shape)
+    for name, value in kept.items():
         object.__setattr__(task, name, value)
-
-
-def _fixed(name: str, target: Target, shape: tuple[int, ...]) -> Target:
-    """The target, checked and copied at once when it does not move."""
-    return target if callable(target) else checked(name, target, shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,17 +89,13 @@ class CoMTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _set_gains(self)
-        for part in ("position", "velocity", "acceleration"):
-            object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
+        _keep(self, (3,), "position", "velocity", "acceleration")
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_com q̈ + J̇_com q̇ - a, shape (3,), m/s²."""
         state = eom.state
-        e = state.com - _value("position", self.position, t, (3,))
-        e_dot = state.com_velocity - _value("velocity", self.velocity, t, (3,))
-        feed = _value("acceleration", self.acceleration, t, (3,))
-        return _motion_residual(self, state.com_jacobian, state.com_drift, feed, e, e_dot)
+        x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
+        return _motion_residual(self, state.com_jacobian, state.com_drift, a, state.com - x, state.com_velocity - v)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,12 +118,10 @@ class OrientationTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _set_gains(self)
-        object.__setattr__(self, "rotation", _fixed(f"rotation of {self.name}", self.rotation, (3, 3)))
+        _keep(self, (3,), "angular_velocity", "angular_acceleration")
         if not callable(self.rotation):
-            object.__setattr__(self, "rotation", read_only(nearest_rotation(self.name, np.asarray(self.rotation))))
-        for part in ("angular_velocity", "angular_acceleration"):
-            object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
+            rotation = checked(f"rotation of {self.name}", self.rotation, (3, 3))
+            object.__setattr__(self, "rotation", read_only(nearest_rotation(self.name, rotation)))
 
     @property
     def name(self) -> str:
@@ -170,9 +164,7 @@ class FrameTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _set_gains(self)
-        for part in ("position", "velocity", "acceleration"):
-            object.__setattr__(self, part, _fixed(f"{part} of {self.name}", getattr(self, part), (3,)))
+        _keep(self, (3,), "position", "velocity", "acceleration")
 
     @property
     def name(self) -> str:
@@ -182,11 +174,9 @@ class FrameTask:
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J q̈ + J̇ q̇ - a, shape (3,), m/s², world-aligned."""
         state = eom.state
-        e = state.point(self.frame) - _value("position", self.position, t, (3,))
-        e_dot = state.frame_velocity(self.frame)[:3] - _value("velocity", self.velocity, t, (3,))
-        feed = _value("acceleration", self.acceleration, t, (3,))
+        x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
         J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
-        return _motion_residual(self, J, drift, feed, e, e_dot)
+        return _motion_residual(self, J, drift, a, state.point(self.frame) - x, state.frame_velocity(self.frame)[:3] - v)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,9 +195,7 @@ class PostureTask:
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _set_gains(self)
-        if not callable(self.q):
-            object.__setattr__(self, "q", checked("q of posture", self.q, (None,)))
+        _keep(self, (None,), "q")
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
@@ -232,7 +220,7 @@ class ForceTask:
     block: ClassVar[Block] = "forces"
 
     def __post_init__(self) -> None:
-        _keep_target(self)
+        _keep(self, (None,), "target")
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """λ - target, shape (k,), N."""
@@ -250,19 +238,12 @@ class TorqueTask:
     block: ClassVar[Block] = "tau"
 
     def __post_init__(self) -> None:
-        _keep_target(self)
+        _keep(self, (None,), "target")
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """τ - target, shape (d,), N·m."""
         target = np.zeros(eom.d) if self.target is None else _value("target torques", self.target, t, (eom.d,))
         return Affine.identity(eom.d) - target
-
-
-def _keep_target(task: ForceTask | TorqueTask) -> None:
-    """Check the weight, and copy a target that does not move."""
-    object.__setattr__(task, "weight", positive(f"weight of {task.name}", task.weight, allow_zero=True))
-    if task.target is not None and not callable(task.target):
-        object.__setattr__(task, "target", checked(f"target of {task.name}", np.ravel(task.target), (None,)))
 
 
 def standing_tasks(state: State) -> tuple[Task, ...]:

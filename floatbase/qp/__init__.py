@@ -1,10 +1,10 @@
 """Quadratic programs: named rows, optimality, back ends, and rows in conflict (§4, App. C of the document)."""
 
 from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set, table_top
-from floatbase.qp.conflicts import conflicting_rows
+from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_rows
 from floatbase.qp.labels import RowLabel
 from floatbase.qp.linear_programs import INFEASIBLE, OPTIMAL, UNBOUNDED, linear_program
-from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP
+from floatbase.qp.problem import QP
 from floatbase.qp.solution import Residuals, Solution, with_equality_multipliers
 from floatbase.qp.solve import check_solver, solve, solvers
 

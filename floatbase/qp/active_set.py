@@ -22,8 +22,8 @@ Algorithm
 
 At a degenerate point (more rows meet than there are coordinates) steps of length 0 can follow one another. As long as
 they do, both choices fall on the row with the least index (Bland's rule), which keeps a working set from coming back.
-A direction without curvature has no minimiser: p then is the slope along it and α may be as long as it likes; if no row
-blocks, the objective has no minimum.
+A direction without curvature, along which the objective falls, has no minimiser: p then is the way down and α may be as
+long as it likes; if no row blocks, the objective has no minimum.
 
 Source: the document, Appendix C; Nocedal and Wright, Numerical Optimization (2006), ch. 16.5; for Bland's rule on
 quadratic programs Chang and Cottle, Math. Programming 18 (1980).
@@ -41,9 +41,9 @@ from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
-from floatbase.qp.conflicts import SHARE, infeasible, not_convex, unbounded
+from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, SHARE, infeasible, not_convex, unbounded
 from floatbase.qp.labels import RowLabel
-from floatbase.qp.problem import FEASIBILITY_TOLERANCE, QP, ReducedQP
+from floatbase.qp.problem import QP, InequalityQP
 from floatbase.qp.solution import Solution, with_equality_multipliers
 
 _ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60 terms
@@ -100,10 +100,10 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
     """App. C: solve a convex QP by the active-set method of this module, keeping a record of every iteration.
 
     qp: the problem.
-    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. Without one, the method starts from
-        the minimiser of the objective on the rows of `working`, as if there were no other rows.
-    working: names of inequality rows to start with in W, such as the last run's `working`: a warm start. Rows that depend
-        on earlier ones are left out.
+    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. By default the minimiser on the rows
+        of `working`, as if there were no others.
+    working: names of inequality rows to start with in W, such as the last run's `working`; those that depend on earlier
+        ones are left out.
 
     Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum or is
     not convex, `UnknownNameError` for a row that does not exist, `InputError` for a start of another shape.
@@ -131,15 +131,8 @@ def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (
     row is active and might be an equality.
     """
     centre, H = checked("minimum", minimum, (2,), "m"), np.diag(checked("curvature", curvature, (2,)))
-    return QP(
-        H=H,
-        g=-H @ centre,
-        A=np.zeros((0, 2)),
-        b=np.zeros(0),
-        G=np.array([[0.0, -1.0]]),
-        h=np.zeros(1),
-        inequality_names=("table",),
-    )
+    G, h = np.array([[0.0, -1.0]]), np.zeros(1)  # -up ≤ 0
+    return QP(H, -H @ centre, np.zeros((0, 2)), np.zeros(0), G, h, inequality_names=("table",))
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +145,7 @@ class _Walk:
     iterations: list[Iteration]
 
 
-def _walk(problem: ReducedQP, x: Array, rows: list[int], last: int | None = None) -> _Walk:
+def _walk(problem: QP, x: Array, rows: list[int], last: int | None = None) -> _Walk:
     """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W; ends early when row `last` blocks."""
     rows, stuck = list(rows), False
     iterations: list[Iteration] = []
@@ -177,7 +170,7 @@ def _walk(problem: ReducedQP, x: Array, rows: list[int], last: int | None = None
     )
 
 
-def _starting_point(problem: ReducedQP, y: Array | None, rows: list[int]) -> Array:
+def _starting_point(problem: QP, y: Array | None, rows: list[int]) -> Array:
     """The point on the rows of W that is nearest to y, or without y the minimiser there."""
     W = problem.G[rows]
     origin = np.zeros(problem.n) if y is None else y
@@ -186,7 +179,7 @@ def _starting_point(problem: ReducedQP, y: Array | None, rows: list[int]) -> Arr
     return point + p if y is None and np.isfinite(reach) else point
 
 
-def _feasible_start(problem: ReducedQP, y: Array, rows: list[int]) -> _Walk:
+def _feasible_start(problem: QP, y: Array, rows: list[int]) -> _Walk:
     """Phase 1: a point that satisfies all rows, with rows of W that it lies on.
 
     Minimises s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h on the others, by the
@@ -199,7 +192,7 @@ def _feasible_start(problem: ReducedQP, y: Array, rows: list[int]) -> _Walk:
     if not np.any(violated):
         return _Walk(y, rows, np.zeros(0), [])
     s_row = len(problem.G)
-    elastic = ReducedQP(
+    elastic = InequalityQP(
         H=np.zeros((n + 1, n + 1)),
         g=np.eye(n + 1)[-1],
         G=np.block([[problem.G, -(size * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]),
@@ -216,18 +209,17 @@ def _feasible_start(problem: ReducedQP, y: Array, rows: list[int]) -> _Walk:
     return _Walk(walk.x[:-1], found, np.zeros(0), walk.iterations)
 
 
-def _direction(problem: ReducedQP, x: Array, rows: list[int]) -> tuple[Array, float]:
+def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
     """The direction p to the minimiser on the rows of W, and how far along it to go: 1, or inf where there is none.
 
-    With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u.
-    Its curvatures are the eigenvalues of Zᵀ H Z. A direction of zero curvature along which the objective falls leads to
-    infinity.
+    With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u,
+    whose curvatures are the eigenvalues of Zᵀ H Z.
     """
     Z = null_space(problem.G[rows] / problem.row_lengths[rows, None])
     curvature, modes = np.linalg.eigh(Z.T @ problem.H @ Z)
     flat_below = _ROUNDING * float(np.max(np.abs(problem.H), initial=0.0))
     if np.any(curvature < -_COUNTS * flat_below):
-        raise not_convex(problem, float(np.linalg.eigvalsh(problem.H)[0]))
+        raise not_convex(problem, problem.H)
     modes, curved = Z @ modes, curvature > flat_below
     slope = modes.T @ (problem.H @ x + problem.g)
     falling = ~curved & (np.abs(slope) > _COUNTS * _slope_rounding(problem, x))
@@ -236,7 +228,7 @@ def _direction(problem: ReducedQP, x: Array, rows: list[int]) -> tuple[Array, fl
     return -modes[:, curved] @ (slope[curved] / curvature[curved]), 1.0
 
 
-def _longest_step(problem: ReducedQP, x: Array, p: Array, reach: float, rows: list[int]) -> tuple[float, int | None]:
+def _longest_step(problem: QP, x: Array, p: Array, reach: float, rows: list[int]) -> tuple[float, int | None]:
     """How far from x along p, at most `reach`, all rows hold: the length α, and the (first) row that forbids more."""
     size = problem.row_lengths
     speed, slack = problem.G @ p, problem.h - problem.G @ x
@@ -255,12 +247,12 @@ def _longest_step(problem: ReducedQP, x: Array, p: Array, reach: float, rows: li
     return float(lengths[first]), int(blocking[first])
 
 
-def _multipliers(problem: ReducedQP, x: Array, rows: list[int]) -> Array:
+def _multipliers(problem: QP, x: Array, rows: list[int]) -> Array:
     """μ of the rows of W at the minimiser on them, shape (len(rows),): solves Gᵀ μ = -(H x + g) in least squares."""
     return np.linalg.lstsq(problem.G[rows].T, -(problem.H @ x + problem.g), rcond=None)[0]
 
 
-def _row_to_drop(problem: ReducedQP, x: Array, rows: list[int], mu: Array, stuck: bool) -> int | None:
+def _row_to_drop(problem: QP, x: Array, rows: list[int], mu: Array, stuck: bool) -> int | None:
     """The row of W with the most negative multiplier, rows at equal size, or None; when stuck, the first of wrong sign."""
     force = mu * problem.row_lengths[rows]
     wrong = [row for row, f in zip(rows, force, strict=True) if f < -_slope_rounding(problem, x)]
@@ -269,7 +261,7 @@ def _row_to_drop(problem: ReducedQP, x: Array, rows: list[int], mu: Array, stuck
     return min(wrong) if stuck else rows[int(np.argmin(force))]
 
 
-def _independent_rows(problem: ReducedQP, rows: Sequence[int]) -> list[int]:
+def _independent_rows(problem: QP, rows: Sequence[int]) -> list[int]:
     """`rows` without those that depend on the ones before them."""
     independent: list[int] = []
     basis = np.zeros((0, problem.n))
@@ -284,7 +276,7 @@ def _independent_rows(problem: ReducedQP, rows: Sequence[int]) -> list[int]:
     return independent
 
 
-def _slope_rounding(problem: ReducedQP, x: Array) -> float:
+def _slope_rounding(problem: QP, x: Array) -> float:
     """How large an entry of H x + g may come out when it is zero."""
     H, g = np.abs(problem.H), np.abs(problem.g)
     return _ROUNDING * float(np.max(g, initial=0.0) + np.max(H @ np.abs(x), initial=0.0))
@@ -297,7 +289,7 @@ def _index(qp: QP, name: str) -> int:
 
 
 def _record(
-    problem: ReducedQP, x: Array, rows: list[int], p: Array, length: float, blocking: int | None, mu: Array, drop: int | None
+    problem: QP, x: Array, rows: list[int], p: Array, length: float, blocking: int | None, mu: Array, drop: int | None
 ) -> Iteration:
     names = problem.inequality_names
     return Iteration(

@@ -15,17 +15,25 @@ from floatbase.errors import InfeasibleError, SolverError
 from floatbase.qp.labels import RowLabel
 from floatbase.qp.linear_programs import OPTIMAL, linear_program
 
-_TOLERANCE = 1e-9  # a violation of a row of unit length below this counts as none, as in `FEASIBILITY_TOLERANCE`
+FEASIBILITY_TOLERANCE = 1e-9  # how far a solver may violate an inequality of unit length: N, N·m; well above rounding
+SHARE = 1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
 _ROUNDING = 1e-12  # part of the largest |h| that a linear program may leave as a violation
 _HIGHS = 1e-10  # the smallest tolerance that HiGHS can be asked for
-SHARE = 1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
 _FEW = 4  # rows that are listed in one line
 
 
 def infeasible(rows: Iterable[str]) -> InfeasibleError:
-    """The error that names the inequality rows in conflict; more than a few are grouped by kind and counted."""
-    labels = tuple(row if isinstance(row, RowLabel) else RowLabel(row) for row in rows)
-    text = f" {', '.join(labels)}. " if len(labels) <= _FEW else "\n" + "\n".join(_grouped(labels)) + "\n"
+    """The error that names the inequality rows in conflict.
+
+    More than a few are grouped by kind and counted, each by its owner, or by its whole name where its owner has several.
+    """
+    labels = [row if isinstance(row, RowLabel) else RowLabel(row) for row in rows]
+    text = f" {', '.join(labels)}. "
+    if len(labels) > _FEW:
+        kinds: dict[str, list[str]] = {}
+        for label in labels:
+            kinds.setdefault(label.kind, []).append(label.owner if label.index is None else label)
+        text = "".join(f"\n  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()) + "\n"
     return InfeasibleError(
         f"no point satisfies all rows. Given the equalities, these are in conflict:{text}"
         "Loosen or drop any one of them: at least one has to go.",
@@ -41,10 +49,10 @@ def unbounded(problem: object) -> SolverError:
     )
 
 
-def not_convex(problem: object, curvature: float) -> SolverError:
-    """The error for a problem, told by its repr, whose objective curves downwards; curvature: the smallest, < 0."""
+def not_convex(problem: object, H: Array) -> SolverError:
+    """The error for a problem, told by its repr, whose objective curves downwards; H: where the equalities hold."""
     return SolverError(
-        f"{problem!r} is not convex: along one direction its curvature is {curvature:.3g}. "
+        f"{problem!r} is not convex: along one direction its curvature is {np.linalg.eigvalsh(H)[0]:.3g}. "
         "H must be positive semidefinite where the equalities hold; weights must be ≥ 0."
     )
 
@@ -56,27 +64,13 @@ def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:
     rows. A linear program finds the least common violation; the rows with a multiplier there are in conflict (Farkas), and
     a second pass leaves out row by row what the conflict does not need. Raises `SolverError` when the linear program fails.
     """
-    tolerance = _TOLERANCE + _ROUNDING * float(np.max(np.abs(h), initial=0.0))
+    tolerance = FEASIBILITY_TOLERANCE + _ROUNDING * float(np.max(np.abs(h), initial=0.0))
     violation, conflict = _least_violation(G, h)
     if violation <= tolerance:
         return ()
-    for row in tuple(conflict):
+    for row in conflict:
         rest = [i for i in conflict if i != row]
         if _least_violation(G[rest], h[rest])[0] > tolerance:
-            conflict = rest
-    return tuple(sorted(conflict))
-
-
-def inconsistent_equalities(A: Array, b: Array, tolerance: float) -> tuple[int, ...]:
-    """Indices of rows of A x = b that cannot hold together, while any of them dropped leaves the others satisfiable.
-
-    A: (m, n) with rows of unit length, b: (m,), known to be inconsistent by more than `tolerance`.
-    """
-    conflict = list(range(len(A)))
-    for row in range(len(A)):
-        rest = [i for i in conflict if i != row]
-        x = np.linalg.lstsq(A[rest], b[rest], rcond=None)[0]
-        if np.max(np.abs(A[rest] @ x - b[rest]), initial=0.0) > tolerance:
             conflict = rest
     return tuple(conflict)
 
@@ -94,11 +88,3 @@ def _least_violation(G: Array, h: Array) -> tuple[float, list[int]]:
         raise SolverError(f"the linear program that looks for conflicting rows ended with: {found.message}")
     violation = float(np.max(G @ found.x[:n] - h, initial=0.0))
     return violation, [int(i) for i in np.flatnonzero(np.abs(found.ineqlin.marginals) > SHARE)]
-
-
-def _grouped(labels: tuple[RowLabel, ...]) -> list[str]:
-    """One line for each kind of row: how many, and whose; a row that its owner has several of by its full name."""
-    kinds: dict[str, list[str]] = {}
-    for label in labels:
-        kinds.setdefault(label.kind, []).append(label.owner if label.index is None else str(label))
-    return [f"  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()]

@@ -7,14 +7,12 @@ from typing import Any
 
 from floatbase.errors import InputError
 
-OTHER = "other rows"  # the kind of a row whose name is a plain text
-
 
 class RowLabel(str):
     """The name of a row, such as "FL_foot facet 2", that also knows what it names.
 
     text: the name; label and text are equal, so `"FL_foot facet 2" in command.active` asks as one expects.
-    kind: what the row says, such as "friction", "normal force", "upper torque limit", "dynamics" or "motion".
+    kind: what the row says, such as "friction", "upper torque limit" or "dynamics"; "other rows" for a plain text.
     owner: the foot, joint or contact that it says it of; the text itself by default.
     index: which of its owner's rows of that kind, or None where the owner has one.
     """
@@ -25,7 +23,7 @@ class RowLabel(str):
     owner: str
     index: int | None  # type: ignore[assignment]  # a text's own method of that name finds a part of it
 
-    def __new__(cls, text: str, kind: str = OTHER, owner: str | None = None, index: int | None = None) -> RowLabel:
+    def __new__(cls, text: str, kind: str = "other rows", owner: str | None = None, index: int | None = None) -> RowLabel:
         label = super().__new__(cls, text)
         label.kind, label.owner, label.index = kind, text if owner is None else owner, index
         return label

@@ -24,8 +24,7 @@ def linear_program(
     """min cᵀ x subject to A x = b, G x ≤ h; `.status` is `OPTIMAL`, `INFEASIBLE` or `UNBOUNDED`, never anything else.
 
     cost: c, (n,).
-    equalities: A, b.
-    inequalities: G, h.
+    equalities, inequalities: (A, b) and (G, h), none by default.
     bounds: (lowest, highest) of every variable, or a list with a pair for each; None where there is none.
     tolerance: what rows and multipliers may be off by, HiGHS's own 1e-7 by default.
 
@@ -33,13 +32,10 @@ def linear_program(
     """
     from scipy.optimize import linprog  # slow to load, and never needed while all goes well
 
-    A, b = equalities if equalities is not None else (None, None)
-    G, h = inequalities if inequalities is not None else (None, None)
-    options = (
-        {} if tolerance is None else dict.fromkeys(("primal_feasibility_tolerance", "dual_feasibility_tolerance"), tolerance)
-    )
+    (A, b), (G, h) = equalities or (None, None), inequalities or (None, None)
+    tolerances = dict.fromkeys(("primal_feasibility_tolerance", "dual_feasibility_tolerance"), tolerance)
     for presolve in (True, False):  # presolve may stop at "infeasible or unbounded"; the simplex method then decides
-        result = linprog(cost, G, h, A, b, bounds, method="highs-ds", options={"presolve": presolve, **options})
+        result = linprog(cost, G, h, A, b, bounds, method="highs-ds", options={"presolve": presolve, **tolerances})
         if result.status in (OPTIMAL, INFEASIBLE, UNBOUNDED):
             return result
     raise SolverError(f"HiGHS did not converge on a linear program of {cost.size} variables: {result.message}")

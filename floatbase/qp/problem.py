@@ -28,10 +28,9 @@ from floatbase._arrays import Array, checked, read_only
 from floatbase.affine import Affine
 from floatbase.errors import InfeasibleError
 from floatbase.linear_algebra import ranked_svd, row_lengths
-from floatbase.qp.conflicts import inconsistent_equalities
+from floatbase.qp.conflicts import conflicting_rows
 from floatbase.qp.labels import row_labels
 
-FEASIBILITY_TOLERANCE = 1e-9  # how far a solver may violate an inequality of unit length: N, N·m; well above rounding
 _CONSISTENCY_TOLERANCE = 1e-7  # part of the largest |b| by which equalities of unit length may miss each other: measured b
 _ROUNDING = 1e-14  # part of a sum's terms that may be rounding: some 50 units in the last place
 
@@ -88,23 +87,21 @@ class QP:
         Rows count at unit length, so that multiplying an equation changes nothing. Raises `InfeasibleError` naming rows
         when the equalities are inconsistent.
         """
-        if not len(self.A):
-            return Affine.identity(self.n)
         size = row_lengths(self.A)
         A, b = self.A / size[:, None], self.b / size
         U, s, Vt, rank = ranked_svd(A)
-        residual = U[:, rank:].T @ b
-        tolerance = _CONSISTENCY_TOLERANCE * (1.0 + float(np.max(np.abs(b))))
-        if np.max(np.abs(residual), initial=0.0) > tolerance:
-            rows = [self.equality_names[i] for i in inconsistent_equalities(A, b, tolerance)]
+        residual = np.max(np.abs(U[:, rank:].T @ b), initial=0.0)
+        if residual > _CONSISTENCY_TOLERANCE * (1.0 + np.max(np.abs(b), initial=0.0)):
+            sides = conflicting_rows(np.vstack([A, -A]), np.append(b, -b))  # A x ≤ b and A x ≥ b
+            rows = [self.equality_names[i] for i in sorted(side % len(A) for side in sides)]
             raise InfeasibleError(f"these equality rows are inconsistent: {', '.join(rows)}. Drop one of them.", rows)
         return Affine(Vt[rank:].T, Vt[:rank].T @ ((U[:, :rank].T @ b) / s[:rank]))
 
     @cached_property
-    def reduced(self) -> ReducedQP:
+    def reduced(self) -> QP:
         """The same problem in β: the objective pulled back through `equality_space` (18), the same inequality rows."""
         if not len(self.A):
-            return ReducedQP(self.H, self.g, self.G, self.h, self.row_lengths, self.inequality_names)
+            return self
         Z, x0 = self.equality_space
         # what vanishes on the space must come out as zero: its rounding would pass for a curvature, a slope or a row
         H = _without_rounding(Z.T @ self.H @ Z, np.max(np.abs(self.H), initial=0.0))
@@ -112,46 +109,26 @@ class QP:
         G, h = self.G @ Z, self.h - self.G @ x0
         G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_lengths] = 0.0
         h[np.abs(h) <= _ROUNDING * (np.abs(self.G) @ np.abs(x0) + np.abs(self.h))] = 0.0
-        return ReducedQP(0.5 * (H + H.T), g, G, h, self.row_lengths, self.inequality_names)
+        return InequalityQP(H, g, G, h, self.row_lengths, self.inequality_names)
 
     @cached_property
     def row_lengths(self) -> Array:
-        """Length of each row of G, shape (l,), 1 for a row of zeros: the unit to compare violations of rows in."""
+        """The unit to compare violations of rows in, shape (l,): the length of each row of G, 1 for a row of zeros.
+
+        `reduced` keeps the lengths that the rows have in x.
+        """
         return read_only(row_lengths(self.G))
 
     def __repr__(self) -> str:
         return f"QP({self.n} variables, {len(self.A)} equalities, {len(self.G)} inequalities)"
 
 
-@dataclass(frozen=True, eq=False)
-class ReducedQP:
-    """min ½ βᵀ H β + gᵀ β subject to G β ≤ h: a `QP` whose equalities hold for every β. Made by `QP.reduced`, not checked.
+class InequalityQP(QP):
+    """A `QP` without equalities, made from another one, whose `row_lengths` (l,) are given rather than measured."""
 
-    H: (p, p), symmetric.
-    g: (p,).
-    G, h: (l, p) and (l,).
-    row_lengths: (l,), the length of the rows in the `QP`, in which violations are compared.
-    inequality_names: (l,), as in the `QP`.
-    """
-
-    H: Array
-    g: Array
-    G: Array
-    h: Array
-    row_lengths: Array
-    inequality_names: tuple[str, ...]
-
-    @property
-    def n(self) -> int:
-        """Number of variables."""
-        return int(self.g.size)
-
-    def objective(self, beta: Array) -> float:
-        """½ βᵀ H β + gᵀ β."""
-        return float(0.5 * beta @ self.H @ beta + self.g @ beta)
-
-    def __repr__(self) -> str:
-        return f"ReducedQP({self.n} variables, {len(self.G)} inequalities)"
+    def __init__(self, H: Array, g: Array, G: Array, h: Array, row_lengths: Array, inequality_names: tuple[str, ...]):
+        super().__init__(H, g, np.zeros((0, len(g))), np.zeros(0), G, h, inequality_names=inequality_names)
+        vars(self)["row_lengths"] = row_lengths
 
 
 def _without_rounding(value: Array, terms: float) -> Array:

@@ -93,14 +93,7 @@ class Solution:
 
 
 def with_equality_multipliers(qp: QP, x: Array, mu: Array, solver: str, iterations: int) -> Solution:
-    """The `Solution` from x and μ alone; ν follows from stationarity, by least squares.
-
-    qp: the problem.
-    x: (n,), the minimiser.
-    mu: (l,), the multipliers of the inequalities.
-    solver: name of what found them.
-    iterations: how many it took.
-    """
+    """The `Solution` with minimiser x and inequality multipliers mu; ν follows from stationarity, by least squares."""
     slope, size = qp.H @ x + qp.g + qp.G.T @ mu, row_lengths(qp.A)
-    nu = np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size if len(qp.A) else np.zeros(0)
+    nu = np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size
     return Solution(qp, read_only(x), read_only(nu), read_only(mu), solver, iterations)

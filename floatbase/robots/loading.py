@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import pinocchio as pin
 from floatbase._arrays import Array, positive, read_only
 from floatbase.errors import InputError, UnknownNameError, unknown_name
 from floatbase.robots.entries import CATALOGUE, Entry
-from floatbase.robots.robot import Foot, Robot, torque_limits_of
+from floatbase.robots.robot import Foot, Robot
 
 PLATE = (0.4, 0.03)  # width and thickness, m, of the plate on which `unbolted` lets a robot stand
 _FLIGHT_HEIGHT = 1.0  # m: where a robot without bolts and plate floats
@@ -47,11 +47,34 @@ def load(
 
     Raises `UnknownNameError` with the near names, and `InputError` for feet or limits that do not fit.
     """
-    loader = _loader(name)
-    entry = CATALOGUE.get(name)
-    model = _model(loader.urdf, loader.free_flyer)
-    start = _reference(model, loader, entry)
-    return _robot(name, model, loader, entry, start, feet, foot_radius, torque_limits, posture)
+    import example_robot_data as data
+
+    loader, entry = _loader(name, data.robots_loader.ROBOTS), CATALOGUE.get(name, Entry(""))
+    urdf = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
+    root = Path(data.getModelPath(urdf)).resolve()
+    model = _model(root / urdf, loader.free_flyer)
+    srdf = root / loader.path / loader.srdf_subpath / loader.srdf_filename if loader.srdf_filename else None
+    start = _reference(model, loader, srdf, entry)  # also where a posture is given: it reads the inertia of rotors
+    if feet is None:
+        if foot_radius is not None:
+            raise InputError("foot_radius goes with feet=[…]: the catalogue's feet have their own radius.")
+        if name not in CATALOGUE and loader.free_flyer:
+            raise InputError(
+                f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be given: "
+                f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
+                f"Its limbs end with {', '.join(_limb_ends(model))}."
+            )
+    return Robot(
+        name=name,
+        model=model,
+        urdf=root / urdf,
+        package_dirs=(root.parent.parent, root),
+        feet=entry.feet if feet is None else _feet(feet, foot_radius),
+        torque_limits=_torque_limits(model, loader.free_flyer, entry.torque_limit if torque_limits is None else torque_limits),
+        posture=start if posture is None else posture,  # type: ignore[arg-type]  # Robot checks it
+        description=entry.description,
+        sources=entry.sources,
+    )
 
 
 def load_urdf(
@@ -78,9 +101,6 @@ def load_urdf(
     urdf = Path(path).expanduser().resolve()
     if not urdf.is_file():
         raise InputError(f"there is no file {urdf}; give the path of a URDF file.")
-    name = urdf.stem if name is None else name
-    dirs = (*(Path(folder) for folder in package_dirs), urdf.parent)
-    loader = _Loader(urdf, None, None, floating, False, dirs)
     try:
         model = _model(urdf, floating)
     except (RuntimeError, ValueError) as error:
@@ -91,7 +111,15 @@ def load_urdf(
                 f"joint {model.names[i]!r} of {urdf.name} moves in {model.joints[i].nv} ways; a motor drives one. Make it "
                 "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
             )
-    return _robot(name, model, loader, None, pin.neutral(model), list(feet), foot_radius, torque_limits, posture)
+    return Robot(
+        name=urdf.stem if name is None else name,
+        model=model,
+        urdf=urdf,
+        package_dirs=(*(Path(folder) for folder in package_dirs), urdf.parent),
+        feet=_feet(feet, foot_radius),
+        torque_limits=_torque_limits(model, floating, torque_limits),
+        posture=pin.neutral(model) if posture is None else posture,  # type: ignore[arg-type]  # Robot checks it
+    )
 
 
 def unbolted(robot: Robot, plate: bool = False) -> Robot:
@@ -129,51 +157,8 @@ def _model(urdf: Path, floating: bool) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf), *([pin.JointModelFreeFlyer()] if floating else []))
 
 
-def _robot(
-    name: str,
-    model: pin.Model,
-    loader: _Loader,
-    entry: Entry | None,
-    start: Array,
-    feet: Sequence[str | Foot] | None,
-    foot_radius: float | None,
-    torque_limits: npt.ArrayLike | None,
-    posture: npt.ArrayLike | None,
-) -> Robot:
-    """The robot, after every argument was checked."""
-    robot = Robot(
-        name=name,
-        model=model,
-        urdf=loader.urdf,
-        package_dirs=loader.package_dirs,
-        feet=_feet(name, model, entry, feet, foot_radius, loader.free_flyer),
-        torque_limits=_torque_limits(model, loader.free_flyer, entry, torque_limits),
-        posture=start if posture is None else posture,  # type: ignore[arg-type]  # Robot checks it
-        description=entry.description if entry else "",
-        sources=entry.sources if entry else {},
-    )
-    for foot in robot.feet:
-        robot.frame_id(foot.frame)
-    return robot
-
-
-@dataclass(frozen=True)
-class _Loader:
-    """Where a robot's files are, and what is said in them."""
-
-    urdf: Path
-    srdf: Path | None
-    reference: str | None
-    free_flyer: bool
-    rotors: bool
-    package_dirs: tuple[Path, ...]
-
-
-def _loader(name: str) -> _Loader:
-    """A robot of example-robot-data."""
-    import example_robot_data as data
-
-    known = data.robots_loader.ROBOTS
+def _loader(name: str, known: Mapping[str, Any]) -> Any:
+    """What example-robot-data says about a robot."""
     if str(name).endswith((".urdf", ".xml", ".xacro")) or "/" in str(name):
         raise UnknownNameError(
             f"{str(name)!r} is no robot's name but a file's; fb.load_urdf({str(name)!r}, feet=[…]) loads a URDF of your own. "
@@ -181,71 +166,42 @@ def _loader(name: str) -> _Loader:
         )
     if name not in known:
         raise unknown_name("robot", name, known, "fb.catalogue() says what the catalogue's robots are for.")
-    loader: Any = known[name]
-    if not loader.urdf_filename:
+    if not known[name].urdf_filename:
         raise InputError(f"{name} comes as an SDF file; floatbase reads URDF. Choose one of {', '.join(CATALOGUE)}.")
-    urdf = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
-    root = Path(data.getModelPath(urdf)).resolve()
-    srdf = root / loader.path / loader.srdf_subpath / loader.srdf_filename if loader.srdf_filename else None
-    dirs = (root.parent.parent, root)
-    return _Loader(root / urdf, srdf, loader.ref_posture, loader.free_flyer, loader.has_rotor_parameters, dirs)
+    return known[name]
 
 
-def _reference(model: pin.Model, loader: _Loader, entry: Entry | None) -> Array:
+def _reference(model: pin.Model, loader: Any, srdf: Path | None, entry: Entry) -> Array:
     """The SRDF's reference configuration with the catalogue's joint angles on top; loads rotor inertia too."""
     q = pin.neutral(model)
-    if loader.srdf is not None:
-        if loader.rotors:
-            pin.loadRotorParameters(model, str(loader.srdf), False)
+    if srdf is not None:
+        if loader.has_rotor_parameters:
+            pin.loadRotorParameters(model, str(srdf), False)
             model.armature = model.rotorInertia * model.rotorGearRatio**2
-        pin.loadReferenceConfigurations(model, str(loader.srdf), False)
-        references = {entry.key(): entry.data() for entry in model.referenceConfigurations}
-        q = np.array(references.get(loader.reference, q))
-    for joint, angle in (entry.joints if entry else {}).items():
+        pin.loadReferenceConfigurations(model, str(srdf), False)
+        references = {reference.key(): reference.data() for reference in model.referenceConfigurations}
+        q = np.array(references.get(loader.ref_posture, q))
+    for joint, angle in entry.joints.items():
         q[model.idx_qs[model.getJointId(joint)]] = angle
     return read_only(pin.normalize(model, q))
 
 
-def _torque_limits(model: pin.Model, free_flyer: bool, entry: Entry | None, requested: npt.ArrayLike | None) -> Array:
-    d = model.nv - (6 if free_flyer else 0)
-    if requested is not None:
-        return torque_limits_of(d, requested)
-    if entry is not None and entry.torque_limit is not None:
-        return read_only(np.full(d, entry.torque_limit))
-    effort = np.array(model.effortLimit)[model.nv - d :]
-    return read_only(np.where(effort > 0, effort, np.inf))  # URDF writers put 0 where they do not know
+def _torque_limits(model: pin.Model, floating: bool, requested: npt.ArrayLike | None) -> Any:
+    """Requested limits, which Robot checks, or those of the URDF's joints, where 0 stands for unknown."""
+    effort = np.array(model.effortLimit)[6 if floating else 0 :]
+    return np.where(effort > 0, effort, np.inf) if requested is None else requested
 
 
-def _limb_ends(model: pin.Model) -> tuple[str, ...]:
+def _limb_ends(model: pin.Model) -> list[str]:
     """Names of the links that carry no other link, behind the last joint of a limb: feet, fingers, heads."""
-    inner = set(model.parents)
-    bodies = {i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}
-    above: set[int] = set()
-    for i in bodies:
-        while i:
-            i = int(model.frames[i].parentFrame)
-            above.add(i)
-    return tuple(str(model.frames[i].name) for i in sorted(bodies - above) if model.frames[i].parentJoint not in inner)
+    frames, inner = model.frames, set(model.parents)
+    bodies = [frame for frame in frames if frame.type == pin.FrameType.BODY]
+    carrying = {frames[frames[frame.parentFrame].parentFrame].name for frame in bodies}  # a link hangs from a joint's frame
+    return [str(frame.name) for frame in bodies if frame.name not in carrying and frame.parentJoint not in inner]
 
 
-def _feet(
-    name: str,
-    model: pin.Model,
-    entry: Entry | None,
-    requested: Sequence[str | Foot] | None,
-    radius: float | None,
-    free_flyer: bool,
-) -> tuple[Foot, ...]:
-    if requested is None:
-        if radius is not None:
-            raise InputError("foot_radius goes with feet=[…]: the catalogue's feet have their own radius.")
-        if entry is None and free_flyer:
-            raise InputError(
-                f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be given: "
-                f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
-                f"Its limbs end with {', '.join(_limb_ends(model))}."
-            )
-        return entry.feet if entry else ()
+def _feet(requested: Sequence[str | Foot], radius: float | None) -> tuple[Foot, ...]:
+    """Feet of frames and `Foot` values."""
     if isinstance(requested, str):
         raise InputError(f'feet must be a list of frames, as in feet=["{requested}"].')
     r = 0.0 if radius is None else positive("foot_radius", radius, "m", allow_zero=True)

@@ -41,8 +41,7 @@ class Foot:
         object.__setattr__(self, "radius", positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
         object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
-            corners = checked(f"corners of foot {self.frame}", self.corners, (None, 3), "m")
-            object.__setattr__(self, "corners", spread_corners(self.frame, corners))
+            object.__setattr__(self, "corners", spread_corners(self.frame, self.corners))
 
     @property
     def is_flat(self) -> bool:
@@ -82,6 +81,9 @@ class Robot:
     def __post_init__(self) -> None:
         object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,)))
         check_unit_lengths(self.model, "posture", self.posture)
+        object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
+        for foot in self.feet:
+            self.frame_id(foot.frame)
 
     @cached_property
     def is_floating(self) -> bool:
@@ -135,10 +137,8 @@ class Robot:
     def base(self) -> str:
         """Name of the base link's frame."""
         root = 1 if self.is_floating else 0
-        for frame in self.model.frames:
-            if frame.type == pin.FrameType.BODY and frame.parentJoint == root:
-                return str(frame.name)
-        return str(self.model.frames[0].name)
+        bodies = (frame for frame in self.model.frames if frame.type == pin.FrameType.BODY and frame.parentJoint == root)
+        return str(next(bodies, self.model.frames[0]).name)
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
@@ -147,29 +147,23 @@ class Robot:
 
     @cached_property
     def _frame_numbers(self) -> dict[str, int]:
-        """Pinocchio's number of each frame; the first of several that share a name."""
-        return {str(frame.name): i for i, frame in reversed(list(enumerate(self.model.frames)))}
+        """Pinocchio's number of each frame, the first of several that share a name; "base" is the base link."""
+        numbers = {str(frame.name): i for i, frame in reversed(list(enumerate(self.model.frames)))}
+        return {"base": numbers[self.base], **numbers}
 
     def frame_id(self, frame: str) -> int:
         """Pinocchio's number of a frame; "base" stands for the base link on every robot.
 
         Raises `UnknownNameError` with the near names.
         """
-        if isinstance(frame, str):
-            number = self._frame_numbers.get(frame)
-            if number is not None:
-                return number
-            if frame == "base":
-                return self._frame_numbers[self.base]
-        raise unknown_name(f"frame of {self.name}", frame, self.frames, "robot.frames lists them all.")
+        if not isinstance(frame, str) or frame not in self._frame_numbers:
+            raise unknown_name(f"frame of {self.name}", frame, self.frames, "robot.frames lists them all.")
+        return self._frame_numbers[frame]
 
     def foot(self, frame: str) -> Foot:
         """The foot carried by a frame; a frame that is no foot gives a point foot of radius 0 at its origin."""
         self.frame_id(frame)
-        for foot in self.feet:
-            if foot.frame == frame:
-                return foot
-        return Foot(frame)
+        return next((foot for foot in self.feet if foot.frame == frame), Foot(frame))
 
     def neutral(self) -> State:
         """The state with all joints at zero and the base at the world's origin, at rest."""
@@ -204,17 +198,9 @@ class Robot:
 
         rng = np.random.default_rng(seed)
         spread = positive("spread", spread, allow_zero=True)
-        step = rng.uniform(-spread, spread, self.nv)
-        q = pin.integrate(self.model, self.standing().q, step)
-        single = np.array([self.model.nqs[i] == 1 for i in range(self.model.njoints)])
-        for i in np.flatnonzero(single):
-            at = self.model.idx_qs[int(i)]
-            q[at] = np.clip(q[at], self.model.lowerPositionLimit[at], self.model.upperPositionLimit[at])
+        q = self.standing().integrate(rng.uniform(-spread, spread, self.nv))
+        q = np.clip(q, self.model.lowerPositionLimit, self.model.upperPositionLimit)
         return State(self, q, spread * rng.standard_normal(self.nv))
-
-    def torque_violation(self, tau: npt.ArrayLike) -> float:
-        """How far the worst joint is over its limit, N·m; negative when all are within."""
-        return float(np.max(np.abs(checked("tau", tau, (self.d,), "N·m")) - self.torque_limits))
 
     def __repr__(self) -> str:
         base = "floating" if self.is_floating else "fixed"
@@ -233,22 +219,23 @@ def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", fi
     first: the first of Pinocchio's joints that counts: 2 leaves the base of a floating robot out.
     """
     if pin.isNormalized(model, q, UNIT_LENGTH_TOLERANCE):
-        return
+        return  # it is faster than this loop
     for i in range(first, model.njoints):
-        offset = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # positions come first
-        part = slice(model.idx_qs[i] + offset, model.idx_qs[i] + model.nqs[i])
+        positions = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # they come first
+        part = slice(model.idx_qs[i] + positions, model.idx_qs[i] + model.nqs[i])
         length = float(np.linalg.norm(q[part]))
-        if model.nqs[i] == model.nvs[i] or abs(length - 1.0) <= UNIT_LENGTH_TOLERANCE:
-            continue
-        entries = f"{name}[{part.start}:{part.stop}]"
-        what = f"the base quaternion {entries} (x y z w)"
-        if i > 1 or offset != 3:
-            what = f"{entries}, {'cosine and sine' if part.stop - part.start == 2 else 'the quaternion'} of {model.names[i]!r},"
-        raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
+        if model.nqs[i] != model.nvs[i] and abs(length - 1.0) > UNIT_LENGTH_TOLERANCE:
+            what = f"{name}[{part.start}:{part.stop}]"
+            if i == 1 and positions == 3:
+                what = f"the base quaternion {what} (x y z w)"
+            else:
+                what += f", {'cosine and sine' if len(q[part]) == 2 else 'the quaternion'} of {model.names[i]!r},"
+            raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
 
 
-def spread_corners(frame: str, corners: Array) -> Array:
-    """The corners, after checking that they span an area: on a line they cannot hold all six motions of a foot."""
+def spread_corners(frame: str, requested: npt.ArrayLike) -> Array:
+    """The corners, (n, 3), m, of a foot, checked: on one line they cannot hold all six motions. Raises `InputError`."""
+    corners = checked(f"corners of {frame}", requested, (None, 3), "m")
     if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=_AREA_TOLERANCE) < 2:
         raise InputError(f"the corners of {frame} span no area; a flat foot needs at least 3 that are not on one line.")
     return corners

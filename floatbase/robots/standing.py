@@ -43,15 +43,15 @@ def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Arr
 
     Soles at z = 0 and level; the base where the posture has it, but for its height, which follows the feet or is given.
     """
-    errors: list[float] = []
-    rows: list[Array] = []
+    errors, rows = [], []
     for foot in state.robot.feet:
         errors.append(_sole_height(state, foot))
-        rows.append(_sole_jacobian(state, foot)[2])
+        R, J = state.frame_pose(foot.frame).rotation, state.frame_jacobian(foot.frame)
+        rows.append(J[2] - (pin.skew(R @ foot.middle) @ J[3:])[2])
         if foot.is_flat:
-            up = state.frame_pose(foot.frame).rotation[:, 2]
+            up = R[:, 2]
             errors += [up[0], up[1]]
-            rows += list((-pin.skew(up) @ state.frame_jacobian(foot.frame)[3:])[:2])  # d(up)/dt = ω × up
+            rows += list((-pin.skew(up) @ J[3:])[:2])  # d(up)/dt = ω × up
     R = state.frame_pose("base").rotation
     J_base = np.eye(state.robot.nv)[:6]
     errors += list(pin.log3(posture.frame_pose("base").rotation.T @ R))
@@ -66,9 +66,3 @@ def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Arr
 def _sole_height(state: State, foot: Foot) -> float:
     """Height of the foot's lowest point above z = 0, m."""
     return float(state.point(foot.frame, foot.middle)[2] - foot.radius)
-
-
-def _sole_jacobian(state: State, foot: Foot) -> Array:
-    """Jacobian of the point whose height counts, shape (3, nv)."""
-    J = state.frame_jacobian(foot.frame)
-    return J[:3] - pin.skew(state.frame_pose(foot.frame).rotation @ foot.middle) @ J[3:]

@@ -170,13 +170,6 @@ def test_a_particle_at_rest_in_the_world_circles_backwards_in_a_frame_that_turns
     assert np.array_equal(view.euler, np.zeros((101, 3)))
 
 
-def test_the_path_is_straight_again_in_the_world() -> None:
-    time = np.linspace(0.5, 2.5, 21)
-    view = seen_from_turning_frame(time, wandering, (0.1, 0.2, 0.3), (1.0, -1.0, 0.5), wandering_rate)
-    world = np.einsum("nij,nj->ni", view.rotation, view.position)
-    assert np.allclose(world, np.array([0.1, 0.2, 0.3]) + np.outer(time - 0.5, [1.0, -1.0, 0.5]), atol=1e-12)
-
-
 def test_a_link_that_turns_evenly_pulls_its_points_inward_by_omega_squared_times_distance() -> None:
     """ur5's shoulder turns at 2 rad/s: the wrist's acceleration by the robot's own kinematics."""
     robot = judges.load("ur5")

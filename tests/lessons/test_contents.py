@@ -59,7 +59,7 @@ def test_the_page_of_conventions_shows_every_tolerance_with_its_reason() -> None
     shown = {(file, name): float(value) for file, name, value, _ in conventions.tolerances()}
     assert shown["linear_algebra", "RANK_TOLERANCE"] == RANK_TOLERANCE
     assert shown["dynamics/resolve", "MOTION_NOISE"] == MOTION_NOISE
-    assert shown["qp/problem", "FEASIBILITY_TOLERANCE"] == FEASIBILITY_TOLERANCE
+    assert shown["qp/conflicts", "FEASIBILITY_TOLERANCE"] == FEASIBILITY_TOLERANCE
     assert all(len(reason) > 15 for *_, reason in conventions.tolerances())
 
 

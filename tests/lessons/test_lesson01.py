@@ -8,7 +8,6 @@ from hints import missed, right
 
 import floatbase as fb
 from floatbase.lessons import joint_servo, lesson01
-from floatbase.objectives import momentum, momentum_rate
 from floatbase.robots import Robot, unbolted
 
 F_R = np.array([-60.0, 0.0, 0.0])
@@ -22,24 +21,6 @@ def arm() -> Robot:
 @pytest.fixture(scope="module")
 def go2() -> Robot:
     return fb.load("go2")
-
-
-def test_the_arm_without_bolts_is_the_same_arm(arm: Robot) -> None:
-    cut = unbolted(arm)
-    assert cut.joint_names == arm.joint_names
-    state, free = arm.standing(), cut.standing()
-    assert np.allclose(free.M[6:, 6:], state.M)
-    assert np.allclose(free.h[6:], state.h)
-    assert np.allclose(free.point("tool0") - free.point("base_link"), state.point("tool0") - state.point("base_link"))
-    assert cut.mass == pytest.approx(arm.mass)
-
-
-def test_momentum_is_mass_times_velocity_and_its_rate_is_the_weight(go2: Robot) -> None:
-    state = go2.random_state(3)
-    assert np.allclose(momentum(state)[:3], go2.mass * state.com_velocity)
-    qdd = np.linalg.solve(state.M, go2.S @ np.arange(12.0) - state.h)
-    rate = momentum_rate(state, qdd)
-    assert np.allclose(rate, [0, 0, -go2.weight, 0, 0, 0], atol=1e-8)
 
 
 def test_a_servo_follows_its_path_at_its_ends(arm: Robot) -> None:

@@ -161,7 +161,7 @@ def test_every_text_of_the_course_becomes_html() -> None:
 def test_a_file_page_gives_back_its_scene_and_other_texts_hold_none() -> None:
     commands = [b"first", b"", b"second"]
     assert viewer_page.scene_in(viewer_page.file_page(commands)) == commands
-    with pytest.raises(ViewerError, match="holds no scene"):
+    with pytest.raises(ViewerError, match="contains no scene"):
         viewer_page.scene_in("<html></html>")
 
 

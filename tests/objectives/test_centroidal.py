@@ -12,7 +12,6 @@ import pytest
 
 import floatbase as fb
 from floatbase import dynamics, linear_algebra, objectives
-from floatbase.affine import Quadratic
 from floatbase.dynamics import EquationsOfMotion, fixed_frame
 
 Array = npt.NDArray[np.float64]
@@ -79,10 +78,10 @@ def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> Non
     """(20)(21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i; no points give a matrix without columns."""
     rng = np.random.default_rng(0)
     points, about, forces = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=(5, 3))
-    wrench = objectives.grasp_matrix(points, about) @ forces.ravel()
+    wrench = dynamics.grasp_matrix(points, about) @ forces.ravel()
     assert np.allclose(wrench[:3], forces.sum(axis=0))
     assert np.allclose(wrench[3:], np.cross(points - about, forces).sum(axis=0))
-    assert objectives.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
+    assert dynamics.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
 
 
 # (20)(21) ----------------------------------------------------------------------------------------------------------------
@@ -156,19 +155,8 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_wanted(name: 
         assert np.allclose(rate[3:], spin, atol=1e-4 * state.robot.weight)
 
 
-def test_standing_still_wants_the_weight_upwards_and_no_moment(name: str) -> None:
-    state = judges.load(name).standing()
-    force, moment = objectives.desired_wrench(state, np.zeros(3))
-    assert np.allclose(force, [0.0, 0.0, 9.81 * mass_of_links(state)])
-    assert np.array_equal(moment, np.zeros(3))
-
-
-def mass_of_links(state: fb.State) -> float:
-    return float(judges.mujoco_of(state.robot.name).model.body_mass.sum())
-
-
-def test_the_wrench_objective_has_the_value_of_its_formula_and_cvxpys_minimum() -> None:
-    """On one foot six numbers cannot all be had: the minimum is above zero, and it is cvxpy's."""
+def test_the_wrench_objective_has_the_value_of_its_formula() -> None:
+    """On one foot and on two, six numbers cannot all be had: the minimum is above zero."""
     rng = np.random.default_rng(0)
     state = judges.load("go2").standing()
     for feet in (1, 2, 4):
@@ -182,13 +170,7 @@ def test_the_wrench_objective_has_the_value_of_its_formula_and_cvxpys_minimum() 
         direct = 0.5 * np.sum((force - f.sum(axis=0)) ** 2)
         direct += 0.5 * np.sum((moment - np.cross(points - state.com, f).sum(axis=0)) ** 2)
         assert cost(lam) == pytest.approx(direct, rel=1e-10)
-        x = [cp.Variable(3) for _ in range(feet)]
-        tau_c = sum(pin.skew(p - state.com) @ xi for p, xi in zip(points, x, strict=True))
-        objective = 0.5 * cp.sum_squares(force - sum(x)) + 0.5 * cp.sum_squares(moment - tau_c)
-        problem = cp.Problem(cp.Minimize(objective))
-        problem.solve(**TIGHT)
-        assert cost(cost.minimiser()) == pytest.approx(problem.value, rel=1e-6, abs=1e-7)
-        assert (problem.value > 1e-3) == (feet < 3)
+        assert (cost(cost.minimiser()) > 1e-3) == (feet < 3)
 
 
 # (23) --------------------------------------------------------------------------------------------------------------------
@@ -211,58 +193,6 @@ def test_the_force_bias_is_the_squared_friction_plus_alpha_times_the_squared_dis
         assert objectives.tangential_bias(contacts)(lam) == pytest.approx(tangential, rel=1e-10)
         assert objectives.normal_bias(contacts, a)(lam) == pytest.approx(normal, rel=1e-10)
         assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(tangential + alpha * normal, rel=1e-10)
-
-
-def test_only_squared_is_the_friction_term_a_quadratic() -> None:
-    """Twice the friction costs four times as much; the norm as printed would cost twice, and have no gradient at 0."""
-    contacts = fb.Contacts.points(judges.load("go2"))
-    sideways = np.tile([3.0, 4.0, 0.0], 4)
-    bias = objectives.tangential_bias(contacts)
-    assert bias(sideways) == pytest.approx(4 * 0.5 * 25.0)
-    assert bias(2.0 * sideways) == pytest.approx(4.0 * bias(sideways))
-    assert np.allclose(bias.gradient(np.zeros(12)), 0.0)
-
-
-def test_the_gradient_of_the_bias_points_along_friction_and_along_the_excess_of_normal_force() -> None:
-    rng = np.random.default_rng(1)
-    contacts = fb.Contacts.points(judges.load("go2"), normals=LEAN)
-    lam, alpha, a = 30.0 * rng.normal(size=12), 0.4, 25.0
-    bias = objectives.force_bias(contacts, alpha, a)
-    slope = [(bias(lam + 1e-3 * e) - bias(lam - 1e-3 * e)) / 2e-3 for e in np.eye(12)]
-    assert judges.relative(bias.gradient(lam), slope) < 1e-8
-    forces = lam.reshape(4, 3)
-    wanted = [f - (f @ n) * n + alpha * (f @ n - a) * n for f, n in zip(forces, LEAN, strict=True)]
-    assert np.allclose(bias.gradient(lam).reshape(4, 3), wanted)
-
-
-def test_the_bias_is_smallest_at_a_along_every_normal() -> None:
-    contacts = fb.Contacts.points(judges.load("go2"), normals=LEAN)
-    a = np.array([10.0, 20.0, 30.0, 40.0])
-    bias = objectives.force_bias(contacts, 0.3, a)
-    assert np.allclose(bias.minimiser().reshape(4, 3), a[:, None] * LEAN)
-    assert bias(bias.minimiser()) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_bias_does_not_know_how_the_world_is_turned() -> None:
-    """Turn normals and forces together: every part keeps its value."""
-    rng = np.random.default_rng(2)
-    robot = judges.load("go2")
-    for _ in range(10):
-        R, lam = judges.rotation(rng.uniform(-2.0, 2.0, 3)), 30.0 * rng.normal(size=(4, 3))
-        here = fb.Contacts.points(robot, normals=LEAN)
-        there = fb.Contacts.points(robot, normals=LEAN @ R.T)
-        for part in (
-            objectives.tangential_bias,
-            lambda c: objectives.normal_bias(c, 12.0),
-            lambda c: objectives.force_bias(c, 0.7, [1.0, 2.0, 3.0, 4.0]),
-        ):
-            assert part(there)((lam @ R.T).ravel()) == pytest.approx(part(here)(lam.ravel()), rel=1e-9)
-
-
-def test_the_bias_is_a_preference_that_a_pulling_force_only_pays_for() -> None:
-    contacts = fb.Contacts.points(judges.load("go2"))
-    pulling = np.tile([0.0, 0.0, -5.0], 4)
-    assert np.isfinite(objectives.force_bias(contacts, 0.1, 37.0)(pulling))
 
 
 def test_with_the_bias_the_forces_of_a_wanted_wrench_are_unique_and_cvxpys() -> None:
@@ -433,8 +363,3 @@ def test_other_values_that_do_not_fit_are_named() -> None:
     for call in (found.gap, found.nearest):
         with pytest.raises(fb.FloatbaseError, match=r"forces has shape \(9,\); it must have shape \(12,\)"):
             call(np.zeros(9))
-
-
-def test_objectives_are_costs_of_the_package() -> None:
-    contacts = fb.Contacts.points(judges.load("go2"))
-    assert isinstance(objectives.force_bias(contacts, 1.0, 1.0), Quadratic)

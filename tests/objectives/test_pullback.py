@@ -9,7 +9,7 @@ import pytest
 
 import floatbase as fb
 from floatbase import dynamics, objectives
-from floatbase.affine import Affine, Quadratic
+from floatbase.affine import Quadratic
 from floatbase.dynamics import EquationsOfMotion, fixed_frame
 
 Array = npt.NDArray[np.float64]
@@ -125,28 +125,9 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
     space = dynamics.feasible_space(eom)
     rng = np.random.default_rng(0)
     A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
-    seen = objectives.pullback(Quadratic.from_residual(A, r), space.map)
+    seen = Quadratic.from_residual(A, r).pullback(space.map)
     beta = rng.normal(size=space.dimension)
     assert seen(beta) == pytest.approx(0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10)
-
-
-def test_a_pullback_of_a_pullback_is_the_pullback_by_the_composed_map() -> None:
-    rng = np.random.default_rng(1)
-    cost = Quadratic.from_residual(rng.normal(size=(7, 5)), rng.normal(size=7))
-    f, g = Affine(rng.normal(size=(5, 4)), rng.normal(size=5)), Affine(rng.normal(size=(4, 3)), rng.normal(size=4))
-    twice, once = cost.pullback(f).pullback(g), cost.pullback(f @ g)
-    assert np.allclose(twice.H, once.H)
-    assert np.allclose(twice.g, once.g)
-    assert twice.c == pytest.approx(once.c)
-
-
-def test_the_gradient_of_a_pullback_is_the_chain_rule() -> None:
-    eom = eom_of("go2", 4, 0)
-    cost, eta = Quadratic.from_residual(*costs(eom)["qdd"]), dynamics.accelerations_from_torques(eom)
-    seen, tau = objectives.cost_on_torques(cost, eom), np.random.default_rng(0).normal(size=12)
-    slope = [(seen(tau + 1e-4 * e) - seen(tau - 1e-4 * e)) / 2e-4 for e in np.eye(12)]
-    assert judges.relative(seen.gradient(tau), slope) < 1e-6
-    assert judges.relative(seen.gradient(tau), eta.A.T @ cost.gradient(eta(tau))) < 1e-10
 
 
 # (19) --------------------------------------------------------------------------------------------------------------------
@@ -266,18 +247,6 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
         beta = objectives.best_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)
         assert np.allclose(N.T @ (space.forces(beta) - wanted), 0.0, atol=1e-3), weight
-
-
-def test_minimised_over_a_span_is_the_schur_complement() -> None:
-    """Keep x1, minimise over x2: H11 - H12 H22⁻¹ H21."""
-    rng = np.random.default_rng(2)
-    A = rng.normal(size=(9, 6))
-    cost, N = Quadratic.from_residual(A, rng.normal(size=9)), np.eye(6)[:, 4:]
-    seen = cost.pullback(cost.minimised_over(N))
-    H = cost.H
-    assert np.allclose(seen.H[:4, :4], H[:4, :4] - H[:4, 4:] @ np.linalg.solve(H[4:, 4:], H[4:, :4]), atol=1e-10)
-    assert np.allclose(seen.H[4:], 0.0, atol=1e-10)
-    assert cost.minimised_over(np.zeros((6, 0))).n_in == 6
 
 
 def test_a_block_that_does_not_exist_is_named() -> None:

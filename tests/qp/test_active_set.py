@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import judges
 import numpy as np
@@ -127,32 +126,17 @@ def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP
     return [controller.qp(robot.random_state(seed, (0.05, 0.15)[seed % 2])) for seed in range(n)]
 
 
-@pytest.mark.parametrize(("name", "n", "torque"), [("go2", 40, 0.4), ("solo12", 40, 0.3), ("talos", 20, 0.3)])
-def test_it_agrees_with_daqp_on_100_problems_of_three_robots(name: str, n: int, torque: float) -> None:
-    friction = motors = 0
-    for qp in controller_qps(name, n, torque):
-        run, daqp = active_set(qp), solve(qp)
-        assert np.max(np.abs(run.solution.x - daqp.x)) < 1e-7
-        check_optimum(run)
-        friction += any("facet" in row or "normal" in row for row in run.solution.active)
-        motors += any("torque" in row for row in run.solution.active)
-    assert friction > n / 3
-    assert motors > n / 10
-
-
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_it_solves_the_controllers_problem_of_every_robot_and_records_an_honest_way(name: str) -> None:
-    for qp in controller_qps(name, 6, torque=0.7):
-        try:
-            expected = solve(qp)
-        except InfeasibleError:
-            with pytest.raises(InfeasibleError):
-                active_set(qp)
-            continue
+def test_it_agrees_with_daqp_on_20_problems_of_every_robot_and_records_an_honest_way(name: str) -> None:
+    active = ""
+    for qp in controller_qps(name, 20, torque=0.3):
         run = active_set(qp)
-        assert np.allclose(run.solution.x, expected.x, atol=1e-7)
+        assert np.max(np.abs(run.solution.x - solve(qp).x)) < 1e-7
         check_optimum(run)
         check_record(run)
+        active += " ".join(run.solution.active)
+    assert "torque" in active
+    assert "facet" in active or not judges.load(name).feet
 
 
 def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
@@ -188,17 +172,6 @@ def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks
     assert np.median(warm) == 1  # most ticks keep the active set of the last one
 
 
-def test_the_controller_runs_on_it() -> None:
-    robot = judges.load("go2")
-    state = robot.random_state(3, 0.1)
-    tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
-    readable = fb.WholeBodyController(robot, contacts, tasks, solver="active_set")(state.q, state.v)
-    assert readable.solution.solver == "active_set"
-    assert np.allclose(
-        readable.tau, fb.WholeBodyController(robot, contacts, tasks, path="readable")(state.q, state.v).tau, atol=1e-7
-    )
-
-
 @pytest.mark.parametrize("name", ["solo12", "go2", "talos"])
 def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name: str) -> None:
     robot = judges.load(name)
@@ -206,28 +179,10 @@ def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(
     controller = fb.WholeBodyController(robot, contacts, tasks, min_normal_force=2000.0, solver="active_set")
     with pytest.raises(InfeasibleError, match="these are in conflict") as caught:
         controller(robot.standing().q, robot.standing().v)
-    check_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
+    assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
 
 
 # degenerate, infeasible, unbounded -----------------------------------------------------------------------------------
-
-
-def check_smallest_conflict(qp: QP, names: tuple[str, ...]) -> None:
-    """Together impossible, possible without any one of them: by a linear program on the whole problem."""
-    rows = [qp.inequality_names.index(name) for name in names]
-    assert not feasible(qp, rows)
-    for row in rows:
-        assert feasible(qp, [i for i in rows if i != row])
-
-
-def feasible(qp: QP, rows: list[int]) -> bool:
-    return bool(least(np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, (None, None)).status == 0)
-
-
-def least(c: Array, G: Array, h: Array, A: Array, b: Array, bounds: tuple[float | None, float | None]) -> Any:
-    """The linear program min cᵀ x with G x ≤ h, A x = b; scipy wants None where there are no rows."""
-    upper, equal = (G, h) if len(G) else (None, None), (A, b) if len(A) else (None, None)
-    return linprog(c, *upper, *equal, bounds=bounds, method="highs")
 
 
 CORNER = [[1, 0], [0, 1], [1, 1], [2, 1], [1, 2], [1, 0]]  # six rows through one point of the plane
@@ -298,7 +253,7 @@ def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp: QP)
     for start in (None, (0.0, 0.0), (50.0, -20.0)):
         with pytest.raises(InfeasibleError, match="Loosen or drop any one of them") as caught:
             active_set(qp, start)
-        check_smallest_conflict(qp, caught.value.rows)
+        assert judges.is_smallest_conflict(qp, caught.value.rows)
     with pytest.raises(InfeasibleError):
         solve(qp, "active_set")
 
@@ -327,10 +282,10 @@ def random_qp(seed: int) -> QP:
 
 def verdict(qp: QP) -> str:
     """By linear programs: is there a point, and a direction without curvature or row where the objective falls?"""
-    if least(np.zeros(qp.n), qp.G, qp.h, qp.A, qp.b, (None, None)).status == 2:
+    if not judges.is_feasible(qp, list(range(len(qp.G)))):
         return "infeasible"
     flat = np.vstack([qp.H, qp.A])
-    falls = least(qp.g, qp.G, np.zeros(len(qp.G)), flat, np.zeros(len(flat)), (-1.0, 1.0))
+    falls = linprog(qp.g, qp.G, np.zeros(len(qp.G)), flat, np.zeros(len(flat)), bounds=(-1.0, 1.0), method="highs")
     return "unbounded" if falls.fun < -1e-9 else "optimal"
 
 
@@ -342,22 +297,13 @@ def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed: in
         run = active_set(qp)
     except InfeasibleError as error:
         assert expected == "infeasible"
-        check_smallest_conflict(qp, error.rows)
+        assert judges.is_smallest_conflict(qp, error.rows)
     except SolverError as error:
         assert expected == "unbounded", error
     else:
         assert expected == "optimal"
         check_optimum(run)
         check_record(run)
-
-
-@given(st.integers(0, 10**9))
-@hypothesis_settings(max_examples=40)
-def test_random_problems_have_the_optimum_that_cvxpy_finds(seed: int) -> None:
-    flat = random_qp(seed)
-    qp = QP(flat.H + 0.5 * np.eye(flat.n), flat.g, flat.A, flat.b, flat.G, flat.h)  # curved: the optimum is one point
-    if verdict(qp) == "optimal":
-        assert np.allclose(active_set(qp).solution.x, solve(qp, "cvxpy").x, atol=1e-4)
 
 
 @given(st.integers(0, 10**9), st.integers(0, 10**9))
@@ -383,10 +329,7 @@ def test_arguments_that_do_not_fit_are_refused() -> None:
         active_set(table_top(), working=["tabel"])
 
 
-def test_a_run_is_a_value_and_the_same_every_time() -> None:
-    qp = DEGENERATE["a vertex of more rows than variables"]
-    first, second = active_set(qp, (-1.0, -2.0)), active_set(qp, (-1.0, -2.0))
-    assert [step.working for step in first.iterations] == [step.working for step in second.iterations]
-    assert np.array_equal(first.solution.x, second.solution.x)
-    assert not first.iterations[0].x.flags.writeable
-    assert not first.solution.x.flags.writeable
+def test_a_run_is_a_value() -> None:
+    run = active_set(table_top())
+    assert not run.iterations[0].x.flags.writeable
+    assert not run.solution.x.flags.writeable
