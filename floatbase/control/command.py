@@ -20,20 +20,20 @@ class Command:
     forces: (k,) N, world, the contact forces planned with them, stacked as in `contacts`.
     contacts: the contacts that the forces act at.
     path: which way answered, "compiled" or "readable".
-    solve: gives `solution`; called when that is first asked for.
+    solution: what `solution` gives, or a function that makes it when it is first asked for.
 
     The arrays are read-only.
     """
 
     def __init__(
-        self, tau: Array, qdd: Array, forces: Array, contacts: Contacts, path: str, solve: Callable[[], Solution]
+        self, tau: Array, qdd: Array, forces: Array, contacts: Contacts, path: str, solution: Solution | Callable[[], Solution]
     ) -> None:
-        self.tau, self.qdd, self.forces, self.contacts, self.path, self._solve = tau, qdd, forces, contacts, path, solve
+        self.tau, self.qdd, self.forces, self.contacts, self.path, self._solution = tau, qdd, forces, contacts, path, solution
 
     @cached_property
     def solution(self) -> Solution:
         """The QP of this tick with its optimum, multipliers and residuals."""
-        return self._solve()
+        return self._solution if isinstance(self._solution, Solution) else self._solution()
 
     def force(self, name: str) -> Array:
         """The planned force of one contact, shape (3,), N, world: for a flat foot the sum over its corners."""

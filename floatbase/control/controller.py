@@ -13,7 +13,7 @@ import numpy.typing as npt
 from floatbase._arrays import Array, read_only
 from floatbase.control.command import Command
 from floatbase.control.problem import Limits, Problem, build_qp
-from floatbase.control.tick import Compiled, announce_if_slow, cache_warning, obstacle
+from floatbase.control.tick import Compiled, cache_warning, obstacle
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives import Task
@@ -71,14 +71,14 @@ class WholeBodyController:
         if path not in get_args(Path):
             raise unknown_name("path", path, get_args(Path))
         self.problem, self.solver, self.requested_path = problem, solver, path
-        self.compiled, self.path_reason = _compiled_tick(problem, solver, path)
-        self.path: Literal["compiled", "readable"] = "readable" if self.compiled is None else "compiled"
+        reason = "it was requested" if path == "readable" else obstacle(problem, solver)
+        if reason and path == "compiled":
+            raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
+        self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
+        self.path_reason = reason or "the tasks and contacts are the package's own" + cache_warning()
+        self.compiled = None if reason else Compiled(problem)
         if self.compiled is not None:
-            warning = cache_warning()
-            with announce_if_slow(
-                f"floatbase compiles its controller{'; ' + warning if warning else ', once: about half a minute'}."
-            ):
-                self.compiled.warm_up()
+            self.compiled.warm_up()
 
     @property
     def robot(self) -> Robot:
@@ -111,7 +111,7 @@ class WholeBodyController:
             return command
         solution = solve(self.qp(State(self.robot, q, v), t), self.solver)
         tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
-        return Command(tau, qdd, forces, self.contacts, "readable", partial(_itself, solution))
+        return Command(tau, qdd, forces, self.contacts, "readable", solution)
 
     def _compiled_command(self, tick: Compiled, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
         """The compiled tick's answer, or None where the readable path must answer, or say what is wrong."""
@@ -124,15 +124,11 @@ class WholeBodyController:
             return None
         numbers = answer[0]
         numbers.setflags(write=False)
-        solve = partial(self._solution_of, q, v, t, *answer)
-        return Command(numbers[tick.tau], numbers[tick.qdd], numbers[tick.forces], self.contacts, "compiled", solve)
+        solution = partial(self._solution_of, q, v, t, *answer)
+        return Command(numbers[tick.tau], numbers[tick.qdd], numbers[tick.forces], self.contacts, "compiled", solution)
 
     def _solution_of(self, q: Array, v: Array, t: float, numbers: Array, n_active: int, targets: Array) -> Solution:
-        """The readable problem of a compiled tick, with the tick's answer as its solution.
-
-        q, v, t: the state and the time of the tick.
-        numbers, n_active, targets: the answer, as `Compiled.__call__` returns it.
-        """
+        """The readable problem at q, v and t, with what `Compiled.__call__` returned for them as its solution."""
         tick = self.compiled
         assert tick is not None  # it answered
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
@@ -162,23 +158,3 @@ class WholeBodyController:
 
     def __repr__(self) -> str:
         return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"
-
-
-def _compiled_tick(problem: Problem, solver: str, path: Path) -> tuple[Compiled | None, str]:
-    """The compiled tick of a problem, or None, and the reason for either. Raises where it was requested and cannot be had."""
-    if path == "readable":
-        return None, "it was requested"
-    reason = obstacle(problem, solver)
-    if reason and path == "compiled":
-        raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
-    if reason:
-        return None, reason
-    tick = Compiled(problem)
-    if not tick.fits:
-        return None, "a target has the wrong shape"
-    return tick, "; ".join(filter(None, ("the tasks and contacts are the package's own", cache_warning())))
-
-
-def _itself(solution: Solution) -> Solution:
-    """A solution that is there already."""
-    return solution

@@ -51,8 +51,7 @@ class Limits:
 class Problem:
     """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning there.
 
-    Where no task acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added,
-    so that the optimum is unique. Raises `InputError` for values of a wrong kind; `check_shapes` looks at names and shapes.
+    Raises `InputError` for values of a wrong kind; `check_shapes` looks at names and shapes.
     """
 
     robot: Robot
@@ -82,12 +81,12 @@ class Problem:
 def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
-    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: the
-    friction polyhedron (28) and the normal force of every contact point, and the torque limits. Source: the document, §4.1.
+    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: those of
+    `Limits`. Source: the document, §4.1.
 
     eom: the equations of motion (7) at a state.
     tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is missing).
-    limits: friction, normal forces and torque limits.
+    limits: the inequalities.
     t: s, the time that tasks with moving targets are evaluated at.
 
     Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a measured velocity that the
@@ -109,17 +108,8 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     G = np.zeros((len(G_force) + len(G_torque), n))
     G[: len(G_force), blocks["forces"]] = G_force
     G[len(G_force) :, blocks["tau"]] = G_torque
-    return QP(
-        H=H,
-        g=g,
-        A=A,
-        b=np.concatenate([-eom.h, b]),
-        G=G,
-        h=np.concatenate([h_force, h_torque]),
-        equality_names=_equality_names(eom.robot, eom.contacts),
-        inequality_names=force_names + torque_names,
-        blocks=blocks,
-    )
+    b, h = np.concatenate([-eom.h, b]), np.concatenate([h_force, h_torque])
+    return QP(H, g, A, b, G, h, _equality_names(eom.robot, eom.contacts), force_names + torque_names, blocks)
 
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
@@ -155,8 +145,7 @@ def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
     gap = np.abs(eom.b - b)
     motion = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
     if np.max(gap, initial=0.0) > INCONSISTENT + MOTION_NOISE * motion:
-        names = _equality_names(eom.robot, eom.contacts)[eom.nv :]
-        rows = [names[i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
+        rows = [_equality_names(eom.robot, eom.contacts)[eom.nv + i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
         raise InfeasibleError(
             f"these motions cannot be kept together: {', '.join(rows)}. At least one of their constraints has to go.", rows
         )
@@ -168,9 +157,8 @@ def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
 def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
     """Friction facets and normal force of every point: G λ ≤ h, and the names of the rows."""
     per_point = limits.facets + 1
-    G = np.zeros((per_point * contacts.n_points, contacts.k))
-    h = np.zeros(len(G))
     names: list[RowLabel] = []
+    G, h = np.zeros((per_point * contacts.n_points, contacts.k)), np.zeros(per_point * contacts.n_points)
     for i, point in enumerate(contacts.point_names):
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
         rows = slice(per_point * i, per_point * (i + 1))
@@ -185,24 +173,16 @@ def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple
 def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
     """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h, and the names of the rows."""
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
-    rows = np.eye(robot.d)[limited]
-    bound = limits.torque_limits[limited]
-    joints = [robot.joint_names[i] for i in limited]
-    names = tuple(
-        RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint)
-        for side in ("upper", "lower")
-        for joint in joints
-    )
-    return np.vstack([rows, -rows]), np.concatenate([bound, bound]), names
+    rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
+    sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]
+    names = tuple(RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side, joint in sides)
+    return np.vstack([rows, -rows]), np.tile(bound, 2), names
 
 
 @lru_cache(maxsize=64)
 def _equality_names(robot: Robot, contacts: Contacts) -> tuple[RowLabel, ...]:
     """Names of the rows of (7)."""
     axes = [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"] if robot.is_floating else []
-    owners = [*axes, *robot.joint_names]
+    dynamics = [RowLabel(f"dynamics {owner}", "dynamics", owner) for owner in (*axes, *robot.joint_names)]
     motion = [(contact.name, i, row) for contact in contacts for i, row in enumerate(contact.row_names)]
-    return (
-        *(RowLabel(f"dynamics {owner}", "dynamics", owner) for owner in owners),
-        *(RowLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion),
-    )
+    return *dynamics, *(RowLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion)

@@ -21,14 +21,13 @@ from floatbase._arrays import Array
 from floatbase.control.tick.tables import CONTACT_KINDS, TASK_KINDS, dynamics_of, tables_of
 from floatbase.errors import InputError
 from floatbase.objectives import Task, nearest_rotation
-from floatbase.robots import Robot
+from floatbase.robots import Robot, check_unit_lengths
 
 if TYPE_CHECKING:
     from floatbase.control.problem import Problem
 
 # joints whose axes stand still in their own frame
 _JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
-_UNIT = 1e-6  # part by which (cos, sin) in a posture may miss length 1, as for `State`
 
 
 @contextmanager
@@ -44,10 +43,10 @@ def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
 
 
 def cache_warning() -> str:
-    """What to do where no folder can be written to for compiled code, or ""."""
+    """What to add to a message where compiled code cannot be kept on disk, or ""."""
     from floatbase.control.tick import jit
 
-    return "" if jit.cache_on_disk else "what is compiled cannot be kept here: set NUMBA_CACHE_DIR to a folder to write to"
+    return "" if jit.cache_on_disk else "; what is compiled cannot be kept here: set NUMBA_CACHE_DIR to a folder to write to"
 
 
 def obstacle(problem: Problem, solver: str) -> str:
@@ -60,15 +59,11 @@ def obstacle(problem: Problem, solver: str) -> str:
     for task in problem.tasks:
         if type(task) not in TASK_KINDS:
             return f"task {task.name!r} is a {type(task).__name__}; the compiled tick takes the tasks of the package"
-    return _numba_obstacle() or _robot_obstacle(problem.robot)
-
-
-def _numba_obstacle() -> str:
     try:
         import floatbase.control.tick.tick  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
         return f"numba cannot be loaded ({error}); pip install numba may mend it"
-    return ""
+    return _robot_obstacle(problem.robot)
 
 
 @lru_cache(maxsize=16)
@@ -92,24 +87,21 @@ class Compiled:
 
     qdd, tau, forces: where these are among the numbers.
     arguments: what `tick.tick` takes after q, v and the targets, but for the answer and the parts to run.
-    targets: those that stand still.
+    targets: as in `costs.TaskTable`, zeros for those that move.
     workspace: real and whole numbers, memory of the tick.
-    fits: False where a target has the wrong shape.
 
-    Raises `UnknownNameError` for a frame that does not exist.
+    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
     """
 
     def __init__(self, problem: Problem):
         from floatbase.control.tick import tick
 
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
-        self._problem, self.dynamics, self._tables = problem, dynamics_of(robot), tables_of(problem)
-        self.fits, self.targets = not self._tables.misfits, self._tables.targets
+        self._problem, self.dynamics = problem, dynamics_of(robot)
+        *tables, self.targets, self._moving = tables_of(problem)
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        tables = self._tables.sizes, self._tables.indices, self._tables.numbers
-        n_motion_rows = sum(len(contact.row_names) for contact in problem.contacts)
-        n_floats, n_ints = tick.workspace_sizes(tables[0], n_motion_rows)
+        n_floats, n_ints = tick.workspace_sizes(tables[0])
         self.workspace = np.empty(n_floats), np.empty(n_ints, np.int64)  # of one tick at a time: the dynamics' lock sees to it
         self.arguments = *self.dynamics.views, *tables, *self.workspace
         self._tick, self._parts = tick.tick, tick.PARTS
@@ -117,7 +109,7 @@ class Compiled:
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, Array] | None:
         if q.shape != self._q_shape or v.shape != self._v_shape:
             return None
-        targets = self._targets_at(t) if self._tables.moving else self.targets
+        targets = self._targets_at(t) if self._moving else self.targets
         if targets is None:
             return None
         dynamics, answer = self.dynamics, self.empty_answer()
@@ -131,12 +123,13 @@ class Compiled:
         from floatbase.control.tick.jit import remove_old_files
 
         standing = self._problem.robot.standing()
-        q, v = np.array(standing.q), np.array(standing.v)
-        try:
-            self(q, v, 0.0)
-        except (EOFError, UnpicklingError):  # a power cut left half a file on disk: forget it, and compile again
-            self._tick.recompile()
-            self(q, v, 0.0)
+        given = np.array(standing.q), np.array(standing.v), 0.0
+        with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about half a minute'}."):
+            try:
+                self(*given)
+            except (EOFError, UnpicklingError):  # a power cut left half a file on disk: forget it, and compile again
+                self._tick.recompile()
+                self(*given)
         remove_old_files(self._tick)
 
     def empty_answer(self) -> Array:
@@ -146,7 +139,7 @@ class Compiled:
     def tasks(self, targets: Array) -> tuple[Task, ...]:
         """The tasks with the targets of one tick, as a call returned them: functions may return others when called again."""
         values: dict[int, dict[str, Any]] = {}
-        for task, first, shape, name, _ in self._tables.moving:
+        for task, first, shape, name, _ in self._moving:
             values.setdefault(task, {})[name] = targets[first : first + prod(shape)].reshape(shape)
         return tuple(replace(cast(Any, task), **values.get(i, {})) for i, task in enumerate(self._problem.tasks))
 
@@ -161,20 +154,17 @@ class Compiled:
 
     def _targets_at(self, t: float) -> Array | None:
         """All targets at time t, in an array of their own, as other threads may run ticks too. None for a bad target."""
-        targets = self.targets.copy()
-        for _, first, shape, name, function in self._tables.moving:
+        targets, robot = self.targets.copy(), self._problem.robot
+        for _, first, shape, name, function in self._moving:
             try:
                 value: Array = np.asarray(function(t), dtype=np.float64)
-                if name == "rotation" and value.shape == shape:
+                if value.shape != shape:
+                    return None
+                if name == "rotation":
                     value = nearest_rotation(name, value)
+                if name == "q":
+                    check_unit_lengths(robot.model, name, value, first=2 if robot.is_floating else 1)
             except (TypeError, ValueError, InputError):
-                return None
-            if value.shape != shape or (name == "q" and not self._has_unit_turns(value)):
                 return None
             targets[first : first + value.size] = value.ravel()
         return targets
-
-    def _has_unit_turns(self, q: Array) -> bool:
-        """Whether (cos, sin) of joints without limits have length 1."""
-        turns = [first for _, _, _, first, count in self.dynamics.tree[1:] if count == 2]
-        return all(abs(np.hypot(q[first], q[first + 1]) - 1.0) <= _UNIT for first in turns)

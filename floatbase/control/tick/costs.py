@@ -35,7 +35,7 @@ class TaskTable(NamedTuple):
 class Cost(NamedTuple):
     """½ ‖R (β, 1)‖² + ½ Σ diagonal β² - linearᵀ β."""
 
-    R: Any  # (·, nb + 1), a multiple of four rows
+    R: Any  # (·, nb + 1), a multiple of four rows, of which the last may be zero
     diagonal: Any  # (nb,), from terms on single entries of (q̈, λ) that are a β
     linear: Any  # (nb,), likewise
 
@@ -54,11 +54,9 @@ def rotation_error(R, target):
 
 
 @jit
-def motion_task(i, tasks: TaskTable, bodies: Bodies, Ag, links, rows):
+def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
     """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for a bad target.
 
-    Ag: (6, nv), centroidal momentum matrix: mass × the Jacobian of the CoM in its first three rows.
-    links: (n, 4), mass of each link and its position in the joint.
     rows: (3, nv) receives the Jacobian.
     """
     clear(rows)
@@ -66,11 +64,11 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, Ag, links, rows):
     target = targets.reshape(1, targets.size)
     after, valid = first + (9 if kind == ORIENTATION else 3), True
     if kind == COM:
-        p, e_dot, drift, mass = centre_of_mass(bodies, links)
+        p, e_dot, drift, mass = centre_of_mass(bodies)
         e = minus(p, row_part(target, 0, first))
         for r in range(3):
             for c in range(rows.shape[1]):
-                rows[r, c] = Ag[r, c] / mass
+                rows[r, c] = bodies.Ag[r, c] / mass
     else:
         R, p = frame_pose(bodies, joint, tasks.frames, i)
         if kind == ORIENTATION:
@@ -87,10 +85,7 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, Ag, links, rows):
 
 @jit
 def posture_error(tree, q, v, target, base, e, e_dot):
-    """e and ė (d,) of all joints from q and target (nq,) and v (nv,); joints without limits are (cos, sin) in q.
-
-    tree: as in `Bodies`. base: first joint's index in v.
-    """
+    """e and ė (d,) of all joints, the first at `base` in v, from q and target (nq,); unlimited ones are (cos, sin) in q."""
     for i in range(1, tree.shape[0]):
         row, at = tree[i, 1] - base, tree[i, 3]
         if row < 0:
@@ -104,13 +99,11 @@ def posture_error(tree, q, v, target, base, e, e_dot):
 
 
 @jit
-def task_costs(q, v, bodies: Bodies, Ag, links, tasks: TaskTable, space: Space, base, workspace, cost: Cost):
+def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Space, base, workspace, cost: Cost):
     """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns the number of its rows in use, -1 for a bad target.
 
     q, v: (nq,), (nv,), the state.
-    Ag, links: as for `motion_task`.
     base: number of rows of (7) without a motor, 6 or 0.
-    cost: receives the result; the last of the rows in use, of which there are a multiple of four, may be zero.
     """
     R, nv, d, nb = cost.R, v.size, space.T.shape[0], cost.linear.size
     k = space.V.shape[0] - nv
@@ -123,7 +116,7 @@ def task_costs(q, v, bodies: Bodies, Ag, links, tasks: TaskTable, space: Space, 
     for i in range(tasks.table.shape[0]):
         kind, at, w, kp, kd = tasks.table[i, 0], tasks.table[i, 2], tasks.gains[i, 0], tasks.gains[i, 1], tasks.gains[i, 2]
         if kind <= FRAME:
-            e, e_dot, bias, valid = motion_task(i, tasks, bodies, Ag, links, rows)
+            e, e_dot, bias, valid = motion_task(i, tasks, bodies, rows)
             if not valid:
                 return -1
             root = np.sqrt(w)
@@ -148,12 +141,9 @@ def task_costs(q, v, bodies: Bodies, Ag, links, tasks: TaskTable, space: Space, 
 
 @jit
 def single_entry_costs(used, weights, weighted, space: Space, cost: Cost):
-    """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ). Returns the number of rows of R in use.
+    """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ) to a cost. Returns how many rows of R are in use then.
 
-    used: number of rows of R in use before.
-    weights: (n + d,), of each entry.
-    weighted: (n + d,), weight × desired.
-    cost: updated; entries that are a β change the diagonal only, the others take a row of R.
+    weights, weighted: (n + d,), weight and weight × desired of each entry; those that are a β take no row of R.
     """
     V, beta_of, T = space
     R, diagonal, linear = cost

@@ -20,7 +20,7 @@ from floatbase.qp import FEASIBILITY_TOLERANCE
 INACCURATE, INFEASIBLE = -2, -3  # why there is no answer: it lacks digits, or there seems to be none
 FLAT_COST = 1e-13  # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
 PARALLEL = 1e-12  # part of a row, squared, outside the active rows: with less it depends on them
-NEWTON_STEPS = 3  # at most, each to half as many lost digits or better
+NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
 SETTLED = 1e-6  # part of β: what a step this small leaves is rounding
 UNSETTLED = 1e-4  # part of β that the last step may still move
 WRONG_SIGN = 1e-9  # part of the largest multiplier by which one may be negative through rounding
@@ -87,12 +87,7 @@ def inverse(L, W):
 
 @jit
 def add_row(W, U, d, z, q):
-    """Mirror rows q: of W so that d (nb,) = W row is zero after q, and make d column q of U.
-
-    W, U: as in `ActiveSet`.
-    d, z: (nb,), as from `directions`.
-    q: number of active rows.
-    """
+    """Mirror rows q: of W so that d = W row is zero after q, and make d column q of U; d, z: as from `directions`."""
     n, length = d.size, 0.0
     for j in range(q, n):
         length += d[j] * d[j]
@@ -153,17 +148,13 @@ def times_row(W, row, d):
 
 @jit
 def directions(W, U, d, q, z, r):
-    """How β and the multipliers move as the multiplier of a new row grows by 1.
+    """How β and the multipliers move as the multiplier of a new row grows by 1, from d (nb,) = W times that row.
 
-    W, U: as in `ActiveSet`.
-    d: (nb,), W times the new row.
-    q: number of active rows.
     z: (nb,) receives the step of β.
     r: (nb,) receives the decrease of the q multipliers.
     """
     n, j = d.size, q
-    for i in range(n):
-        z[i] = 0.0
+    clear(z)
     while j + 4 <= n:  # four rows at a time: each sum is loaded and stored once for all of them
         a, b, c, e = d[j], d[j + 1], d[j + 2], d[j + 3]
         for i in range(n):
@@ -183,12 +174,10 @@ def directions(W, U, d, q, z, r):
 def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
     """Bring one violated row to its bound, dropping active rows whose multiplier would turn negative.
 
-    number, row, bound: of the row, (nb,) and its bound in h.
-    q: number of active rows.
+    number, row, bound: of that row, as in `ActiveSet`.
     d, z, r: (nb,), memory for `directions`.
-    active, beta: updated.
 
-    Returns the new q, or why there is none.
+    Updates `active` and `beta`. Returns the new q, or why there is none.
     """
     n, multiplier, mu, W, U = beta.size, 0.0, active.mu, active.W, active.U
     for _ in range(2 * n + 2):
@@ -229,13 +218,11 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
 def newton_step(q, slope, L, step, move, y, active: ActiveSet, beta):
     """One step of Newton's method on the optimality conditions from (β, mu) that are right but for rounding.
 
-    q: number of active rows.
     slope: (nb,), the cost's slope at β; overwritten.
-    L: (nb, nb), Cholesky factor of the Hessian.
+    L: Cholesky factor of the Hessian.
     step, move, y: (nb,), memory.
-    active, beta: the multipliers and β are updated.
 
-    Returns the largest change of an entry of β.
+    Updates β and the multipliers. Returns the largest change of an entry of β.
     """
     nb, mu, rows, W, U = beta.size, active.mu, active.rows, active.W, active.U
     if q == 0:
@@ -246,8 +233,9 @@ def newton_step(q, slope, L, step, move, y, active: ActiveSet, beta):
     for a in range(q):
         for c in range(nb):
             slope[c] += mu[a] * rows[a, c]
+    clear(step)
+    clear(move)
     for j in range(nb):
-        step[j], move[j] = 0.0, 0.0
         for i in range(nb):
             step[j] -= W[j, i] * slope[i]
     for a in range(q):  # back to the bounds: Uᵀ y = h - G β
@@ -287,8 +275,7 @@ def wrong_signed_row(mu, q):
 def dual_search(cost: Cost, limits: Inequalities, space: Space, workspace, numbers, mu, beta):
     """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why there is no answer.
 
-    numbers, mu: (nb,) receive the numbers and multipliers of the active rows.
-    beta: (nb,) receives the optimum.
+    numbers, mu, beta: (nb,) receive the numbers and multipliers of the active rows, and the optimum.
 
     Newton's method refines the end of the search. Where that shows that it was not the optimum, as a multiplier has the wrong
     sign or a row is violated, the search goes on.

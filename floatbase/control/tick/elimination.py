@@ -35,7 +35,7 @@ def gauss_jordan(B, first, last, top, columns, weights, lengths, pivots):
     B: (·, n + 1), the right-hand side in the last column; rows first:last have other entries in the first `columns` only.
     top: rows from there on are cleared of the pivots.
     weights: (columns,), each row takes the pivot of the largest weight × |entry|.
-    lengths: length of each row of B before the elimination.
+    lengths: of each row of B, before the elimination.
     pivots: receives the column of each row's pivot.
     """
     right, least = B.shape[1] - 1, 1.0
@@ -65,10 +65,7 @@ def gauss_jordan(B, first, last, top, columns, weights, lengths, pivots):
 
 @jit
 def equalities(A, b, M, h, J, base, lengths, B):
-    """(7) without its joint rows: B (m + base, n + 1) = [A 0 | b] above [M_b -J_bᵀ | -h_b]; see `eliminate`.
-
-    lengths: (m + base,) receives the length of each row without its last entry.
-    """
+    """(7) without its joint rows: B = [A 0 | b] above [M_b -J_bᵀ | -h_b], and the `lengths` of its rows left of the bar."""
     m, nv, k = A.shape[0], A.shape[1], J.shape[0]
     for i in range(m):
         for c in range(nv):
@@ -90,18 +87,11 @@ def equalities(A, b, M, h, J, base, lengths, B):
 
 
 @jit_allocating
-def inconsistent(A, b, v, U):
-    """Whether rows of A q̈ = b disagree by more than the contacts' motion A v explains; U: (m, r), of the SVD of A."""
-    gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
-    return np.max(np.abs(gap)) > INCONSISTENT + MOTION_NOISE * np.max(np.abs(motion))
-
-
-@jit_allocating
 def independent_rows(A, b, v, rows, right):
     """(5) Orthonormal rows (r, nv) that say what A q̈ = b says along the directions that A resolves, as in `build_qp`.
 
-    v: (nv,), the velocity. rows: (m, nv) and right: (m,) receive them and their right-hand sides first. Returns r, -1 where
-    A q̈ = b is inconsistent.
+    rows, right: (m, nv), (m,) receive them and their right-hand sides first. Returns r, or -1 where rows of A q̈ = b disagree by
+    more than the contacts' motion A v explains.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
@@ -109,7 +99,8 @@ def independent_rows(A, b, v, rows, right):
         r += 1
     U = np.ascontiguousarray(U[:, :r])
     rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
-    return -1 if inconsistent(A, b, v, U) else r
+    gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
+    return -1 if np.max(np.abs(gap)) > INCONSISTENT + MOTION_NOISE * np.max(np.abs(motion)) else r
 
 
 @jit
@@ -117,8 +108,7 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
     """(13)(17) Solve the equalities for as many entries of (q̈, λ). Returns the least part left of a motion row, of any row.
 
     A, b: (m, nv), (m,), the motion rows (5).
-    M, h: (nv, nv), (nv,), of (7).
-    J: (k, nv), of all contact points.
+    M, h, J: (nv, nv), (nv,), (k, nv), of (7).
     base: number of rows of (7) without a motor, 6 or 0.
     B: (m + base, n + 1) receives the reduced rows.
     pivots: (m + base,) receives the entry of (q̈, λ) that each is solved for.
@@ -142,11 +132,9 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
 
 @jit
 def parametrise(B, pivots, m, free, V, beta_of):
-    """(13)(17) V and beta_of of `Space` from reduced rows.
+    """(13)(17) V and beta_of of `Space` from the reduced rows of `eliminate`, the first m of them for motions.
 
-    B, pivots: as from `eliminate`; the pivots of rows from m on still stand in the rows before, and are substituted here.
-    m: number of motion rows.
-    free: (nb,), memory for the entries of (q̈, λ) that each β is.
+    The pivots of the later rows still stand in those of motions, and are substituted here. free: (nb,), memory.
     """
     n, nb = V.shape[0], V.shape[1] - 1
     for c in range(n):

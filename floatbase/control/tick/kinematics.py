@@ -17,9 +17,11 @@ class Bodies(NamedTuple):
     """The tree of n joints in one state."""
 
     tree: Any  # (n, 5), parent, first index in v, count in v, first index in q, count in q
+    links: Any  # (n, 4), mass of each link and its position in the joint
     poses: Any  # (n, 12), rotation column by column, then position
     J: Any  # (6, nv), spatial velocity about the world's origin for each entry of v: linear, then angular
-    velocity: Any  # (n, 6), spatial velocity of each joint about the world's origin: linear, then angular
+    Ag: Any  # (6, nv), centroidal momentum matrix: mass × the Jacobian of the CoM in its first three rows
+    velocity: Any  # (n, 6), J v of each joint
     drift: Any  # (n, 6), its derivative at q̈ = 0
 
 
@@ -37,7 +39,7 @@ def forward_velocities(bodies: Bodies, v):
 
     A joint's columns of J move with it, so its drift is that of its parent + velocity × (J v of the joint alone).
     """
-    tree, _, J, velocity, drift = bodies
+    tree, J, velocity, drift = bodies.tree, bodies.J, bodies.velocity, bodies.drift
     for r in range(6):
         velocity[0, r], drift[0, r] = 0.0, 0.0
     for i in range(1, tree.shape[0]):
@@ -92,34 +94,22 @@ def angular_jacobian(bodies: Bodies, joint, out, row):
 
 
 @jit
-def centre_of_mass(bodies: Bodies, links):
-    """Position, velocity and drift of the centre of mass, and the mass. links: (n, 4), mass and its position in the joint."""
+def centre_of_mass(bodies: Bodies):
+    """Position, velocity and drift of the centre of mass, and the mass."""
     com, com_velocity, com_drift, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
-    for i in range(1, links.shape[0]):
-        p = plus(row_part(bodies.poses, i, 9), rotate(rotation_in(bodies.poses, i), row_part(links, i, 1)))
+    for i in range(1, bodies.links.shape[0]):
+        link = bodies.links[i, 0]
+        p = plus(row_part(bodies.poses, i, 9), rotate(rotation_in(bodies.poses, i), row_part(bodies.links, i, 1)))
         velocity, drift = point_velocity(bodies, i, p)
-        com = plus(com, times(links[i, 0], p))
-        com_velocity, com_drift = plus(com_velocity, times(links[i, 0], velocity)), plus(com_drift, times(links[i, 0], drift))
-        mass += links[i, 0]
+        com, mass = plus(com, times(link, p)), mass + link
+        com_velocity, com_drift = plus(com_velocity, times(link, velocity)), plus(com_drift, times(link, drift))
     return times(1.0 / mass, com), times(1.0 / mass, com_velocity), times(1.0 / mass, com_drift), mass
 
 
 @jit
-def count_motion_rows(contacts: ContactTable):
-    """The number m of rows of A in (5): three for a point, six for a flat foot."""
-    m = 0
-    for i in range(contacts.table.shape[0]):
-        m += 3 if contacts.table[i, 1] == POINT else 6
-    return m
-
-
-@jit
 def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
-    """(4)(5) A (m, nv) and b (m,) of all contacts, and the Jacobian J (k, nv) of their points.
-
-    A and J may be one array where all contacts are points.
-    """
-    all_points, row = contacts.table.shape[0] == contacts.points.shape[0] and b.size == J.shape[0], 0
+    """(4)(5) A (m, nv) and b (m,) of all contacts, and the Jacobian J (k, nv) of their points, the same array where m = k."""
+    row = 0
     clear(A)
     clear(J)
     for i in range(contacts.table.shape[0]):
@@ -131,7 +121,7 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
             point_jacobian(bodies, joint, point, J, 3 * j)
             if kind == POINT:
                 p = point
-        if not all_points:
+        if A.shape[0] != J.shape[0]:  # there are flat feet, of three corners or more
             point_jacobian(bodies, joint, p, A, row)
         _, drift = point_velocity(bodies, joint, p)
         if kind == POINT:  # the ball rolls: its lowest point moves on the ball

@@ -6,10 +6,9 @@ What belongs to one robot or one contact is made once, so that a controller with
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -31,14 +30,14 @@ TASK_KINDS: dict[type, int] = {
 POINT, FLAT = range(2)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
 _POSE = 12  # numbers of a pose: rotation column by column, then position
+Indices: TypeAlias = npt.NDArray[np.int64]
 
 
 class Dynamics:
     """Pinocchio's results for one robot.
 
     views: M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12); overwritten by every `update`.
-    tree: (n, 5), parent, first index in v, count in v, first index in q, count in q of each joint.
-    links: (n, 4), mass of each link and its position in the joint.
+    tree, links: as in `kinematics.Bodies`.
     lock: held from `update` until the views have been read.
     """
 
@@ -71,52 +70,28 @@ def dynamics_of(robot: Robot) -> Dynamics:
 
 
 class Target(NamedTuple):
-    """A target that is a function of time: of which task, from where in `Tables.targets`, its shape, attribute and function."""
+    """A target that is a function of time."""
 
-    task: int
-    first: int
+    task: int  # whose it is
+    first: int  # where it starts among the targets
     shape: tuple[int, ...]
-    name: str
+    name: str  # of the task's attribute
     function: Callable[[float], npt.ArrayLike]
 
 
-@dataclass(frozen=True, eq=False)
-class Tables:
-    """A problem as arrays.
+def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Target]]:
+    """A problem of the package's own contacts and tasks: what `tick.unpack` takes, and the targets that move, zeros among them.
 
-    sizes, indices, numbers: as for `tick.unpack`.
-    targets: of all tasks, one after the other; zero where they are functions of time.
-    moving: those that are.
-    misfits: names of the tasks with a target of the wrong shape.
-    """
-
-    sizes: npt.NDArray[np.int64]
-    indices: npt.NDArray[np.int64]
-    numbers: Array
-    targets: Array
-    moving: tuple[Target, ...]
-    misfits: tuple[str, ...]
-
-
-def tables_of(problem: Problem) -> Tables:
-    """The tables of one problem, whose contacts and tasks are the package's own.
-
-    Raises `UnknownNameError` for a frame that does not exist.
+    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
     """
     contacts, frames, points, cones = _contact_tables(problem)
-    tasks, gains, poses, targets, moving, misfits = _task_tables(problem)
-    dynamics, limits = dynamics_of(problem.robot), problem.limits
-    sizes = (len(dynamics.tree), len(contacts), len(points), limits.facets + 1, len(tasks), len(limits.torque_limits))
+    tasks, gains, poses, targets, moving = _task_tables(problem)
+    dynamics, limits, m = dynamics_of(problem.robot), problem.limits, sum(len(on.row_names) for on in problem.contacts)
+    sizes = (len(dynamics.tree), len(contacts), len(points), m, limits.facets + 1, len(tasks), len(limits.torque_limits))
     lengths, bounds = np.linalg.norm(cones, axis=1), (limits.torque_limits, limits.min_normal_force)
     real = (0.0, dynamics.links, frames, points, gains, poses, cones, lengths, *bounds)  # a workspace counts in its first entry
-    return Tables(
-        sizes=np.array(sizes, np.int64),
-        indices=np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)]),
-        numbers=np.concatenate([np.ravel(table) for table in real]),
-        targets=targets,
-        moving=moving,
-        misfits=misfits,
-    )
+    indices = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
+    return np.array(sizes, np.int64), indices, np.concatenate([np.ravel(table) for table in real]), targets, moving
 
 
 def _contact_tables(problem: Problem) -> tuple[Any, ...]:
@@ -146,10 +121,10 @@ def _contact_numbers(
 
 
 def _task_tables(problem: Problem) -> tuple[Any, ...]:
-    """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, moving and misfits as in `Tables`."""
+    """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, and those that move."""
     n, robot = len(problem.tasks), problem.robot
     table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE))
-    targets, first, moving, misfits = [np.zeros(0)], 0, [], []
+    targets, first, moving = [np.zeros(0)], 0, []
     for i, task in enumerate(problem.tasks):
         joint, poses[i] = _frame(robot, task.frame) if isinstance(task, OrientationTask | FrameTask) else (0, np.zeros(_POSE))
         table[i] = TASK_KINDS[type(task)], joint, first
@@ -161,23 +136,19 @@ def _task_tables(problem: Problem) -> tuple[Any, ...]:
             elif np.shape(value) == shape:
                 target = np.asarray(value)
             elif value is not None:
-                misfits.append(task.name)
+                problem.check_shapes()  # raises
             targets.append(target.ravel())
             first += target.size
-    return table, gains, poses, np.concatenate(targets), tuple(moving), tuple(misfits)
+    return table, gains, poses, np.concatenate(targets), moving
 
 
 def _target_shapes(task: Task, robot: Robot, k: int) -> dict[str, tuple[int, ...]]:
     """Shape of each target of a task by its attribute, in the order in which the tick reads them."""
     if isinstance(task, OrientationTask):
         return {"rotation": (3, 3), "angular_velocity": (3,), "angular_acceleration": (3,)}
-    if isinstance(task, PostureTask):
-        return {"q": (robot.nq,)}
-    if isinstance(task, ForceTask):
-        return {"target": (k,)}
-    if isinstance(task, TorqueTask):
-        return {"target": (robot.d,)}
-    return {"position": (3,), "velocity": (3,), "acceleration": (3,)}
+    if isinstance(task, CoMTask | FrameTask):
+        return {"position": (3,), "velocity": (3,), "acceleration": (3,)}
+    return {"q": (robot.nq,)} if isinstance(task, PostureTask) else {"target": (k if isinstance(task, ForceTask) else robot.d,)}
 
 
 def _frame(robot: Robot, name: str) -> tuple[int, Array]:

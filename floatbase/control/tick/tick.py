@@ -21,24 +21,24 @@ from floatbase.control.tick.dual_search import INACCURATE, dual_search
 from floatbase.control.tick.elimination import DEPENDENT_ROW, LOST_ROW, Space, eliminate, independent_rows, parametrise, torques
 from floatbase.control.tick.inequalities import Inequalities, affine_value
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
-from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, count_motion_rows, forward_velocities
+from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, forward_velocities
 from floatbase.control.tick.memory import all_finite, take_matrix, take_vector
+from floatbase.robots import UNIT_LENGTH_TOLERANCE
 
 INVALID, STOPPED = -1, -4
 PARTS = 4  # of a tick: contact rows, elimination, costs, optimum
 FAR = 1e8  # m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
-UNIT = 1e-6  # part by which a quaternion or (cos, sin) may miss length 1, as for `State`
 
 
 @jit_inline
 def unpack(sizes, indices, numbers, targets):
-    """Tree, links, contacts, tasks and limits as `tables.tables_of` laid them out, in that order and row by row.
+    """Tree, links, contacts, tasks and limits as `tables.tables_of` laid them out.
 
-    sizes: number of joints, contacts, points, facets + 1, tasks, driven joints.
+    sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints.
     indices, numbers: whole and real numbers of all tables, one table after the other, as in a workspace.
-    targets: of all tasks, one after the other.
+    targets: as in `TaskTable`.
     """
-    n, n_contacts, n_points, n_rows, n_tasks, d = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5]
+    n, n_contacts, n_points, n_rows, n_tasks, d = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5], sizes[6]
     indices[0], numbers[0] = 1, 1
     tree, links, contact_table = take_matrix(indices, n, 5), take_matrix(numbers, n, 4), take_matrix(indices, n_contacts, 4)
     contacts = ContactTable(contact_table, take_matrix(numbers, n_contacts, 16), take_matrix(numbers, n_points, 3))
@@ -49,9 +49,9 @@ def unpack(sizes, indices, numbers, targets):
     return tree, links, contacts, tasks, Inequalities(cones, lengths, n_rows - 1, torque_limits, least_normal)
 
 
-def workspace_sizes(sizes, m):
-    """How many real and how many whole numbers a tick needs; sizes: as for `unpack`, m: number of motion rows."""
-    n_joints, _, n_points, _, n_tasks, d = (int(size) for size in sizes)
+def workspace_sizes(sizes):
+    """How many real and how many whole numbers a tick needs; sizes: as for `unpack`."""
+    n_joints, _, n_points, m, _, n_tasks, d = (int(size) for size in sizes)
     base, k = 6, 3 * n_points
     nv = d + base
     n = nv + k  # and no more β than that
@@ -73,19 +73,14 @@ def inputs_valid(q, v, targets, tree):
             square = 0.0
             for at in range(tree[i, 3] + (3 if tree[i, 4] == 7 else 0), tree[i, 3] + tree[i, 4]):
                 square += q[at] * q[at]
-            if abs(np.sqrt(square) - 1.0) > UNIT:
+            if abs(np.sqrt(square) - 1.0) > UNIT_LENGTH_TOLERANCE:
                 return False
     return True
 
 
 @jit
 def write_answer(space: Space, beta, active, n_active, nv, answer):
-    """Write (q̈, τ, λ) at β (nb,) and the numbers of the active rows into `answer`. Returns False where one has no digits.
-
-    active: (n_active or more,), numbers of the active rows.
-    nv: length of q̈.
-    answer: as for `tick`; the multipliers are there already.
-    """
+    """Write (q̈, τ, λ) at β and the numbers of the active rows into `answer`. Returns False where one has no digits."""
     n, d = space.V.shape[0], space.T.shape[0]
     affine_value(space.V, beta, 0, nv, answer[:nv])
     affine_value(space.T, beta, 0, d, answer[nv : nv + d])
@@ -106,22 +101,22 @@ def make_tick(digest):
 
         q, v: (nq,), (nv,), the state.
         targets, sizes, indices, numbers: as for `unpack`; few arrays, since each costs.
-        M, h, J, Ag, oMi: Pinocchio's results for q and v, as in `tables.Dynamics`.
+        M, h, J, Ag, oMi: the views of `tables.Dynamics` for q and v.
         floats, ints: workspaces of `workspace_sizes` numbers.
         answer: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each.
         parts: how many of PARTS to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
         tree, links, contacts, tasks, limits = unpack(sizes, indices, numbers, targets)
-        nv, d, k, m = v.size, limits.torque_limits.size, 3 * contacts.points.shape[0], count_motion_rows(contacts)
+        nv, d, k, m = v.size, limits.torque_limits.size, 3 * contacts.points.shape[0], sizes[3]
         base, n = nv - d, nv + k
         if not inputs_valid(q, v, targets, tree):
             return INVALID
         floats[0], ints[0] = 1, 1
-        bodies = Bodies(tree, oMi, J, take_matrix(floats, tree.shape[0], 6), take_matrix(floats, tree.shape[0], 6))
+        bodies = Bodies(tree, links, oMi, J, Ag, take_matrix(floats, tree.shape[0], 6), take_matrix(floats, tree.shape[0], 6))
         forward_velocities(bodies, v)
         J_points, b = take_matrix(floats, k, nv), take_vector(floats, m)
-        A = J_points if contacts.table.shape[0] == contacts.points.shape[0] and m == k else take_matrix(floats, m, nv)
+        A = J_points if m == k else take_matrix(floats, m, nv)
         contact_rows(bodies, contacts, A, b, J_points)
         if parts == 1:
             return STOPPED
@@ -145,7 +140,7 @@ def make_tick(digest):
             return STOPPED
         R = take_matrix(floats, 3 * tasks.table.shape[0] + 2 * d + k + 3, nb + 1)
         diagonal, linear = take_vector(floats, nb), take_vector(floats, nb)
-        used = task_costs(q, v, bodies, Ag, links, tasks, space, base, floats, Cost(R, diagonal, linear))
+        used = task_costs(q, v, bodies, tasks, space, base, floats, Cost(R, diagonal, linear))
         if used < 0:
             return INVALID
         if parts == 3:
