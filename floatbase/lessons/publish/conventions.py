@@ -17,7 +17,7 @@ _TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = (-?[0-9.]+(?:e-?[0-9]
 
 def page() -> str:
     """The page of conventions as Markdown."""
-    first, *rest = (conventions.__doc__ or "").split("\n", 1)
+    first, *rest = _with_table_of_symbols(conventions.__doc__ or "").split("\n", 1)
     rows = [f"| {room} | `{name}` | {value} | {reason} |" for room, name, value, reason in tolerances()]
     return "\n".join(
         [
@@ -36,6 +36,23 @@ def page() -> str:
             "",
         ]
     )
+
+
+def _with_table_of_symbols(text: str) -> str:
+    """The text with its indented lines, which are symbols and their meaning, as a table of Markdown."""
+    lines: list[str] = []
+    symbol = re.compile(r"^    (\S.*?)\s{2,}(.+)$")
+    for line in text.splitlines():
+        found = symbol.match(line)
+        if found and not (lines and lines[-1].startswith("| ")):
+            lines += ["", "| symbol | meaning |", "|---|---|"]
+        if found:
+            lines.append(f"| {found[1]} | {re.sub(' +', ' ', found[2])} |")
+        elif line.startswith("    "):
+            lines[-1] = f"{lines[-1][:-2]} {line.strip()} |"
+        else:
+            lines.append(line)
+    return "\n".join(lines)
 
 
 def tolerances() -> Iterator[tuple[str, str, str, str]]:
