@@ -43,8 +43,7 @@ class Limits:
         limits = np.ravel(self.torque_limits)
         object.__setattr__(self, "torque_limits", torque_limits_of(limits.size, limits))
         object.__setattr__(self, "min_normal_force", positive("min_normal_force", self.min_normal_force, "N", allow_zero=True))
-        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets)  # raises for a wrong number of facets
-        object.__setattr__(self, "facets", polyhedron.facets)
+        object.__setattr__(self, "facets", FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets).facets)
 
 
 @dataclass(frozen=True, eq=False)
