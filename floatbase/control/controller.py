@@ -62,16 +62,12 @@ class WholeBodyController:
             raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
         problem = Problem(robot, contacts, tasks, Limits(limits, facets, inside, min_normal_force))
-        problem.check_shapes()
-        self.__setstate__((problem, solver, path))
+        problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
+        self._prepare(problem, solver, path)
 
-    def __getstate__(self) -> tuple[Problem, str, Path]:
-        """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""
-        return self.problem, self.solver, self.requested_path
-
-    def __setstate__(self, state: tuple[Problem, str, Path]) -> None:
-        """Keep a checked problem, and prepare the compiled tick where it can be had."""
-        self.problem, self.solver, self.requested_path = problem, solver, path = state
+    def _prepare(self, problem: Problem, solver: str, path: Path, warm_up: bool = True) -> None:
+        """Keep a checked problem, and prepare the compiled tick where it can be had. warm_up: run it once, outside the loop."""
+        self.problem, self.solver, self.requested_path = problem, solver, path
         check_solver(solver)
         if path not in get_args(Path):
             raise unknown_name("path", path, get_args(Path))
@@ -81,8 +77,15 @@ class WholeBodyController:
         self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
         self.path_reason = reason or "the tasks and contacts are the package's own" + cache_warning()
         self.compiled = None if reason else Compiled(problem)
-        if self.compiled is not None:
+        if self.compiled is not None and warm_up:
             self.compiled.warm_up()
+
+    def __getstate__(self) -> tuple[Problem, str, Path]:
+        """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""
+        return self.problem, self.solver, self.requested_path
+
+    def __setstate__(self, state: tuple[Problem, str, Path]) -> None:
+        self._prepare(*state)
 
     @property
     def robot(self) -> Robot:
@@ -145,9 +148,9 @@ class WholeBodyController:
         contacts = self.contacts if contacts is None else contacts
         problem = replace(self.problem, contacts=contacts, tasks=self.tasks if tasks is None else tasks)
         other = object.__new__(type(self))
-        other.__setstate__((problem, self.solver, self.requested_path))
+        other._prepare(problem, self.solver, self.requested_path, warm_up=self.compiled is None)
         if tasks is not None or other.compiled is None:  # the compiled tick's tables found that known tasks fit new contacts
-            problem.check_shapes()
+            problem.qp(self.robot.standing())
         return other
 
     def __repr__(self) -> str:

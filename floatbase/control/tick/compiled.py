@@ -120,8 +120,6 @@ class Compiled:
 
     def warm_up(self) -> None:
         """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it."""
-        from floatbase.control.tick.jit import remove_old_files
-
         standing = self._problem.robot.standing()
         given = np.array(standing.q), np.array(standing.v), 0.0
         with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about half a minute'}."):
@@ -130,7 +128,6 @@ class Compiled:
             except (EOFError, UnpicklingError):  # a power cut left half a file on disk: forget it, and compile again
                 self._tick.recompile()
                 self(*given)
-        remove_old_files(self._tick)
 
     def empty_answer(self) -> Array:
         """An array for the numbers of one tick."""

@@ -133,7 +133,7 @@ def _task_tables(problem: Problem) -> tuple[Any, ...]:
             elif np.shape(value) == shape:
                 target = np.asarray(value)
             elif value is not None:
-                problem.check_shapes()  # raises
+                problem.qp(problem.robot.standing())  # raises
             targets.append(target.ravel())
             first += target.size
     return table, gains, poses, np.concatenate(targets), moving
