@@ -111,9 +111,7 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
         raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
     robot = getattr(controller, "robot", sim.robot)
     if robot is not sim.robot:
-        raise InputError(
-            f"the controller is one for {robot!r}, the simulation holds {sim.robot!r}: make both from one fb.load."
-        )
+        raise InputError(f"the controller is for {robot!r}, the simulation holds {sim.robot!r}: make both from one fb.load.")
     if not isinstance(pushes, Sequence):
         raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {pushes!r}.")
     for push in pushes:
@@ -161,10 +159,8 @@ def _act(
 def _desired(sim: Simulation, command: Any) -> Array:
     """The torques of a command, shape (d,), N·m."""
     if not hasattr(command, "tau"):
-        raise InputError(
-            f"a controller must answer with .tau, shape ({sim.robot.d},), N·m, as a Command does; got {command!r}. Any "
-            f"object with .tau will do: types.SimpleNamespace(tau=…)."
-        )
+        required = f".tau, shape ({sim.robot.d},), N·m, as a Command does or types.SimpleNamespace(tau=…)"
+        raise InputError(f"a controller must answer with {required}; got {command!r}.")
     return _torques(sim, "the controller's torques", command.tau)
 
 
