@@ -159,8 +159,10 @@ def _act(
 def _desired(sim: Simulation, command: Any) -> Array:
     """The torques of a command, shape (d,), N·m."""
     if not hasattr(command, "tau"):
-        required = f".tau, shape ({sim.robot.d},), N·m, as a Command does or types.SimpleNamespace(tau=…)"
-        raise InputError(f"a controller must answer with {required}; got {command!r}.")
+        raise InputError(
+            f"a controller must answer with .tau, shape ({sim.robot.d},), N·m, as a Command does; got {command!r}. Any "
+            f"object with .tau will do: types.SimpleNamespace(tau=…)."
+        )
     return _torques(sim, "the controller's torques", command.tau)
 
 
