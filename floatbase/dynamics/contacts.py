@@ -65,10 +65,8 @@ class Contacts:
         each = _feet(robot, frames, mu, normals)
         for foot, *_ in each:
             if not foot.is_flat:
-                raise InputError(
-                    f"{foot.frame} of {robot.name} is not a flat foot; use fb.Contacts.points, or load the robot with "
-                    "feet=[floatbase.robots.Foot(frame, corners=…)]."
-                )
+                instead = "use fb.Contacts.points, or load the robot with feet=[floatbase.robots.Foot(frame, corners=…)]"
+                raise InputError(f"{foot.frame} of {robot.name} is not a flat foot; {instead}.")
         return Contacts([_contact(*one) for one in each])
 
     @staticmethod

@@ -153,8 +153,8 @@ class Dimensions:
 def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Counts every dimension of §2.2 at this state.
 
-    The rank of J is decided once (`contact_space`). B and C are then counted by their own singular values, with the resolved
-    rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
+    `contact_space` decides the rank of J. B and C are counted by their own singular values, with the resolved rows and their
+    forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
     space = contact_space(eom)
     reactions = np.linalg.qr(eom.J.T @ space.lift)[0]

@@ -133,9 +133,8 @@ class Robot:
     @cached_property
     def base(self) -> str:
         """Name of the base link's frame."""
-        root = 1 if self.is_floating else 0
-        bodies = (frame for frame in self.model.frames if frame.type == pin.FrameType.BODY and frame.parentJoint == root)
-        return str(next(bodies, self.model.frames[0]).name)
+        root, frames = int(self.is_floating), self.model.frames
+        return str(next((f for f in frames if f.type == pin.FrameType.BODY and f.parentJoint == root), frames[0]).name)
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
@@ -217,11 +216,9 @@ def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", fi
         part = slice(model.idx_qs[i] + positions, model.idx_qs[i] + model.nqs[i])
         length = float(np.linalg.norm(q[part]))
         if model.nqs[i] != model.nvs[i] and abs(length - 1.0) > UNIT_LENGTH_TOLERANCE:
-            what = f"{name}[{part.start}:{part.stop}]"
-            if i == 1 and positions == 3:
-                what = f"the base quaternion {what} (x y z w)"
-            else:
-                what += f", {'cosine and sine' if len(q[part]) == 2 else 'the quaternion'} of {model.names[i]!r},"
+            what, numbers = f"{name}[{part.start}:{part.stop}]", "cosine and sine" if len(q[part]) == 2 else "the quaternion"
+            floating = i == 1 and positions == 3
+            what = f"the base quaternion {what} (x y z w)" if floating else f"{what}, {numbers} of {model.names[i]!r},"
             raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
 
 

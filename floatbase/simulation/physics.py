@@ -177,11 +177,9 @@ class Simulation:
             return int(self.model.joint(joint).bodyid[0])
         if self.robot.is_floating:
             return self._base
-        moving = [f.name for f in self.robot.model.frames if f.parentJoint > 0 and f.type == pin.FrameType.BODY]
-        raise InputError(
-            f"a push at {push.frame!r} moves nothing: {self.robot.name} is bolted to the ground there. "
-            f"Push a link that moves: {', '.join(moving)}."
-        )
+        moving = ", ".join(f.name for f in self.robot.model.frames if f.parentJoint > 0 and f.type == pin.FrameType.BODY)
+        held = f"{self.robot.name} is bolted to the ground there"
+        raise InputError(f"a push at {push.frame!r} moves nothing: {held}. Push a link that moves: {moving}.")
 
     def _apply(self, push: Push) -> None:
         """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""
