@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 
 import judges
@@ -277,6 +278,13 @@ def test_an_arm_bolted_to_the_ground_accelerates_as_the_equations_say() -> None:
     sim.step(tau)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     assert np.allclose((sim.v - state.v) / 1e-5, judges.aba(eom, tau, np.zeros(0)), rtol=1e-3, atol=1e-2)
+
+
+def test_a_copy_of_a_simulation_falls_as_the_simulation_does() -> None:
+    sim = copy.deepcopy(fb.Simulation(judges.load("go2")))
+    for _ in range(1500):
+        sim.step(np.zeros(12))
+    assert sim.fallen
 
 
 def test_resetting_gives_the_same_run_again() -> None:
