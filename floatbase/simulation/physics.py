@@ -155,13 +155,12 @@ class Simulation:
 
     def contact_forces(self) -> Array:
         """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world, ordered as `point_names`."""
-        forces = np.zeros((len(self._balls), 3))
-        if self.data.ncon:
-            contact = self.data.contact
-            in_frame = self.data.efc_force[contact.efc_address[:, None] + np.arange(3)]
-            # one plane (geom 0), so one frame for all contacts: its rows are normal and tangents, from the plane to the ball
-            forces[self._point_of_geom[contact.geom[:, 1]]] = in_frame @ contact.frame[0].reshape(3, 3)
-        return forces
+        forces, wrench, contact = np.zeros((len(self._balls), 3)), np.zeros(6), self.data.contact
+        for i, (_, ball) in enumerate(contact.geom):  # from the plane to the ball
+            mujoco.mj_contactForce(self.model, self.data, i, wrench)
+            forces[self._point_of_geom[ball]] = wrench[:3]
+        # one plane, so one frame for all contacts: its rows are normal and tangents
+        return forces @ contact.frame[0].reshape(3, 3) if len(contact) else forces
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the lowest point of each ball along the ground's normal."""
