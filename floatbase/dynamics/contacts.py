@@ -130,11 +130,6 @@ class Contacts:
         b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
-    def rows(self, state: State, t: float = 0.0) -> tuple[Array, Array, Array]:
-        """J of (4), shape (k, nv), with A, shape (m, nv), and b, shape (m,), of (5), all at time t, s."""
-        A, b = self.constraint(state, t)
-        return A if all(contact.J_is_A for contact in self.items) else self.jacobian(state, t), A, b
-
     def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
         return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
 
