@@ -18,9 +18,10 @@ sign. Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimizati
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, fields
+from functools import cached_property, partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,10 @@ class QP:
         values["inequality_names"] = row_labels(self.inequality_names, len(G), "inequality")
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = {part.name: getattr(self, part.name) for part in fields(self)}
+        return partial(type(self), **values | {"blocks": dict(self.blocks)}), ()  # a mapping proxy cannot be pickled
 
     @property
     def n(self) -> int:

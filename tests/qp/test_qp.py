@@ -172,6 +172,16 @@ def test_the_error_of_an_infeasible_problem_names_its_rows_and_says_what_to_do(s
     assert "Loosen or drop any one of them" in str(caught.value)
 
 
+def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
+    qp = QP(np.eye(2), np.ones(2), np.ones((1, 2)), np.ones(1), np.eye(2), np.ones(2), blocks={"tau": slice(0, 1)})
+    solution = solve(qp)
+    for copied in (copy.deepcopy(solution), pickle.loads(pickle.dumps(solution))):
+        assert np.array_equal(copied["tau"], solution["tau"]) and copied.active == solution.active
+        assert copied.qp.reduced.row_lengths.tolist() == pickle.loads(pickle.dumps(qp.reduced)).row_lengths.tolist()
+    space = Affine.stack(first=qp.equality_space, second=qp.equality_space)
+    assert np.array_equal(pickle.loads(pickle.dumps(space))["second"].A, copy.deepcopy(space)["first"].A)
+
+
 def test_labels_are_texts_that_know_their_kind_owner_and_index() -> None:
     label = RowLabel("FL_foot facet 2", "friction", "FL_foot", 2)
     assert label == "FL_foot facet 2" and label in {"FL_foot facet 2": 1}
