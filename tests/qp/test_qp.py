@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 
 import judges
@@ -13,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from floatbase.affine import Affine
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.qp import (
     INFEASIBLE,
@@ -178,6 +180,7 @@ def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
     for copied in (copy.deepcopy(solution), pickle.loads(pickle.dumps(solution))):
         assert np.array_equal(copied["tau"], solution["tau"]) and copied.active == solution.active
         assert copied.qp.reduced.row_lengths.tolist() == pickle.loads(pickle.dumps(qp.reduced)).row_lengths.tolist()
+    assert np.array_equal(replace(qp.reduced, h=np.zeros(2)).row_lengths, qp.row_lengths)
     space = Affine.stack(first=qp.equality_space, second=qp.equality_space)
     assert np.array_equal(pickle.loads(pickle.dumps(space))["second"].A, copy.deepcopy(space)["first"].A)
 
