@@ -136,7 +136,7 @@ class Contacts:
     def force_slice(self, name: str) -> slice:
         """Which entries of λ belong to a contact."""
         contact = self[name]
-        start = sum(before.k for before in self.items[: self.items.index(contact)])
+        start = sum(before.k for before in self.items[: self.names.index(name)])
         return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
@@ -155,13 +155,13 @@ class Contacts:
 
     def only(self, *names: str) -> Contacts:
         """The contacts of these names, in the order they have here."""
-        chosen = [self[name] for name in names]
-        return Contacts([contact for contact in self.items if contact in chosen])
+        chosen = [self[name].name for name in names]
+        return Contacts([contact for contact in self.items if contact.name in chosen])
 
     def without(self, *names: str) -> Contacts:
         """The contacts but those of these names."""
-        dropped = [self[name] for name in names]
-        return Contacts([contact for contact in self.items if contact not in dropped])
+        dropped = [self[name].name for name in names]
+        return Contacts([contact for contact in self.items if contact.name not in dropped])
 
     def __getitem__(self, name: str) -> Contact:
         if name not in self.names:
