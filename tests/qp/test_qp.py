@@ -185,11 +185,11 @@ def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
     assert np.array_equal(pickle.loads(pickle.dumps(space))["second"].A, copy.deepcopy(space)["first"].A)
 
 
-def test_labels_are_texts_that_know_their_kind_owner_and_index() -> None:
+def test_labels_are_texts_that_know_their_kind_owner_and_number() -> None:
     label = RowLabel("FL_foot facet 2", "friction", "FL_foot", 2)
     assert label == "FL_foot facet 2" and label in {"FL_foot facet 2": 1}
     for same in (label, copy.deepcopy(label), pickle.loads(pickle.dumps(label))):
-        assert (same, same.kind, same.owner, same.index) == ("FL_foot facet 2", "friction", "FL_foot", 2)
+        assert (same, same.kind, same.owner, same.number) == ("FL_foot facet 2", "friction", "FL_foot", 2)
     qp = QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=(label, "roof"))
     assert [name.kind for name in qp.inequality_names] == ["friction", "other rows"]
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]
