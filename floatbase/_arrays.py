@@ -65,4 +65,4 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def _text(shape: tuple[int | None, ...]) -> str:
-    return str(shape).replace("None", "any")
+    return str(tuple(n if n is None else int(n) for n in shape)).replace("None", "any")

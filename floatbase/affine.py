@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,9 @@ class Affine:
         object.__setattr__(self, "A", checked("A", self.A, (None, None)))
         object.__setattr__(self, "b", checked("b", self.b, (self.A.shape[0],)))
         object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Affine, (self.A, self.b, dict(self.blocks))  # a mapping proxy can be neither pickled nor copied
 
     @staticmethod
     def linear(A: npt.ArrayLike) -> Affine:

@@ -27,7 +27,6 @@ class Contact(Protocol):
     point_names: one for each point that carries a force; empty for a constraint whose forces have no friction cone.
     k: number of force components.
     row_names: one for each row of (5).
-    J_is_A: whether each force component acts along one row of (5), so that J = A.
     """
 
     @property
@@ -42,8 +41,6 @@ class Contact(Protocol):
     def k(self) -> int: ...
     @property
     def row_names(self) -> tuple[str, ...]: ...
-    @property
-    def J_is_A(self) -> bool: ...
 
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n, 3), m."""
@@ -62,7 +59,6 @@ class OnePoint:
     frame: str
     k: ClassVar[int] = 3
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
-    J_is_A: ClassVar[bool] = True
 
     @property
     def name(self) -> str:
@@ -143,7 +139,6 @@ class FlatFootContact:
     normal: Array = field(default_factory=lambda: UP)
     mu: float = DEFAULT_MU
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z", "angular x", "angular y", "angular z")  # world-aligned
-    J_is_A: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check_ground(self)

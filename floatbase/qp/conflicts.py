@@ -32,7 +32,7 @@ def infeasible(rows: Iterable[str]) -> InfeasibleError:
     if len(labels) > _FEW:
         kinds: dict[str, list[str]] = {}
         for label in labels:
-            kinds.setdefault(label.kind, []).append(label.owner if label.index is None else label)
+            kinds.setdefault(label.kind, []).append(label.owner if label.number is None else label)
         text = "".join(f"\n  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()) + "\n"
     return InfeasibleError(
         f"no point satisfies all rows. Given the equalities, these are in conflict:{text}"
