@@ -328,11 +328,8 @@ def test_values_of_another_kind_are_refused_when_it_is_made(swap: dict[str, obje
         AnalyticController(**(fitting | swap))
 
 
-def test_its_answer_cannot_be_written_to_and_prints_in_a_line() -> None:
+def test_its_answer_prints_in_a_line() -> None:
     state = judges.load("go2").standing()
     command = controller_of("go2")(state.q, state.v)
-    for array in (command.tau, command.forces, command.qdd):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0.0
     assert repr(command).startswith("AnalyticCommand(|tau|=")
     assert len(repr(command)) < 80

@@ -300,6 +300,7 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(disc: R
     wheel = wheel_of_the_disc()
     assert np.allclose(wheel.slip(state), 0.0, atol=1e-12)
     qdd, force = motion(state, wheel)
+    assert force @ (wheel.constraint(state)[0] @ state.v) == pytest.approx(0.0, abs=1e-9), "a wheel that rolls does no work"
     linear, angular = world_acceleration(state, qdd)
     assert np.allclose(linear, -(rate**2) * radius * out, atol=1e-9)
     assert np.allclose(angular, rate * np.cross(Z, omega), atol=1e-9)

@@ -180,9 +180,7 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
     )
     still = np.zeros(18)
     smallest, best = (f(cost, space, "qdd")(still) for f in (objectives.seen_from_smallest, objectives.seen_from_best))
-    wanted = least(
-        eom, {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))}, {"qdd": still}
-    )
+    wanted = least(eom, {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))}, {"qdd": still})
     assert best == pytest.approx(wanted, rel=1e-6)
     assert smallest / best == pytest.approx(29.0, abs=0.5)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import judges
@@ -265,6 +265,12 @@ def test_a_flat_foot_taken_as_a_point_is_measured_by_all_its_corners() -> None:
     assert np.allclose(points.foot_positions, corners.foot_positions.reshape(30, 2, 4, 3).mean(axis=2), atol=1e-9)
 
 
+def test_an_arm_bolted_to_the_ground_never_falls() -> None:
+    record = fb.rollout(fb.Simulation(judges.load("ur5")), lambda q, v, t: Torques(np.zeros(6)), 0.3)
+    assert record.outcome == "completed"
+    assert np.linalg.norm(record.final.q - record.q[0]) > 0.1, "it did not move"
+
+
 def test_an_arm_under_the_controller_reaches_its_posture() -> None:
     robot = judges.load("ur5")
     sim = fb.Simulation(robot)
@@ -274,13 +280,6 @@ def test_an_arm_under_the_controller_reaches_its_posture() -> None:
     assert record.outcome == "completed"
     assert record.planned.shape == record.measured.shape == (1000, 0)
     assert np.allclose(record.final.q, goal, atol=5e-3)
-
-
-def test_records_can_not_be_written_to(sim: fb.Simulation) -> None:
-    record = fb.rollout(sim, limp, 0.01)
-    arrays = {field.name: getattr(record, field.name) for field in fields(record)} | {"com": record.com, "slip": record.slip()}
-    writable = [name for name, value in arrays.items() if isinstance(value, np.ndarray) and value.flags.writeable]
-    assert not writable
 
 
 def test_a_controller_that_writes_into_its_arguments_changes_neither_the_physics_nor_the_record(sim: fb.Simulation) -> None:
