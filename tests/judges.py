@@ -95,7 +95,7 @@ class Mujoco:
         self.data = mujoco.MjData(self.model)
         self.convert = Conversion(robot, self.model)
 
-    def at(self, state: State) -> Mujoco:
+    def move_to(self, state: State) -> Mujoco:
         """Move MuJoCo's model to a state."""
         self.data.qpos[:], self.data.qvel[:] = self.convert.to_mujoco(state.q, state.v)
         mujoco.mj_fwdPosition(self.model, self.data)
@@ -190,10 +190,10 @@ def aba(eom: EquationsOfMotion, tau: Array, forces: Array) -> Array:
     return np.asarray(pin.aba(model, data, state.q, state.v, robot.S @ tau, wrenches))
 
 
-def relative(found: npt.ArrayLike, wanted: npt.ArrayLike) -> float:
-    """Largest difference, relative to the largest entry wanted."""
-    found, wanted = np.asarray(found, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
-    return float(np.max(np.abs(found - wanted), initial=0.0) / max(float(np.max(np.abs(wanted), initial=0.0)), 1e-12))
+def relative(found: npt.ArrayLike, expected: npt.ArrayLike) -> float:
+    """Largest difference, relative to the largest expected entry."""
+    found, expected = np.asarray(found, dtype=np.float64), np.asarray(expected, dtype=np.float64)
+    return float(np.max(np.abs(found - expected), initial=0.0) / max(float(np.max(np.abs(expected), initial=0.0)), 1e-12))
 
 
 def is_feasible(qp: QP, rows: list[int]) -> bool:

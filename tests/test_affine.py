@@ -99,10 +99,10 @@ def test_a_pullback_is_the_cost_of_the_mapped_point(seed: int, m: int, n: int) -
 def test_the_cost_of_a_residual_is_half_its_weighted_square(seed: int, m: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     f, x, r = affine(rng, m, n), rng.normal(size=n), rng.normal(size=m)
-    wanted = 0.5 * 3.0 * np.sum(f(x) ** 2)
-    assert fb.Quadratic.of(f, 3.0)(x) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    wanted = 0.5 * 2.0 * np.sum((f.A @ x - r) ** 2)
-    assert fb.Quadratic.from_residual(f.A, r, 2.0)(x) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+    expected = 0.5 * 3.0 * np.sum(f(x) ** 2)
+    assert fb.Quadratic.of(f, 3.0)(x) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    expected = 0.5 * 2.0 * np.sum((f.A @ x - r) ** 2)
+    assert fb.Quadratic.from_residual(f.A, r, 2.0)(x) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 @given(seeds, sizes)

@@ -22,20 +22,20 @@ def controller_of(name: str, **options: object) -> fb.WholeBodyController:
 
 
 def cases(name: str, n: int) -> list[State]:
-    """Half the states near standing, half far away, where many rows push."""
+    """Half the states near standing, half far away, where many rows are active."""
     return judges.states(name, n - n // 2, 0.08) + judges.states(name, n // 2, 0.3)
 
 
 @pytest.mark.parametrize(("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS])
 def test_daqp_finds_the_optimum_that_cvxpy_finds(name: str, n: int) -> None:
-    controller, pushed = controller_of(name), 0
+    controller, n_active = controller_of(name), 0
     for state in cases(name, n):
         qp = controller.qp(state)
         found, judge = solve(qp), solve(qp, "cvxpy")
         prices = float(np.sum(judge.inequality_multipliers) + np.sum(np.abs(judge.equality_multipliers)))
         worth = max(judge.residuals.inequality, judge.residuals.equality) * prices + judge.residuals.complementarity * len(qp.G)
         assert abs(found.objective - judge.objective) < 1e-9 * (1.0 + abs(judge.objective)) + 2.0 * worth
-        pushed += bool(found.active)
+        n_active += bool(found.active)
         for solution in (found, judge):
             r = solution.residuals
             assert r.equality < 1e-9
@@ -43,7 +43,7 @@ def test_daqp_finds_the_optimum_that_cvxpy_finds(name: str, n: int) -> None:
             assert r.stationarity < 1e-6
             assert r.complementarity < 1e-6
             assert r.dual == 0.0
-    assert pushed > n / 4 or not judges.load(name).is_floating, "no row pushed: these states try nothing"
+    assert n_active > n / 4 or not judges.load(name).is_floating, "no row was active: these states try nothing"
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
@@ -81,7 +81,7 @@ def test_forces_stay_in_the_exact_cone_and_torques_within_their_limits(name: str
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_row_that_pushes_is_met_exactly_and_named_for_what_it_limits(name: str) -> None:
+def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name: str) -> None:
     controller, robot = controller_of(name, min_normal_force=1.0), judges.load(name)
     seen = set()
     for state in cases(name, 20):
@@ -124,13 +124,13 @@ def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) 
 def test_an_arm_bolted_to_the_ground_gets_computed_torque() -> None:
     """(1) τ = M (-kp e - kd ė) + h, the closed form, when nothing limits it."""
     robot = judges.load("ur5")
-    goal = robot.standing().q
-    task = fb.PostureTask(goal, kp=30.0, kd=4.0, weight=1e6)
+    target = robot.standing().q
+    task = fb.PostureTask(target, kp=30.0, kd=4.0, weight=1e6)
     controller = fb.WholeBodyController(robot, fb.Contacts.none(), [task], torque_limits=np.inf)
     for state in judges.states("ur5", 5):
-        judge = judges.mujoco_of("ur5").at(state)
-        wanted = judge.M @ (-30.0 * (state.q - goal) - 4.0 * state.v) + judge.h
-        assert np.allclose(controller(state.q, state.v).tau, wanted, atol=1e-5)
+        judge = judges.mujoco_of("ur5").move_to(state)
+        expected = judge.M @ (-30.0 * (state.q - target) - 4.0 * state.v) + judge.h
+        assert np.allclose(controller(state.q, state.v).tau, expected, atol=1e-5)
 
 
 def test_nothing_can_hold_a_robot_that_touches_nothing() -> None:
@@ -291,7 +291,7 @@ def test_anything_of_the_form_of_a_task_is_a_task() -> None:
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_feet_whose_rows_contradict_a_measured_velocity_are_kept_as_nearly_as_possible(name: str) -> None:
+def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_nearly_as_possible(name: str) -> None:
     """J loses rank on solo8: then A q̈ = b is met in the least-squares sense, and exactly wherever that is possible."""
     controller = controller_of(name)
     for state in judges.states(name, 5, 0.3):
@@ -359,7 +359,7 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
 
 
-def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_noise_asks_for() -> None:
+def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_only_noise_calls_for() -> None:
     robot = judges.load("solo8")
     state = robot.standing()
 
@@ -372,7 +372,7 @@ def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_noise
     assert record.outcome == "completed", record.error
 
 
-def test_motions_that_contradict_each_other_are_named_and_not_averaged() -> None:
+def test_inconsistent_motions_are_named_and_not_averaged() -> None:
     from floatbase.dynamics import moving_frame
 
     robot = judges.load("go2")

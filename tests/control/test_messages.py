@@ -109,5 +109,5 @@ def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> 
     except InputError:
         return
     command = controller(task)(STATE.q, STATE.v)
-    wanted = controller(fb.CoMTask(UP, kp=10.0, kd=10.0, weight=10.0))(STATE.q, STATE.v)
-    assert np.allclose(command.tau, wanted.tau)
+    expected = controller(fb.CoMTask(UP, kp=10.0, kd=10.0, weight=10.0))(STATE.q, STATE.v)
+    assert np.allclose(command.tau, expected.tau)

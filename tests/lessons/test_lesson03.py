@@ -111,7 +111,7 @@ def test_03_3_knows_what_is_wrong() -> None:
 
 
 @pytest.mark.parametrize("frames", [(), ("FL_foot", "FR_foot", "RL_foot"), ("FL_foot",)], ids=len)
-def test_a_direction_gives_the_base_what_was_asked_for_with_least_change_of_forces(frames: tuple[str, ...]) -> None:
+def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forces(frames: tuple[str, ...]) -> None:
     space = space_of(GO2, *frames)
     desired = [0.3, -0.2, 1.0, 0.1, 0.5, -0.4] if len(frames) != 1 else [0, 0, 1.0, 0, 0, 0]
     step = direction(space, base=desired)

@@ -271,8 +271,8 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
     run.pause()
     run.close()
     assert delay.steps == sum(len(s) for s in slices) * 2  # steps of the physics, two for each tick
-    asked = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])
-    np.testing.assert_allclose(slices[1].tau[0], asked, atol=1e-9)
+    desired = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])
+    np.testing.assert_allclose(slices[1].tau[0], desired, atol=1e-9)
     run.reset()
     until(lambda: delay.resets == 1)
     run.close()

@@ -186,15 +186,15 @@ def test_the_record_holds_a_row_for_each_tick_taken_before_its_torques_act(sim: 
 
 
 def test_torques_are_held_for_the_whole_control_period(sim: fb.Simulation) -> None:
-    asked = []
+    times = []
 
     def counting(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
-        asked.append(t)
-        return Torques(np.full(12, float(len(asked))))
+        times.append(t)
+        return Torques(np.full(12, float(len(times))))
 
     record = fb.rollout(sim, counting, 0.02, control_period=0.005)
-    assert np.allclose(asked, [0.0, 0.005, 0.01, 0.015])
-    assert np.allclose(record.time, asked)
+    assert np.allclose(times, [0.0, 0.005, 0.01, 0.015])
+    assert np.allclose(record.time, times)
     assert sim.time == pytest.approx(0.02)
     assert np.array_equal(record.tau[:, 0], [1.0, 2.0, 3.0, 4.0])
     again = fb.Simulation(sim.robot)
@@ -223,11 +223,11 @@ def test_a_rollout_goes_on_from_where_the_last_one_ended(sim: fb.Simulation) -> 
 
 def test_moving_targets_see_the_simulations_clock(sim: fb.Simulation) -> None:
     seen = []
-    goal = sim.robot.standing().com
+    target = sim.robot.standing().com
 
     def path(t: float) -> np.ndarray:
         seen.append(t)
-        return goal + np.array([0.0, 0.05 * t, 0.0])
+        return target + np.array([0.0, 0.05 * t, 0.0])
 
     robot = sim.robot
     tasks = [fb.CoMTask(path), fb.OrientationTask(), fb.PostureTask(robot.standing().q)]
@@ -274,12 +274,12 @@ def test_an_arm_bolted_to_the_ground_never_falls() -> None:
 def test_an_arm_under_the_controller_reaches_its_posture() -> None:
     robot = judges.load("ur5")
     sim = fb.Simulation(robot)
-    goal = robot.standing().q + 0.2
-    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [fb.PostureTask(goal, weight=1e3)])
+    target = robot.standing().q + 0.2
+    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [fb.PostureTask(target, weight=1e3)])
     record = fb.rollout(sim, controller, 1.0)
     assert record.outcome == "completed"
     assert record.planned.shape == record.measured.shape == (1000, 0)
-    assert np.allclose(record.final.q, goal, atol=5e-3)
+    assert np.allclose(record.final.q, target, atol=5e-3)
 
 
 def test_a_controller_that_writes_into_its_arguments_changes_neither_the_physics_nor_the_record(sim: fb.Simulation) -> None:
@@ -414,7 +414,7 @@ def test_a_contact_that_changes_its_kind_within_a_rollout_is_refused() -> None:
         fb.rollout(fb.Simulation(robot), Shifty(), 0.01)
 
 
-def test_the_force_of_a_foot_is_asked_for_by_name_and_of_a_flat_foot_is_the_resultant() -> None:
+def test_the_force_of_a_foot_is_found_by_its_name_and_of_a_flat_foot_is_the_resultant() -> None:
     robot = judges.load("talos")
     record = fb.rollout(fb.Simulation(robot), standing("talos"), 0.02)
     for kind in ("measured", "planned"):
