@@ -6,7 +6,9 @@ Lists of robots are collected from the package, so a robot that joins the catalo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -47,6 +49,34 @@ def stance(robot: Robot, mu: float = 0.7) -> fb.Contacts:
         return fb.Contacts.none()
     flat = all(foot.is_flat for foot in robot.feet)
     return fb.Contacts.flat_feet(robot, mu) if flat else fb.Contacts.points(robot, mu)
+
+
+def controller_of(name: str, **options: object) -> fb.WholeBodyController:
+    """A controller that keeps a robot standing on all its feet."""
+    robot = load(name)
+    return fb.WholeBodyController(robot, stance(robot), fb.standing_tasks(robot.standing()), **options)
+
+
+@dataclass
+class Torques:
+    """The simplest command: torques alone."""
+
+    tau: Array
+
+
+def limp(q: Array, v: Array, t: float) -> Torques:
+    """A controller of go2 that gives no torques at all."""
+    return Torques(np.zeros(12))
+
+
+class KeepStill:
+    """A task of one's own: no joint accelerates."""
+
+    block: ClassVar[str] = "qdd"
+    name, weight = "keep still", 5.0
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        return fb.Affine.linear(eom.S.T)
 
 
 def random_normals(n: int, seed: int, tilt: float = 0.6) -> Array:

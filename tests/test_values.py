@@ -9,13 +9,14 @@ import pytest
 import floatbase as fb
 from floatbase.control import AnalyticController
 from floatbase.dynamics import RollingWheel
-from floatbase.friction import FrictionPolyhedron, wrench_set
+from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 
+UP = np.array([0.0, 0.0, 1.0])
 ROBOT = judges.load("go2")
 STATE = ROBOT.random_state(1, 0.1)
 CONTACTS = judges.stance(ROBOT)
 EOM = fb.equations_of_motion(STATE, CONTACTS)
-CONTROLLER = fb.WholeBodyController(ROBOT, CONTACTS, fb.standing_tasks(ROBOT.standing()))
+CONTROLLER = judges.controller_of("go2")
 COMMAND = CONTROLLER(STATE.q, STATE.v)
 RECORD = fb.rollout(fb.Simulation(ROBOT), CONTROLLER, 0.005)
 VALUES = {
@@ -24,7 +25,8 @@ VALUES = {
     "FlatFootContact": next(iter(judges.stance(judges.load("talos")))), "RollingWheel": RollingWheel("base", [0, 1, 0], 0.2),
     "EquationsOfMotion": EOM, "Affine": fb.Affine(np.eye(2), np.ones(2)),
     "Quadratic": fb.Quadratic(np.eye(2), np.ones(2)), "QP": CONTROLLER.qp(STATE), "Solution": COMMAND.solution,
-    "Limits": CONTROLLER.limits, "FrictionPolyhedron": FrictionPolyhedron([0.0, 0.0, 1.0], 0.7),
+    "Limits": CONTROLLER.limits, "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),
+    "Decomposition": decompose([5.0, 0.0, 1.0], UP),
     "WrenchSet": wrench_set(STATE, CONTACTS),
     "Command": COMMAND, "AnalyticCommand": AnalyticController(ROBOT, CONTACTS, STATE)(STATE.q, STATE.v), "Rollout": RECORD,
     "Push": fb.Push([1.0, 0.0, 0.0]),
@@ -55,6 +57,8 @@ def test_what_a_value_returns_cannot_be_written_to() -> None:
         "torques": wrenches.torques(), "support_region": wrenches.support_region(), "solution block": COMMAND.solution["tau"],
         "slip": RECORD.slip(), "final q": RECORD.final.q, "command force": COMMAND.force("FL_foot"),
     }  # fmt: skip
+    for shape in (VALUES["FrictionCone"], VALUES["FrictionPolyhedron"]):
+        answers |= {f"projection of {force} to {shape}": shape.project(force) for force in ([5.0, 0.0, 1.0], UP, -UP)}
     assert [name for name, array in answers.items() if array.flags.writeable] == []
     with pytest.raises(TypeError):
         COMMAND.solution.qp.blocks["tau"] = slice(0, 1)

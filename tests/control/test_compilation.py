@@ -29,15 +29,9 @@ from floatbase.robots import Robot
 TICK = Path(tick.__file__).parent
 
 
-def compiled_one(robot: Robot, **options: object) -> fb.WholeBodyController:
-    """A compiled controller that stands."""
-    tasks = fb.standing_tasks(robot.standing())
-    return fb.WholeBodyController(robot, judges.stance(robot), tasks, path="compiled", **options)
-
-
 def tick_of(robot: Robot) -> Compiled:
-    """Its compiled tick."""
-    compiled = compiled_one(robot).compiled
+    """The compiled tick of a controller that stands."""
+    compiled = judges.controller_of(robot.name).compiled
     assert compiled is not None
     return compiled
 
@@ -47,7 +41,7 @@ def tick_of(robot: Robot) -> Compiled:
 
 def test_the_compiled_path_is_the_default_where_it_fits() -> None:
     robot = judges.load("go2")
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+    controller = judges.controller_of(robot.name)
     assert controller.path == "compiled"
     assert controller(robot.posture, np.zeros(robot.nv)).path == "compiled"
 
@@ -76,14 +70,14 @@ def test_without_numba_the_readable_path_answers_and_says_why() -> None:
 def test_another_layout_of_pinocchios_results_leaves_the_readable_path(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = fb.load("go2")  # not the one that other tests share: what fits is remembered for each robot
     monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "fits", False)
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+    controller = judges.controller_of(robot.name)
     assert controller.path == "readable"
     assert controller.path_reason == "this Pinocchio lays its results out in another way in memory"
 
 
 def test_threads_may_share_a_controller() -> None:
     robot = judges.load("go2")
-    controller, states = compiled_one(robot), judges.states("go2", 40, 0.3)
+    controller, states = judges.controller_of(robot.name), judges.states("go2", 40, 0.3)
     expected, wrong = [controller(state.q, state.v).tau for state in states], []
 
     def run(shift: int) -> None:
@@ -105,7 +99,7 @@ def test_threads_may_share_a_controller() -> None:
 
 def test_a_replaced_controller_compiles_nothing() -> None:
     robot = judges.load("go2")
-    controller = compiled_one(robot, facets=6)
+    controller = judges.controller_of(robot.name, facets=6)
     with event.install_recorder("numba:compile") as recorder:
         for frames in (["FL_foot"], ["FR_foot", "RL_foot"], ["FL_foot", "FR_foot", "RR_foot"]):
             controller.replace(contacts=fb.Contacts.points(robot, frames=frames))(robot.posture, np.zeros(robot.nv))
@@ -239,9 +233,9 @@ def test_a_cache_that_a_power_cut_left_half_written_is_compiled_anew(error: Exce
             self.forgotten = True
 
     robot, tick_now, half = judges.load("go2"), tick.tick, Half()
-    expected = compiled_one(robot)(robot.posture, np.zeros(robot.nv)).tau
+    expected = judges.controller_of(robot.name)(robot.posture, np.zeros(robot.nv)).tau
     monkeypatch.setattr(tick, "tick", half)
-    controller = compiled_one(robot)
+    controller = judges.controller_of(robot.name)
     assert half.forgotten
     assert np.array_equal(controller(robot.posture, np.zeros(robot.nv)).tau, expected)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import pickle
 from pathlib import Path
-from typing import ClassVar
 
 import judges
 import numpy as np
@@ -385,21 +384,11 @@ def test_the_path_is_visible_and_can_be_chosen() -> None:
         fb.WholeBodyController(robot, contacts, tasks, path="quick")
 
 
-class OwnTask:
-    """A task of one's own."""
-
-    block: ClassVar[str] = "qdd"
-    name, weight = "keep still", 5.0
-
-    def residual(self, eom: object, t: float = 0.0) -> fb.Affine:
-        return fb.Affine.linear(eom.S.T)
-
-
 def test_what_does_not_fit_takes_the_readable_path_and_says_why() -> None:
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), list(fb.standing_tasks(robot.standing()))
     for options, reason in (
-        ({"tasks": [*tasks, OwnTask()]}, "keep still"),
+        ({"tasks": [*tasks, judges.KeepStill()]}, "keep still"),
         ({"tasks": tasks, "solver": "cvxpy"}, "solver 'cvxpy'"),
     ):
         controller = fb.WholeBodyController(robot, contacts, path="auto", **options)
@@ -462,9 +451,7 @@ def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
 
 @pytest.mark.parametrize("path", ["compiled", "readable"])
 def test_a_controller_can_be_copied_and_sent_to_another_process(path: str) -> None:
-    robot = judges.load("go2")
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), path=path)
-    state = robot.random_state(1, 0.1)
+    controller, state = judges.controller_of("go2", path=path), judges.load("go2").random_state(1, 0.1)
     for other in (copy.deepcopy(controller), copy.copy(controller), pickle.loads(pickle.dumps(controller))):
         assert other.path == path
         assert np.allclose(other(state.q, state.v).tau, controller(state.q, state.v).tau, rtol=0.0, atol=TORQUE)
@@ -509,7 +496,7 @@ def test_new_and_replaced_controllers_have_run_a_tick_before_the_loop_does(monke
     robot = judges.load("go2")
     warmed: list[Compiled] = []
     monkeypatch.setattr(Compiled, "warm_up", lambda self: warmed.append(self))
-    readable = fb.WholeBodyController(robot, judges.stance(robot), [OwnTask()])
+    readable = fb.WholeBodyController(robot, judges.stance(robot), [judges.KeepStill()])
     assert readable.path == "readable" and not warmed
     replaced = readable.replace(tasks=fb.standing_tasks(robot.standing()))
     assert replaced.path == "compiled" and warmed == [replaced.compiled]

@@ -431,10 +431,7 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
         (lambda: wrench_set(state, contacts).reach([np.nan] * 6), "direction holds nan"),
         (lambda: wrench_set(state, contacts).reach(np.zeros(6)), "direction is the zero wrench"),
         (lambda: wrench_set(state, contacts).torques([1.0]), r"force has shape \(1,\)"),
-        (
-            lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
-            "one FrictionPolyhedron for each of the 2",
-        ),
+        (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "one FrictionPolyhedron for each of the 2"),
     ]
     for call, message in cases:
         with pytest.raises(InputError, match=message):

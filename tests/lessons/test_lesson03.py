@@ -38,14 +38,7 @@ def turned(forces: Any, R: Any) -> Any:
 
 def test_03_1_knows_each_wrong_count() -> None:
     assert right("03.1", 11)
-    wrong = {
-        12: "moves nothing",
-        1: "do not move",
-        6: "components",
-        9: "three feet",
-        5: "legs move",
-        10: "more than",
-    }
+    wrong = {12: "moves nothing", 1: "do not move", 6: "components", 9: "three feet", 5: "legs move", 10: "more than"}
     assert missed("03.1", [*wrong.items(), ([11, 11], "shape")]) == []
 
 

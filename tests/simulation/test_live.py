@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 
 import judges
 import numpy as np
 import pytest
+from waiting import until
 
 import floatbase as fb
 from floatbase.simulation import SEEN, Live
@@ -29,13 +29,6 @@ def run(slices: list[fb.Rollout]) -> Iterator[Live]:
     live = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append)
     yield live
     live.close()
-
-
-def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
-    stop = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < stop, "waited in vain"
-        time.sleep(0.01)
 
 
 def test_it_runs_pauses_and_goes_on_where_it_was(run: Live, slices: list[fb.Rollout]) -> None:

@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import judges
 import numpy as np
 import pytest
+from judges import Torques, limp
 
 import floatbase as fb
 from floatbase.dynamics import fixed_frame
 from floatbase.errors import FloatbaseError, InfeasibleError
 from floatbase.robots import State, unbolted
-
-
-@dataclass
-class Torques:
-    """The simplest command: torques alone."""
-
-    tau: np.ndarray
-
-
-def limp(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
-    """No torques at all."""
-    return Torques(np.zeros(12))
-
-
-def standing(name: str = "go2") -> fb.WholeBodyController:
-    robot = judges.load(name)
-    return fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
 
 
 @pytest.fixture
@@ -88,11 +71,11 @@ def test_a_physics_that_explodes_has_diverged(sim: fb.Simulation, tmp_path: Path
     assert np.all(np.isfinite(record.q))
     sim.reset()
     assert not sim.diverged
-    assert fb.rollout(sim, standing(), 0.05).outcome == "completed"
+    assert fb.rollout(sim, judges.controller_of("go2"), 0.05).outcome == "completed"
 
 
 def test_a_controller_without_an_answer_ends_the_record_and_its_error_is_kept(sim: fb.Simulation) -> None:
-    inner = standing()
+    inner = judges.controller_of("go2")
 
     def gives_up(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
         if t > 0.0095:
@@ -123,7 +106,7 @@ def test_a_controller_that_fails_at_once_leaves_an_empty_record(sim: fb.Simulati
 def test_nan_or_infinite_torques_end_the_record_like_a_fall_and_the_rows_before_are_kept(
     sim: fb.Simulation, number: float
 ) -> None:
-    inner = standing()
+    inner = judges.controller_of("go2")
 
     def goes_wild(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
         tau = inner(q, v, t).tau.copy()
@@ -143,7 +126,7 @@ def test_actuators_with_nan_torques_end_the_record_too(sim: fb.Simulation) -> No
             return tau / 0.0 if sim.time > 0.0095 else tau
 
     with np.errstate(all="ignore"):
-        record = fb.rollout(sim, standing(), 0.1, actuators=Broken())
+        record = fb.rollout(sim, judges.controller_of("go2"), 0.1, actuators=Broken())
     assert (record.outcome, len(record)) == ("controller failed", 10)
     assert "the actuators' torques hold" in str(record.error)
 
@@ -163,7 +146,7 @@ def test_mistakes_in_a_controller_are_not_swallowed(sim: fb.Simulation) -> None:
 
 def test_the_record_holds_a_row_for_each_tick_taken_before_its_torques_act(sim: fb.Simulation) -> None:
     start, seen = sim.robot.standing(), []
-    inner = standing()
+    inner = judges.controller_of("go2")
 
     def watched(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
         seen.append((q.copy(), v.copy(), t))
@@ -212,7 +195,7 @@ def test_measured_forces_are_the_mean_over_the_control_period() -> None:
 
 
 def test_a_rollout_goes_on_from_where_the_last_one_ended(sim: fb.Simulation) -> None:
-    controller = standing()
+    controller = judges.controller_of("go2")
     push = fb.Push([30.0, 0.0, 0.0], start=0.015, duration=0.01)
     first, second = (fb.rollout(sim, controller, 0.02, [push]) for _ in range(2))
     assert second.time[0] == pytest.approx(first.time[-1] + 1e-3)
@@ -416,7 +399,7 @@ def test_a_contact_that_changes_its_kind_within_a_rollout_is_refused() -> None:
 
 def test_the_force_of_a_foot_is_found_by_its_name_and_of_a_flat_foot_is_the_resultant() -> None:
     robot = judges.load("talos")
-    record = fb.rollout(fb.Simulation(robot), standing("talos"), 0.02)
+    record = fb.rollout(fb.Simulation(robot), judges.controller_of("talos"), 0.02)
     for kind in ("measured", "planned"):
         forces = getattr(record, kind)
         left, right = (record.force(name, kind) for name in ("left_sole_link", "right_sole_link"))
