@@ -6,7 +6,9 @@ Lists of robots are collected from the package, so a robot that joins the catalo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -47,6 +49,35 @@ def stance(robot: Robot, mu: float = 0.7) -> fb.Contacts:
         return fb.Contacts.none()
     flat = all(foot.is_flat for foot in robot.feet)
     return fb.Contacts.flat_feet(robot, mu) if flat else fb.Contacts.points(robot, mu)
+
+
+def controller_of(name: str, **options: object) -> fb.WholeBodyController:
+    """A controller that keeps a robot standing on all its feet."""
+    robot = load(name)
+    return fb.WholeBodyController(robot, stance(robot), fb.standing_tasks(robot.standing()), **options)
+
+
+@dataclass
+class Torques:
+    """The simplest command: torques, with or without planned forces."""
+
+    tau: object
+    forces: object = None
+
+
+def limp(q: Array, v: Array, t: float) -> Torques:
+    """A controller of go2 that gives no torques at all."""
+    return Torques(np.zeros(12))
+
+
+class KeepStill:
+    """A task of one's own: no joint accelerates."""
+
+    block: ClassVar[str] = "qdd"
+    name, weight = "keep still", 5.0
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        return fb.Affine.linear(eom.S.T)
 
 
 def random_normals(n: int, seed: int, tilt: float = 0.6) -> Array:
@@ -95,7 +126,7 @@ class Mujoco:
         self.data = mujoco.MjData(self.model)
         self.convert = Conversion(robot, self.model)
 
-    def at(self, state: State) -> Mujoco:
+    def move_to(self, state: State) -> Mujoco:
         """Move MuJoCo's model to a state."""
         self.data.qpos[:], self.data.qvel[:] = self.convert.to_mujoco(state.q, state.v)
         mujoco.mj_fwdPosition(self.model, self.data)
@@ -190,10 +221,10 @@ def aba(eom: EquationsOfMotion, tau: Array, forces: Array) -> Array:
     return np.asarray(pin.aba(model, data, state.q, state.v, robot.S @ tau, wrenches))
 
 
-def relative(found: npt.ArrayLike, wanted: npt.ArrayLike) -> float:
-    """Largest difference, relative to the largest entry wanted."""
-    found, wanted = np.asarray(found, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
-    return float(np.max(np.abs(found - wanted), initial=0.0) / max(float(np.max(np.abs(wanted), initial=0.0)), 1e-12))
+def relative(found: npt.ArrayLike, expected: npt.ArrayLike) -> float:
+    """Largest difference, relative to the largest expected entry."""
+    found, expected = np.asarray(found, dtype=np.float64), np.asarray(expected, dtype=np.float64)
+    return float(np.max(np.abs(found - expected), initial=0.0) / max(float(np.max(np.abs(expected), initial=0.0)), 1e-12))
 
 
 def is_feasible(qp: QP, rows: list[int]) -> bool:

@@ -1,4 +1,4 @@
-"""What every panel of sliders must do, asked of the panels of a lesson without a browser."""
+"""What every panel of sliders must do, claimed of the panels of a lesson without a browser."""
 
 from __future__ import annotations
 

@@ -99,10 +99,10 @@ def test_a_pullback_is_the_cost_of_the_mapped_point(seed: int, m: int, n: int) -
 def test_the_cost_of_a_residual_is_half_its_weighted_square(seed: int, m: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     f, x, r = affine(rng, m, n), rng.normal(size=n), rng.normal(size=m)
-    wanted = 0.5 * 3.0 * np.sum(f(x) ** 2)
-    assert fb.Quadratic.of(f, 3.0)(x) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    wanted = 0.5 * 2.0 * np.sum((f.A @ x - r) ** 2)
-    assert fb.Quadratic.from_residual(f.A, r, 2.0)(x) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+    expected = 0.5 * 3.0 * np.sum(f(x) ** 2)
+    assert fb.Quadratic.of(f, 3.0)(x) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    expected = 0.5 * 2.0 * np.sum((f.A @ x - r) ** 2)
+    assert fb.Quadratic.from_residual(f.A, r, 2.0)(x) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 @given(seeds, sizes)
@@ -200,15 +200,11 @@ def test_the_matrix_of_a_cost_is_made_symmetric_without_changing_the_cost() -> N
     assert cost(x) == pytest.approx(0.5 * x @ H @ x)
 
 
-def test_values_share_no_array_with_what_they_were_made_of_and_can_not_be_written_to() -> None:
+def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks() -> None:
     A, b = np.eye(2), np.zeros(2)
     f = fb.Affine(A, b)
     A[0, 0] = b[0] = 9.0
     assert np.array_equal(f([1.0, 1.0]), [1.0, 1.0])
-    with pytest.raises(ValueError, match="read-only"):
-        f.A[0, 0] = 2.0
-    with pytest.raises(AttributeError):
-        f.A = np.zeros((2, 2))
     with pytest.raises(TypeError):
         f.blocks["tau"] = slice(0, 1)
     A, b = f

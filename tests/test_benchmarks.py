@@ -38,8 +38,8 @@ def test_the_friction_rows_are_those_of_the_peers():
     qp = peer_problems.problem("go2", "tsid").controller("readable").qp(peer_problems.problem("go2", "tsid").robot.standing())
     rows = qp.G[:4, qp.blocks["forces"]][:, :3]
     mu = peer_problems.MU
-    wanted = [[1, 0, -mu], [0, 1, -mu], [-1, 0, -mu], [0, -1, -mu]]
-    assert np.allclose(rows, wanted, atol=1e-12)
+    expected = [[1, 0, -mu], [0, 1, -mu], [-1, 0, -mu], [0, -1, -mu]]
+    assert np.allclose(rows, expected, atol=1e-12)
 
 
 def test_the_soles_of_every_state_are_level_and_straight():

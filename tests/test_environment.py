@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 LOCK = (ROOT / "environment.txt").read_text(encoding="utf-8")
 PINS = [Requirement(line) for line in LOCK.splitlines() if line and not line.startswith("#")]
-ASKED = [Requirement(text) for texts in (PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()) for text in texts]
+REQUIRED = [
+    Requirement(text) for texts in (PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()) for text in texts
+]
 HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba", "scipy.optimize", "scipy.spatial")
 IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
@@ -32,12 +34,12 @@ def test_every_package_is_pinned_once_to_one_version() -> None:
 def test_every_dependency_is_pinned_within_its_range() -> None:
     pins = {canonicalize_name(pin.name): pin for pin in PINS}
     wrong = []
-    for asked in ASKED:
-        pin = pins.get(canonicalize_name(asked.name))
+    for required in REQUIRED:
+        pin = pins.get(canonicalize_name(required.name))
         if pin is None:
-            wrong.append(f"{asked.name} is not in environment.txt")
-        elif not asked.specifier.contains(next(iter(pin.specifier)).version, prereleases=True):
-            wrong.append(f"{pin} is not within {asked}")
+            wrong.append(f"{required.name} is not in environment.txt")
+        elif not required.specifier.contains(next(iter(pin.specifier)).version, prereleases=True):
+            wrong.append(f"{pin} is not within {required}")
         elif pin.marker is not None:
             wrong.append(f"{pin} would not be installed everywhere")
     assert not wrong, "\n".join([*wrong, "make lock"])

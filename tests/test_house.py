@@ -125,13 +125,13 @@ def test_rooms_are_entered_by_their_fronts() -> None:
     for path in [*INDOORS, *OUTDOORS]:
         for found in imports(path):
             front, _, inner = found.module.rpartition(".")
-            room = file_of(front) if front and front != "floatbase" else None
-            if found.module in COMPILED or (room and room.parent in path.parents):
+            entered = file_of(front) if front and front != "floatbase" else None
+            if found.module in COMPILED or (entered and entered.parent in path.parents):
                 continue  # the latter is at home in the room
             if found.module in ROOMS:
                 if found.name and found.name not in import_module(found.module).__all__:
                     wrong.append(f"{said(path)}:{found.line} imports {found.name}, which {found.module} does not export")
-            elif room and inner not in import_module(front).__all__:
+            elif entered and inner not in import_module(front).__all__:
                 wrong.append(f"{said(path)}:{found.line} imports from {found.module}, a file inside {front}")
     assert not wrong, "\n".join(dict.fromkeys(wrong))
 

@@ -131,7 +131,7 @@ def test_closed_chambers_are_a_spring_of_the_textbooks_frequency(q: float) -> No
     cylinder, mass = one(replace(HYQ, leakage=0.0)), 60.0
     pose = cylinder.pose([q])
     volume, area = pose.volumes[:, 0], HYQ.areas
-    wanted = np.sqrt(HYQ.bulk_modulus * (area[0] ** 2 / volume[0] + area[1] ** 2 / volume[1]) / mass)
+    expected = np.sqrt(HYQ.bulk_modulus * (area[0] ** 2 / volume[0] + area[1] ** 2 / volume[1]) / mass)
     balanced = np.array([60e5, 60e5 * area[0] / area[1]])
 
     def motion(t: float, y: np.ndarray) -> np.ndarray:
@@ -139,11 +139,11 @@ def test_closed_chambers_are_a_spring_of_the_textbooks_frequency(q: float) -> No
         rates = cylinder.pressure_rates(np.zeros(1), p, pose, speed / pose.lever)
         return np.concatenate([rates.ravel(), cylinder.force(p) / mass])
 
-    time = np.linspace(0.0, 20.0 * 2.0 * np.pi / wanted, 20001)
+    time = np.linspace(0.0, 20.0 * 2.0 * np.pi / expected, 20001)
     speed = solve_ivp(motion, (0.0, time[-1]), [*balanced, 1e-3], t_eval=time, rtol=1e-9, atol=1e-9).y[2]
     rising = np.flatnonzero((speed[:-1] < 0.0) & (speed[1:] >= 0.0))
     frequency = 2.0 * np.pi * (rising.size - 1) / (time[rising[-1]] - time[rising[0]])
-    assert frequency == pytest.approx(wanted, rel=1e-3)
+    assert frequency == pytest.approx(expected, rel=1e-3)
 
 
 # power
@@ -165,8 +165,8 @@ def test_the_pumps_power_is_work_and_heat_and_compressed_oil() -> None:
         stored = np.sum(volume * p * rates, axis=0) / HYQ.bulk_modulus
         joint = (p[0] * area[0] - p[1] * area[1]) * pose.lever * v
         scale = np.abs([pump, joint, power.valve, stored]).max(axis=0)
-        for found, wanted in ((power.pump, pump), (power.joint, joint), (power.stored, stored)):
-            assert np.all(np.abs(found - wanted) < 1e-9 * scale)
+        for found, expected in ((power.pump, pump), (power.joint, joint), (power.stored, stored)):
+            assert np.all(np.abs(found - expected) < 1e-9 * scale)
         assert np.all(np.abs(pump - joint - power.valve - power.leakage - stored) < 1e-9 * scale)
         assert np.all(power.valve >= 0.0) and np.all(power.leakage >= 0.0)
 
@@ -190,10 +190,10 @@ def judge(tau: float, q: float, v: float, time: np.ndarray) -> np.ndarray:
     def rates(t: float, y: np.ndarray) -> list[float]:
         x, pA, pB, integral = y
         error = tau / lever - (A * pA - B * pB)
-        wanted = w * error + 0.05 * w * w * integral + beta * (A * A / VA + B * B / VB) * speed
-        high_A, high_B = (h.supply_pressure, h.tank_pressure) if wanted >= 0 else (h.tank_pressure, h.supply_pressure)
+        desired = w * error + 0.05 * w * w * integral + beta * (A * A / VA + B * B / VB) * speed
+        high_A, high_B = (h.supply_pressure, h.tank_pressure) if desired >= 0 else (h.tank_pressure, h.supply_pressure)
         full = beta * (A / VA * edge(high_A - pA) - B / VB * edge(high_B - pB))
-        u = wanted / abs(full)
+        u = desired / abs(full)
         line_A, line_B = (h.supply_pressure, h.tank_pressure) if x >= 0 else (h.tank_pressure, h.supply_pressure)
         leak = h.leakage * (pA - pB)
         return [
@@ -217,8 +217,8 @@ def test_the_integrator_agrees_with_a_tight_one() -> None:
     for tau, q, v in ((0.2, 0.0, 0.0), (-0.2, 0.3, 0.0), (0.8, 0.0, 0.0), (-0.7, -0.4, 0.0), (0.3, 0.0, 1.0)):
         robot = fb.load("ur5", torque_limits=limit)
         actuators = HydraulicActuators(robot)
-        angles, speeds, wanted = centre + q, np.full(6, v), np.full(6, tau * limit)
-        found = np.array([actuators.step(wanted, angles, speeds, 1e-3) for _ in time])
+        angles, speeds, desired = centre + q, np.full(6, v), np.full(6, tau * limit)
+        found = np.array([actuators.step(desired, angles, speeds, 1e-3) for _ in time])
         exact = judge(tau * limit, q, v, time)
         assert np.allclose(found, found[:, :1])
         assert np.max(np.abs(found[:, 0] - exact)) < 0.01 * limit

@@ -42,7 +42,7 @@ def near(name: str, seed: int, far: float = 0.03, fast: float = 0.3) -> fb.State
 
 def inertia_about_com(state: fb.State) -> Array:
     """Σ R I Rᵀ + m (‖r‖² 1 - r rᵀ) over MuJoCo's bodies about their common centre."""
-    judge = judges.mujoco_of(state.robot.name).at(state)
+    judge = judges.mujoco_of(state.robot.name).move_to(state)
     total = np.zeros((3, 3))
     centre = (judge.model.body_mass[:, None] * judge.data.xipos).sum(axis=0) / judge.model.body_mass.sum()
     for i in range(1, judge.model.nbody):
@@ -60,7 +60,7 @@ def written_out(name: str, state: fb.State) -> tuple[Array, Array, Array, float]
     robot, held = state.robot, judges.load(name).standing()
     contacts = judges.stance(robot)
     kp, kd, alpha, weights = 100.0, 20.0, 0.1, {"bias": 1e-3, "posture": 1e-3, "torque": 1e-6}
-    judge = judges.mujoco_of(name).at(state)
+    judge = judges.mujoco_of(name).move_to(state)
     mass, g = float(judge.model.body_mass.sum()), 9.81
     J = judges.jacobian_of(lambda s: s.com, state)
     force = mass * (-kp * (state.com - held.com) - kd * J @ state.v + np.array([0.0, 0.0, g]))
@@ -111,19 +111,19 @@ def test_standing_the_planned_forces_carry_the_weight_and_are_the_measured_ones(
     assert np.max(np.abs(planned - measured)) < 1e-4 * robot.weight
 
 
-def test_it_goes_where_its_centre_of_mass_is_wanted() -> None:
+def test_it_goes_where_its_centre_of_mass_is_to_be() -> None:
     robot = judges.load("go2")
     start = robot.standing()
-    wanted = start.com + [0.02, -0.03, -0.02]
-    controller = AnalyticController(robot, fb.Contacts.points(robot), start, com=wanted)
+    target = start.com + [0.02, -0.03, -0.02]
+    controller = AnalyticController(robot, fb.Contacts.points(robot), start, com=target)
     run = fb.rollout(fb.Simulation(robot), controller, 1.5, control_period=PERIOD)
     assert run.outcome == "completed"
-    assert np.linalg.norm(run.com[-1] - wanted) < 2e-3
+    assert np.linalg.norm(run.com[-1] - target) < 2e-3
 
 
 @pytest.mark.parametrize("exponent", [3, 4, 6, 8])
 def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lacks(exponent: int) -> None:
-    """solo8 with joint angles off by 1e-6 rad and 0.1 rad/s of noise: rows taken to the letter ask for thousands of N·m."""
+    """solo8 with joint angles off by 1e-6 rad and 0.1 rad/s of noise: rows taken to the letter need thousands of N·m."""
     robot = judges.load("solo8")
     rng = np.random.default_rng(0)
     state = judges.along(robot.standing(), np.append(np.zeros(6), rng.normal(size=8)), 10.0**-exponent)
@@ -197,10 +197,10 @@ def test_a_robot_that_leans_is_turned_back(axis: int) -> None:
     lean = np.zeros(18)
     lean[3 + axis] = 0.05
     leaning = judges.along(state, lean, 1.0)
-    wanted = -100.0 * 0.05 * inertia_about_com(leaning)[axis, axis]
+    expected = -100.0 * 0.05 * inertia_about_com(leaning)[axis, axis]
     for controller, gained in (
-        (AnalyticController(state.robot, contacts, state, posture=1e-7), pytest.approx(wanted, rel=0.02)),
-        (controller_of("go2"), pytest.approx(0.65 * wanted, rel=0.55)),  # the default posture term takes its share
+        (AnalyticController(state.robot, contacts, state, posture=1e-7), pytest.approx(expected, rel=0.02)),
+        (controller_of("go2"), pytest.approx(0.65 * expected, rel=0.55)),  # the default posture term takes its share
     ):
         command = controller(leaning.q, leaning.v)
         model, data = state.robot.model, state.robot.model.createData()
@@ -222,11 +222,11 @@ def test_the_torques_do_not_depend_on_the_way_the_robot_faces() -> None:
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot)
     state = near("go2", 3, far=0.2)
-    wanted = controller_of("go2")(state.q, state.v).tau
+    expected = controller_of("go2")(state.q, state.v).tau
     for yaw in (0.5, 1.6, 3.0):
         facing = AnalyticController(robot, contacts, turned(robot.standing(), yaw))
         there = turned(state, yaw)
-        assert np.allclose(facing(there.q, there.v).tau, wanted, atol=1e-6 * np.abs(wanted).max())
+        assert np.allclose(facing(there.q, there.v).tau, expected, atol=1e-6 * np.abs(expected).max())
 
 
 # the failure that §4 is for ----------------------------------------------------------------------------------------------
@@ -328,11 +328,8 @@ def test_values_of_another_kind_are_refused_when_it_is_made(swap: dict[str, obje
         AnalyticController(**(fitting | swap))
 
 
-def test_its_answer_cannot_be_written_to_and_prints_in_a_line() -> None:
+def test_its_answer_prints_in_a_line() -> None:
     state = judges.load("go2").standing()
     command = controller_of("go2")(state.q, state.v)
-    for array in (command.tau, command.forces, command.qdd):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0.0
     assert repr(command).startswith("AnalyticCommand(|tau|=")
     assert len(repr(command)) < 80

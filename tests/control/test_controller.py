@@ -3,53 +3,42 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import ClassVar
 
 import judges
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 import floatbase as fb
 from floatbase.errors import InfeasibleError, UnknownNameError
-from floatbase.qp import QP, Solution, solve
+from floatbase.qp import Solution, solve
 from floatbase.robots import State
 
 
-def controller_of(name: str, **options: object) -> fb.WholeBodyController:
-    """Keep the robot standing on all its feet."""
-    robot = judges.load(name)
-    return fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), **options)
-
-
 def cases(name: str, n: int) -> list[State]:
-    """Half the states near standing, half far away, where many rows push."""
+    """Half the states near standing, half far away, where many rows are active."""
     return judges.states(name, n - n // 2, 0.08) + judges.states(name, n // 2, 0.3)
 
 
 @pytest.mark.parametrize(("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS])
 def test_daqp_finds_the_optimum_that_cvxpy_finds(name: str, n: int) -> None:
-    controller, pushed = controller_of(name), 0
+    controller, n_active = judges.controller_of(name), 0
     for state in cases(name, n):
         qp = controller.qp(state)
         found, judge = solve(qp), solve(qp, "cvxpy")
         prices = float(np.sum(judge.inequality_multipliers) + np.sum(np.abs(judge.equality_multipliers)))
         worth = max(judge.residuals.inequality, judge.residuals.equality) * prices + judge.residuals.complementarity * len(qp.G)
         assert abs(found.objective - judge.objective) < 1e-9 * (1.0 + abs(judge.objective)) + 2.0 * worth
-        pushed += bool(found.active)
+        n_active += bool(found.active)
         for solution in (found, judge):
             r = solution.residuals
-            assert r.equality < 1e-9
-            assert r.inequality < 1e-6
-            assert r.stationarity < 1e-6
-            assert r.complementarity < 1e-6
-            assert r.dual == 0.0
-    assert pushed > n / 4 or not judges.load(name).is_floating, "no row pushed: these states try nothing"
+            assert r.equality < 1e-9 and r.dual == 0.0
+            assert max(r.inequality, r.stationarity, r.complementarity) < 1e-6
+    assert n_active > n / 4 or not judges.load(name).is_floating, "no row was active: these states try nothing"
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_the_planned_acceleration_is_what_torques_and_forces_bring_about(name: str) -> None:
-    controller = controller_of(name)
+    controller = judges.controller_of(name)
     for state in cases(name, 10):
         command = controller(state.q, state.v)
         eom = fb.equations_of_motion(state, controller.contacts)
@@ -59,7 +48,7 @@ def test_the_planned_acceleration_is_what_torques_and_forces_bring_about(name: s
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name: str) -> None:
     """By differences of the rolling feet's centres, whose velocity ω × r n a rolling ball has."""
-    controller = controller_of(name)
+    controller = judges.controller_of(name)
     for state in judges.states(name, 3, 0.2) if name != "solo8" else []:
         command = controller(state.q, state.v)
         step = 1e-5
@@ -70,7 +59,7 @@ def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name: str) ->
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_forces_stay_in_the_exact_cone_and_torques_within_their_limits(name: str) -> None:
-    controller, robot = controller_of(name), judges.load(name)
+    controller, robot = judges.controller_of(name), judges.load(name)
     for state in cases(name, 20):
         command = controller(state.q, state.v)
         forces, normals = command.forces.reshape(-1, 3), controller.contacts.normals
@@ -82,8 +71,8 @@ def test_forces_stay_in_the_exact_cone_and_torques_within_their_limits(name: str
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_row_that_pushes_is_met_exactly_and_named_for_what_it_limits(name: str) -> None:
-    controller, robot = controller_of(name, min_normal_force=1.0), judges.load(name)
+def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name: str) -> None:
+    controller, robot = judges.controller_of(name, min_normal_force=1.0), judges.load(name)
     seen = set()
     for state in cases(name, 20):
         command = controller(state.q, state.v)
@@ -113,7 +102,7 @@ def test_a_row_that_pushes_is_met_exactly_and_named_for_what_it_limits(name: str
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) -> None:
     state = judges.load(name).standing()
-    command = controller_of(name)(state.q, state.v)
+    command = judges.controller_of(name)(state.q, state.v)
     forces = command.forces.reshape(-1, 3)
     assert np.allclose(forces.sum(axis=0), [0.0, 0.0, state.robot.weight], rtol=1e-3, atol=1e-3 * state.robot.weight)
     moment = np.cross(judges.stance(state.robot).positions(state) - state.com, forces).sum(axis=0)
@@ -125,13 +114,13 @@ def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) 
 def test_an_arm_bolted_to_the_ground_gets_computed_torque() -> None:
     """(1) τ = M (-kp e - kd ė) + h, the closed form, when nothing limits it."""
     robot = judges.load("ur5")
-    goal = robot.standing().q
-    task = fb.PostureTask(goal, kp=30.0, kd=4.0, weight=1e6)
+    target = robot.standing().q
+    task = fb.PostureTask(target, kp=30.0, kd=4.0, weight=1e6)
     controller = fb.WholeBodyController(robot, fb.Contacts.none(), [task], torque_limits=np.inf)
     for state in judges.states("ur5", 5):
-        judge = judges.mujoco_of("ur5").at(state)
-        wanted = judge.M @ (-30.0 * (state.q - goal) - 4.0 * state.v) + judge.h
-        assert np.allclose(controller(state.q, state.v).tau, wanted, atol=1e-5)
+        judge = judges.mujoco_of("ur5").move_to(state)
+        expected = judge.M @ (-30.0 * (state.q - target) - 4.0 * state.v) + judge.h
+        assert np.allclose(controller(state.q, state.v).tau, expected, atol=1e-5)
 
 
 def test_nothing_can_hold_a_robot_that_touches_nothing() -> None:
@@ -174,16 +163,16 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
 def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> None:
     """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges, neither holds the other."""
     for state in judges.states("go2", 5, 0.3):
-        outside = [solve(controller_of("go2", facets=n, inside=False).qp(state)).objective for n in (4, 8, 16, 32)]
+        outside = [solve(judges.controller_of("go2", facets=n, inside=False).qp(state)).objective for n in (4, 8, 16, 32)]
         slack = 1e-9 * abs(outside[0])
         assert all(coarse <= fine + slack for coarse, fine in pairwise(outside))
-        inside = [solve(controller_of("go2", facets=n).qp(state)).objective for n in (4, 8, 16, 32)]
+        inside = [solve(judges.controller_of("go2", facets=n).qp(state)).objective for n in (4, 8, 16, 32)]
         assert max(outside) <= min(inside) + slack
         assert inside[-1] - outside[-1] <= 0.1 * (inside[0] - outside[0]) + slack
 
 
 def test_the_smallest_normal_force_is_kept_on_every_point() -> None:
-    controller = controller_of("go2", min_normal_force=7.0)
+    controller = judges.controller_of("go2", min_normal_force=7.0)
     lowest = [controller(s.q, s.v).forces.reshape(-1, 3)[:, 2].min() for s in judges.states("go2", 10, 0.2)]
     assert min(lowest) == pytest.approx(7.0, abs=1e-6)
 
@@ -203,14 +192,14 @@ def test_normal_forces_are_along_the_normals_of_tilted_ground() -> None:
 def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
     state = judges.states("go2", 1, 0.1)[0]
     robot = state.robot
-    assert np.array_equal(controller_of("go2").limits.torque_limits, robot.torque_limits)
-    free = controller_of("go2", torque_limits=np.inf)
+    assert np.array_equal(judges.controller_of("go2").limits.torque_limits, robot.torque_limits)
+    free = judges.controller_of("go2", torque_limits=np.inf)
     assert not any(name.startswith("torque") for name in free.qp(state).inequality_names)
     less = 0.9 * float(np.max(np.abs(free(state.q, state.v).tau)))
-    assert np.max(np.abs(controller_of("go2", torque_limits=less)(state.q, state.v).tau)) <= less * (1.0 + 1e-9)
+    assert np.max(np.abs(judges.controller_of("go2", torque_limits=less)(state.q, state.v).tau)) <= less * (1.0 + 1e-9)
     some = np.full(12, np.inf)
     some[3] = 1.0
-    one = controller_of("go2", torque_limits=some)
+    one = judges.controller_of("go2", torque_limits=some)
     assert [n for n in one.qp(state).inequality_names if n.startswith("torque")] == [
         f"torque limit {robot.joint_names[3]} upper",
         f"torque limit {robot.joint_names[3]} lower",
@@ -219,7 +208,7 @@ def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
 
 def test_every_row_of_the_problem_has_a_name_of_its_own() -> None:
     for name in judges.ROBOTS:
-        qp = controller_of(name).qp(judges.load(name).standing())
+        qp = judges.controller_of(name).qp(judges.load(name).standing())
         assert len(set(qp.equality_names)) == len(qp.equality_names) == len(qp.A)
         assert len(set(qp.inequality_names)) == len(qp.inequality_names) == len(qp.G)
 
@@ -243,7 +232,7 @@ def test_the_order_of_contacts_does_not_matter() -> None:
 
 
 def test_the_same_state_gets_the_same_answer_whatever_came_before() -> None:
-    controller = controller_of("go2")
+    controller = judges.controller_of("go2")
     state, other = judges.states("go2", 2)
     first = controller(state.q, state.v)
     controller(other.q, other.v)
@@ -263,7 +252,7 @@ def test_regularisation_is_added_where_it_is_missing_and_shown() -> None:
 
 def test_a_controller_is_replaced_rather_than_changed() -> None:
     robot = judges.load("go2")
-    controller = controller_of("go2", facets=8, inside=False, min_normal_force=3.0, torque_limits=20.0, solver="cvxpy")
+    controller = judges.controller_of("go2", facets=8, inside=False, min_normal_force=3.0, torque_limits=20.0, solver="cvxpy")
     three = controller.replace(contacts=controller.contacts.without("FL_foot"))
     assert three.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
     assert controller.contacts.names == tuple(foot.frame for foot in robot.feet)
@@ -277,24 +266,15 @@ def test_a_controller_is_replaced_rather_than_changed() -> None:
 
 
 def test_anything_of_the_form_of_a_task_is_a_task() -> None:
-    class KeepStill:
-        """A residual of one's own: no joint accelerates."""
-
-        block: ClassVar[str] = "qdd"
-        name, weight = "keep still", 5.0
-
-        def residual(self, eom: object, t: float = 0.0) -> fb.Affine:
-            return fb.Affine.linear(eom.S.T)
-
     robot = judges.load("go2")
-    command = fb.WholeBodyController(robot, fb.Contacts.points(robot), [KeepStill()])(robot.standing().q, np.zeros(18))
+    command = fb.WholeBodyController(robot, fb.Contacts.points(robot), [judges.KeepStill()])(robot.standing().q, np.zeros(18))
     assert np.allclose(command.qdd[6:], 0.0, atol=0.05)
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_feet_whose_rows_contradict_a_measured_velocity_are_kept_as_nearly_as_possible(name: str) -> None:
+def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_nearly_as_possible(name: str) -> None:
     """J loses rank on solo8: then A q̈ = b is met in the least-squares sense, and exactly wherever that is possible."""
-    controller = controller_of(name)
+    controller = judges.controller_of(name)
     for state in judges.states(name, 5, 0.3):
         eom = fb.equations_of_motion(state, controller.contacts)
         qdd = controller(state.q, state.v).qdd
@@ -307,33 +287,23 @@ def test_feet_whose_rows_contradict_a_measured_velocity_are_kept_as_nearly_as_po
 # infeasible --------------------------------------------------------------------------------------------------------------
 
 
-def feasible(qp: QP, rows: list[int]) -> bool:
-    """By a linear program on the whole problem: the equalities, and these rows alone."""
-    found = linprog(np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, bounds=(None, None), method="highs")
-    return bool(found.status == 0)
-
-
 @pytest.mark.parametrize("name", ["solo12", "go2"])
 def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict(name: str) -> None:
-    controller = controller_of(name, min_normal_force=500.0)
+    controller = judges.controller_of(name, min_normal_force=500.0)
     state = judges.load(name).standing()
     with pytest.raises(InfeasibleError, match=r"(?s)these are in conflict:.*Loosen or drop any one of them") as caught:
         controller(state.q, state.v)
-    qp = controller.qp(state)
-    rows = [qp.inequality_names.index(row) for row in caught.value.rows]
     assert any(row.endswith("normal force") for row in caught.value.rows)
     assert any(row.startswith("torque limit") for row in caught.value.rows)
     for row in caught.value.rows:  # each by its owner, in the line of its kind
         owner = row.removeprefix("torque limit ").removesuffix(" upper").removesuffix(" lower").removesuffix(" normal force")
         assert owner in str(caught.value)
-    assert not feasible(qp, rows)
-    for row in rows:
-        assert feasible(qp, [i for i in rows if i != row])
+    assert judges.is_smallest_conflict(controller.qp(state), caught.value.rows)
 
 
 def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
     state = judges.load("go2").random_state(0)
-    found = solve(controller_of("go2").qp(state))
+    found = solve(judges.controller_of("go2").qp(state))
     wrong = Solution(found.qp, found.x + 0.01, found.equality_multipliers, found.inequality_multipliers + 0.1, "wrong")
     r = wrong.residuals
     assert min(r.stationarity, r.equality, r.inequality, r.complementarity) > 1e-4
@@ -345,17 +315,16 @@ def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
 @pytest.mark.parametrize("solver", ["daqp", "cvxpy"])
 def test_either_solver_can_drive_a_controller(solver: str) -> None:
     state = judges.load("go2").random_state(1)
-    command = controller_of("go2", solver=solver, path="readable")(state.q, state.v)
+    command = judges.controller_of("go2", solver=solver, path="readable")(state.q, state.v)
     assert command.solution.solver == solver
-    assert np.allclose(command.tau, controller_of("go2")(state.q, state.v).tau, atol=1e-4)
+    assert np.allclose(command.tau, judges.controller_of("go2")(state.q, state.v).tau, atol=1e-4)
 
 
-def test_commands_can_not_be_written_to() -> None:
-    state = judges.load("go2").standing()
-    command = controller_of("go2")(state.q, state.v)
-    for array in (command.tau, command.qdd, command.forces, command.solution.x):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0.0
+def test_the_active_set_method_can_drive_a_controller() -> None:
+    state = judges.load("go2").random_state(1)
+    solution = judges.controller_of("go2", solver="active_set")(state.q, state.v).solution
+    assert solution.solver == "active_set"
+    assert max(solution.residuals.equality, solution.residuals.inequality) < 1e-6
 
 
 def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_stands() -> None:
@@ -371,7 +340,7 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
 
 
-def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_noise_asks_for() -> None:
+def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_only_noise_calls_for() -> None:
     robot = judges.load("solo8")
     state = robot.standing()
 
@@ -384,7 +353,7 @@ def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_noise
     assert record.outcome == "completed", record.error
 
 
-def test_motions_that_contradict_each_other_are_named_and_not_averaged() -> None:
+def test_inconsistent_motions_are_named_and_not_averaged() -> None:
     from floatbase.dynamics import moving_frame
 
     robot = judges.load("go2")
@@ -394,7 +363,7 @@ def test_motions_that_contradict_each_other_are_named_and_not_averaged() -> None
     )
     state = robot.standing()
     with pytest.raises(
-        fb.InfeasibleError, match="these motions cannot be kept together: motion FL_foot z, motion drive of"
+        fb.InfeasibleError, match="these motions are inconsistent: motion FL_foot z, motion drive of"
     ) as e:
         controller(state.q, state.v, 1.0)
     assert e.value.rows == ("motion FL_foot z", "motion drive of FL_foot row 2")
@@ -442,8 +411,6 @@ def test_a_task_of_ones_own_is_checked(task: object, text: str) -> None:
 
 @pytest.mark.parametrize("path", ["compiled", "readable"])
 def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(path: str) -> None:
-    if path == "compiled":
-        pytest.importorskip("numba")
     robot = judges.load("talos")
     contacts, state = fb.Contacts.flat_feet(robot), robot.standing()
     command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), path=path)(state.q, state.v)
@@ -454,5 +421,3 @@ def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(path: str) -
         command.force("left_sole_lnk")
     assert repr(command).startswith("Command(|tau|=") and "\n" not in repr(command)
     assert repr(command).endswith(f"0 rows active, {path})")
-    with pytest.raises(TypeError):
-        command.solution.qp.blocks["tau"] = slice(0, 1)

@@ -37,11 +37,7 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: controller(torque_limits=np.nan), InputError, "torque_limits must be one number > 0"),
         (lambda: controller(solver="dapq"), UnknownNameError, "unknown solver 'dapq'; .*daqp"),
         (lambda: controller("stand"), InputError, r"tasks must hold tasks, such as fb\.CoMTask\(state\.com\); 'stand' is none"),
-        (
-            lambda: controller(fb.FrameTask("FL_fot", UP)),
-            UnknownNameError,
-            "frame of go2 'FL_fot'; near names: FL_foot",
-        ),
+        (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "frame of go2 'FL_fot'; near names: FL_foot"),
         (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "unknown frame of go2 'torso'"),
         (lambda: controller(fb.PostureTask(np.zeros(5))), InputError, r"q of posture has shape \(5,\); .*\(19,\)"),
         (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, r"target forces has shape \(3,\); .*\(12,\)"),
@@ -56,18 +52,10 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: fb.PostureTask(STATE.q, weight=-1.0), InputError, "weight of posture is -1; it must be ≥ 0"),
         (lambda: fb.ForceTask(weight=-1.0), InputError, "weight of force regularisation is -1"),
         (lambda: fb.OrientationTask("base", np.eye(2)), InputError, r"rotation of .*base has shape \(2, 2\); .*\(3, 3\)"),
-        (
-            lambda: fb.OrientationTask("base", 2 * np.eye(3)),
-            InputError,
-            "a rotation matrix: its columns must be orthonormal",
-        ),
+        (lambda: fb.OrientationTask("base", 2 * np.eye(3)), InputError, "a rotation matrix: its columns must be orthonormal"),
         (lambda: fb.OrientationTask("base", np.diag([1, 1, -1])), InputError, r"orthonormal, determinant \+1"),
         (lambda: controller(fb.OrientationTask("base", lambda t: np.zeros((3, 3)))), InputError, "not a rotation matrix"),
-        (
-            lambda: fb.WholeBodyController(GO2, [1], []),
-            InputError,
-            r"Contacts, as fb\.Contacts\.points\(robot\), not list",
-        ),
+        (lambda: fb.WholeBodyController(GO2, [1], []), InputError, r"Contacts, as fb\.Contacts\.points\(robot\), not list"),
         (
             lambda: fb.WholeBodyController(judges.load("solo12"), CONTACTS, []),
             UnknownNameError,
@@ -110,5 +98,5 @@ def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> 
     except InputError:
         return
     command = controller(task)(STATE.q, STATE.v)
-    wanted = controller(fb.CoMTask(UP, kp=10.0, kd=10.0, weight=10.0))(STATE.q, STATE.v)
-    assert np.allclose(command.tau, wanted.tau)
+    expected = controller(fb.CoMTask(UP, kp=10.0, kd=10.0, weight=10.0))(STATE.q, STATE.v)
+    assert np.allclose(command.tau, expected.tau)

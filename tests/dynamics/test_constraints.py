@@ -102,7 +102,7 @@ def test_a_linear_constraint_is_kept_by_the_motion_and_its_force_is_its_rows_tim
     tau = rng.normal(size=12)
     qdd, forces = dynamics.accelerations_from_torques(eom)(tau), dynamics.forces_from_torques(eom)(tau)
     assert np.allclose(A @ qdd, b, atol=1e-8)
-    J_foot = judges.mujoco_of("go2").at(state).jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
+    J_foot = judges.mujoco_of("go2").move_to(state).jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
     assert np.allclose(state.M @ qdd + state.h - eom.S @ tau, J_foot.T @ forces[:3] + A.T @ forces[3:], atol=1e-7)
     assert eom.contacts.point_names == ("FL_foot",)
 
@@ -115,9 +115,9 @@ def test_rows_that_turn_with_time_push_along_where_they_point_now() -> None:
         return (np.array([[np.cos(t), 0.0, np.sin(t)]]) @ s.frame_jacobian("base")[:3], np.array([t]))
 
     eom = fb.equations_of_motion(state, fb.Contacts([LinearConstraint("rail", 1, rows)]), t=0.7)
-    wanted = rows(state, 0.7)[0]
-    assert np.allclose(eom.A, wanted)
-    assert np.allclose(eom.J, wanted), "J of (4) was taken at another time than A of (5)"
+    expected = rows(state, 0.7)[0]
+    assert np.allclose(eom.A, expected)
+    assert np.allclose(eom.J, expected), "J of (4) was taken at another time than A of (5)"
 
 
 @pytest.mark.parametrize(
@@ -181,11 +181,11 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_b
         eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
         model.gravity.linear = R.T @ np.array([0.0, 0.0, -G])  # the bolted base leans
         data = model.createData()
-        wanted = pin.aba(model, data, state.q[7:], state.v[6:], tau)
+        expected = pin.aba(model, data, state.q[7:], state.v[6:], tau)
         qdd = dynamics.accelerations_from_torques(eom)(tau)
-        assert judges.relative(qdd[6:], wanted) < 1e-9
+        assert judges.relative(qdd[6:], expected) < 1e-9
         assert np.max(np.abs(qdd[:6])) < 1e-9
-        pin.rnea(model, data, state.q[7:], state.v[6:], wanted)
+        pin.rnea(model, data, state.q[7:], state.v[6:], expected)
         # what the base link passes on to its children, plus its own weight
         origin = pin.Force.Zero()
         for child in range(1, model.njoints):
@@ -209,15 +209,15 @@ def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1() ->
     assert np.linalg.matrix_rank(dynamics.accelerations_from_torques(standing).A[6:], tol=1e-6) == 6
 
 
-def test_a_driven_frame_has_the_acceleration_asked_for_at_that_time() -> None:
-    def wanted(t: float) -> Array:
+def test_a_driven_frame_has_the_desired_acceleration_at_that_time() -> None:
+    def desired(t: float) -> Array:
         return np.array([np.sin(t), 2.0 * np.cos(3.0 * t), -t])
 
     for seed, (t, frame) in enumerate(((0.0, "base"), (0.8, "FL_foot"), (1.9, "RR_calf"))):
         state = judges.load("go2").random_state(seed, spread=0.6)
-        qdd, force = motion(state, moving_frame(frame, wanted), t=t)
+        qdd, force = motion(state, moving_frame(frame, desired), t=t)
         found = judges.acceleration_of(lambda s, f=frame: s.point(f), state, qdd)
-        assert np.allclose(found, wanted(t), atol=1e-4)
+        assert np.allclose(found, desired(t), atol=1e-4)
         rate = objectives.momentum_rate(state, qdd)
         assert np.allclose(force, rate[:3] + np.array([0.0, 0.0, state.robot.mass * G]), atol=1e-7)
 
@@ -240,9 +240,9 @@ def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart: Rob
         normal = judges.random_normals(1, seed)[0]
         wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, normal)
         A, b = wheel.constraint(state)
-        wanted = -judges.derivative(lambda s, w=wheel: w.jacobian(s) @ s.v, state, state.v)
-        assert np.linalg.norm(wanted) > 1e-2
-        assert np.allclose(b, wanted, atol=1e-7)
+        expected = -judges.derivative(lambda s, w=wheel: w.jacobian(s) @ s.v, state, state.v)
+        assert np.linalg.norm(expected) > 1e-2
+        assert np.allclose(b, expected, atol=1e-7)
         assert np.array_equal(A, wheel.jacobian(state))
 
 
@@ -300,6 +300,7 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(disc: R
     wheel = wheel_of_the_disc()
     assert np.allclose(wheel.slip(state), 0.0, atol=1e-12)
     qdd, force = motion(state, wheel)
+    assert force @ (wheel.constraint(state)[0] @ state.v) == pytest.approx(0.0, abs=1e-9), "a wheel that rolls does no work"
     linear, angular = world_acceleration(state, qdd)
     assert np.allclose(linear, -(rate**2) * radius * out, atol=1e-9)
     assert np.allclose(angular, rate * np.cross(Z, omega), atol=1e-9)

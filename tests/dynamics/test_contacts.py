@@ -84,18 +84,18 @@ def test_the_contact_jacobian_is_mujocos_at_the_contact_point(name: str) -> None
     judge = judges.mujoco_of(name)
     for seed, state in enumerate(judges.states(name, N)):
         contacts = tilted(name, seed)
-        judge.at(state)
+        judge.move_to(state)
         points = zip(owners(contacts), contacts.positions(state), strict=True)
-        wanted = np.vstack([judge.jacobian(frame, point)[0] for frame, point in points])
-        assert np.allclose(contacts.jacobian(state), wanted, atol=1e-9)
+        expected = np.vstack([judge.jacobian(frame, point)[0] for frame, point in points])
+        assert np.allclose(contacts.jacobian(state), expected, atol=1e-9)
 
 
 def test_b_is_minus_the_change_of_a_v_along_v(name: str) -> None:
     for seed, state in enumerate(judges.states(name, N, spread=0.6)):
         contacts = tilted(name, seed)
-        wanted = -judges.drift_of(lambda s, c=contacts: c.constraint(s)[0], state)
-        assert np.max(np.abs(wanted)) > 1e-3
-        assert np.allclose(contacts.constraint(state)[1], wanted, atol=1e-6)
+        expected = -judges.drift_of(lambda s, c=contacts: c.constraint(s)[0], state)
+        assert np.max(np.abs(expected)) > 1e-3
+        assert np.allclose(contacts.constraint(state)[1], expected, atol=1e-6)
 
 
 def test_a_ball_rolls_without_slipping_over_its_lowest_point() -> None:
@@ -141,7 +141,7 @@ def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None
 
 
 @pytest.mark.parametrize("name", judges.FLAT)
-def test_corner_motion_rows_would_contradict_each_other_when_a_foot_turns(name: str) -> None:
+def test_corner_motion_rows_would_be_inconsistent_when_a_foot_turns(name: str) -> None:
     """Why a flat foot is 6 rows: J q̈ = -J̇ q̇ at the corners has no solution where the foot turns."""
     state = judges.load(name).random_state(0, spread=1.0)
     contact = next(iter(judges.stance(state.robot)))

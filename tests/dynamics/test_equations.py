@@ -21,12 +21,12 @@ def name(request: pytest.FixtureRequest) -> str:
 
 def test_inertia_agrees_with_mujoco(name: str) -> None:
     for state in judges.states(name, N):
-        assert judges.relative(state.M, judges.mujoco_of(name).at(state).M) < 1e-9
+        assert judges.relative(state.M, judges.mujoco_of(name).move_to(state).M) < 1e-9
 
 
 def test_bias_force_agrees_with_mujoco(name: str) -> None:
     for state in judges.states(name, N, spread=1.0):
-        assert judges.relative(state.h, judges.mujoco_of(name).at(state).h) < 1e-9
+        assert judges.relative(state.h, judges.mujoco_of(name).move_to(state).h) < 1e-9
 
 
 def test_inertia_is_symmetric_and_positive_definite(name: str) -> None:
@@ -76,8 +76,8 @@ def test_a_fixed_base_has_the_equations_of_a_manipulator() -> None:
     assert np.array_equal(eom.S, np.eye(6))
     assert eom.J.shape == (0, 6)
     tau = np.arange(6.0)
-    wanted = pin.aba(robot.model, robot.model.createData(), eom.state.q, eom.state.v, tau)
-    assert np.allclose(eom.acceleration(tau, []), wanted, atol=1e-9)
+    expected = pin.aba(robot.model, robot.model.createData(), eom.state.q, eom.state.v, tau)
+    assert np.allclose(eom.acceleration(tau, []), expected, atol=1e-9)
 
 
 def test_rotor_inertia_counts() -> None:

@@ -37,7 +37,7 @@ def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(name: str
     judge = judges.Mujoco(judges.load(name))
     judge.model.opt.gravity[:] = 0.0
     for state in judges.states(name, N, spread=1.0):
-        assert judges.relative(bias_forces(state).fictitious, judge.at(state).h) < 1e-8
+        assert judges.relative(bias_forces(state).fictitious, judge.move_to(state).h) < 1e-8
 
 
 def test_gravity_is_the_slope_of_the_weights_potential_energy(name: str) -> None:
@@ -46,7 +46,7 @@ def test_gravity_is_the_slope_of_the_weights_potential_energy(name: str) -> None
     judge.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
 
     def potential(state: fb.State) -> np.ndarray:
-        mujoco.mj_energyPos(judge.model, judge.at(state).data)
+        mujoco.mj_energyPos(judge.model, judge.move_to(state).data)
         return np.array([judge.data.energy[0]])
 
     for state in judges.states(name, 2):
@@ -70,7 +70,7 @@ def test_coriolis_forces_are_the_products_of_two_different_velocities(name: str)
     judge.model.opt.gravity[:] = 0.0
 
     def felt(v: np.ndarray) -> np.ndarray:
-        return judge.at(state.replace(v=v)).h
+        return judge.move_to(state.replace(v=v)).h
 
     v, nv = state.v, state.robot.nv
     alone = [felt(v[i] * np.eye(nv)[i]) for i in range(nv)]

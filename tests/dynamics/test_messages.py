@@ -44,11 +44,7 @@ ALL = fb.Contacts.points(GO2)
         (lambda: fb.Contacts.points(GO2, normals=np.ones((3, 3))), InputError, r"normals has shape \(3, 3\); .*\(4, 3\)"),
         (lambda: fb.Contacts.points(GO2, normals={"FL": [0, 0, 1]}), UnknownNameError, "'FL'; near names: FL_foot"),
         (lambda: fb.Contacts.points(GO2, normals=[0, 0, np.nan]), InputError, r"normal of FL_foot holds nan at index \[2\]"),
-        (
-            lambda: fb.Contacts.flat_feet(GO2),
-            InputError,
-            r"FL_foot of go2 is not a flat foot; use fb\.Contacts\.points",
-        ),
+        (lambda: fb.Contacts.flat_feet(GO2), InputError, r"FL_foot of go2 is not a flat foot; use fb\.Contacts\.points"),
         (lambda: ALL + ALL, InputError, "contact 'FL_foot' stands twice in the list; each name may stand once"),
         (lambda: ALL.only("FL"), UnknownNameError, "unknown contact 'FL'; near names: FL_foot"),
         (lambda: ALL.without("left"), UnknownNameError, "unknown contact 'left'; known: FL_foot, FR_foot, RL_foot, RR_foot"),

@@ -92,7 +92,7 @@ def eliminated(A: npt.ArrayLike, tolerance: float = 1e-8) -> int:
 
 def judged(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """M and J from MuJoCo."""
-    judge = judges.mujoco_of(eom.robot.name).at(eom.state)
+    judge = judges.mujoco_of(eom.robot.name).move_to(eom.state)
     owners = [contact.name for contact in eom.contacts for _ in contact.point_names]
     points = zip(owners, eom.contacts.positions(eom.state), strict=True)
     J = [judge.jacobian(frame, point)[0] for frame, point in points]
@@ -135,15 +135,15 @@ def test_ranks_of_the_contact_jacobian_are_those_of_mujocos_by_elimination(name:
 def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name: str) -> None:
     for case, eom in cases(name):
         found, (_, J) = dynamics.dimensions(eom), judged(eom)
-        wanted = eom.d + eom.k - eliminated(J)
-        assert (found.null_B, found.null_C) == (wanted, wanted), case
-        assert dynamics.feasible_space(eom).dimension == wanted, case
-        assert dynamics.torque_force_space(eom).n_in == wanted, case
+        expected = eom.d + eom.k - eliminated(J)
+        assert (found.null_B, found.null_C) == (expected, expected), case
+        assert dynamics.feasible_space(eom).dimension == expected, case
+        assert dynamics.torque_force_space(eom).n_in == expected, case
         B, C = dynamics.motion_matrix(eom)[0], dynamics.torque_force_matrix(eom)[0]
-        assert B.shape[1] - eliminated(B) == wanted, case
-        assert C.shape[1] - eliminated(C) == wanted, case
+        assert B.shape[1] - eliminated(B) == expected, case
+        assert C.shape[1] - eliminated(C) == expected, case
         if found.rank_J == eom.k:
-            assert wanted == eom.d, case
+            assert expected == eom.d, case
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
@@ -165,10 +165,10 @@ def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_g
         points = eom.contacts.positions(eom.state)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         spanned = int(np.sum(spread > 1e-9))
-        wanted = eom.k - {0: 3, 1: 5}.get(spanned, 6)
+        expected = eom.k - {0: 3, 1: 5}.get(spanned, 6)
         F = dynamics.internal_forces(eom)
-        assert F.shape == (eom.k, wanted), case
-        assert dynamics.dimensions(eom).internal == wanted, case
+        assert F.shape == (eom.k, expected), case
+        assert dynamics.dimensions(eom).internal == expected, case
         for f in F.T:
             each = f.reshape(-1, 3)
             assert np.allclose(each.sum(axis=0), 0.0, atol=1e-9), case
@@ -246,8 +246,8 @@ def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_ra
     """A simulated solo8 is never quite symmetric: whatever rank J is said to have, all other numbers must follow from it."""
     for exponent in range(1, 13):
         found = dynamics.dimensions(near_singular(exponent))
-        wanted = found.d + found.k - found.rank_J
-        assert (found.null_B, found.null_C) == (wanted, wanted), exponent
+        expected = found.d + found.k - found.rank_J
+        assert (found.null_B, found.null_C) == (expected, expected), exponent
         assert found.rank_V_qdd == found.d - found.rank_J + found.rank_J_base, exponent
 
 
@@ -267,16 +267,16 @@ def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_te
 def test_velocity_noise_makes_no_force_near_a_loss_of_rank() -> None:
     """The torques that hold solo8 still at the singular stance: nearby they make the same forces to 1 % of the weight.
 
-    To the letter of (9), joint angles off by 1e-6 rad and a velocity off by 0.1 ask for more than 1e8 N.
+    To the letter of (9), joint angles off by 1e-6 rad and a velocity off by 0.1 need more than 1e8 N.
     """
     robot = judges.load("solo8")
     standing, contacts = robot.standing(), fb.Contacts.points(robot)
     tau = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing))(standing.q, standing.v).tau
-    wanted = dynamics.forces_from_torques(fb.equations_of_motion(standing, contacts))(tau)
+    expected = dynamics.forces_from_torques(fb.equations_of_motion(standing, contacts))(tau)
     for exponent, speed in itertools.product(range(4, 13), (0.0, 0.01, 0.1)):
         eom = near_singular(exponent, speed)
         case = exponent, speed
-        assert np.max(np.abs(dynamics.forces_from_torques(eom)(tau) - wanted)) < 0.01 * robot.weight, case
+        assert np.max(np.abs(dynamics.forces_from_torques(eom)(tau) - expected)) < 0.01 * robot.weight, case
         assert np.max(np.abs(dynamics.accelerations_from_torques(eom)(tau))) < 0.2 + 10.0 * speed, case
         space = dynamics.feasible_space(eom)
         assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, case  # the smallest point of all; q̈ in rad/s² is in it
@@ -493,12 +493,14 @@ def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> No
         qdd, tau, forces = rng.normal(size=eom.nv), rng.normal(size=eom.d), rng.normal(size=eom.k)
         B, right = dynamics.motion_matrix(eom)
         left = B @ np.concatenate([qdd, tau, forces]) - right
-        judge = judges.mujoco_of(name).at(eom.state)
+        judge = judges.mujoco_of(name).move_to(eom.state)
         newton = judge.M @ qdd + judge.h - eom.S @ tau - eom.J.T @ forces
         assert np.allclose(left, np.concatenate([newton, eom.A @ qdd - eom.b]), atol=1e-7), case
         C, a = dynamics.torque_force_matrix(eom)
-        wanted = eom.A @ judges.aba(eom, tau, forces) - eom.b
-        assert np.allclose(C @ np.concatenate([tau, forces]) - a, wanted, atol=1e-7 * max(1.0, np.abs(wanted).max(initial=0.0)))
+        expected = eom.A @ judges.aba(eom, tau, forces) - eom.b
+        assert np.allclose(
+            C @ np.concatenate([tau, forces]) - a, expected, atol=1e-7 * max(1.0, np.abs(expected).max(initial=0.0))
+        )
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
@@ -552,8 +554,8 @@ def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
             point = (qdd, tau, forces + N @ unseen if eom.k else forces)
             back = space(space.coordinates(*point))
             scale = max(np.abs(part).max(initial=1.0) for part in point)
-            for found, wanted in zip(back, point, strict=True):
-                assert np.max(np.abs(found - wanted), initial=0.0) < 1e-7 * scale, case
+            for found, expected in zip(back, point, strict=True):
+                assert np.max(np.abs(found - expected), initial=0.0) < 1e-7 * scale, case
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
@@ -567,7 +569,7 @@ def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str
         assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, case  # (13) v has no part along V⊥
 
 
-def test_where_contacts_are_asked_for_what_they_cannot_do_the_dynamics_still_hold_and_the_motion_rows_are_met_nearest() -> None:
+def test_where_contacts_cannot_do_what_is_required_the_dynamics_still_hold_and_the_motion_rows_are_met_nearest() -> None:
     """solo8 with four feet that slide apart: A q̈ = b has no solution; Newton's law must not pay for that."""
     state = judges.load("solo8").random_state(3, spread=0.6)
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))

@@ -230,20 +230,6 @@ def test_a_projection_stays_put_and_what_it_takes_away_pulls_against_the_whole_c
     assert rest.alpha_perp <= 1e-12 * size  # what is taken away never pushes
 
 
-def test_results_cannot_be_written_to() -> None:
-    cone, polyhedron = FrictionCone(UP, 0.7), FrictionPolyhedron(UP, 0.7)
-    outside = [5.0, 0.0, 1.0]
-    arrays = [
-        cone.normal,
-        polyhedron.rows,
-        polyhedron.rays,
-        decompose(outside, UP).f_par,
-        decompose(outside, UP).f_perp,
-    ]
-    arrays += [shape.project(force) for shape in (cone, polyhedron) for force in (outside, UP, -UP)]
-    assert not any(array.flags.writeable for array in arrays)
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [

@@ -68,9 +68,9 @@ def test_vertices_are_those_of_the_hull_whatever_its_dimension(seed: int, n: int
         return
     basis = np.linalg.svd(points - points[0])[2][:rank].T
     flat = (points - points[0]) @ basis
-    wanted = {int(np.argmin(flat)), int(np.argmax(flat))} if rank == 1 else set(ConvexHull(flat).vertices.tolist())
-    assert {int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in found} == wanted
-    assert len(found) == len(wanted)
+    expected = {int(np.argmin(flat)), int(np.argmax(flat))} if rank == 1 else set(ConvexHull(flat).vertices.tolist())
+    assert {int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in found} == expected
+    assert len(found) == len(expected)
 
 
 def test_points_on_an_edge_are_no_vertices_and_the_plane_is_walked_counter_clockwise() -> None:

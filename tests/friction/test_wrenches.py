@@ -98,14 +98,14 @@ def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: 
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=False)
     found = []
     for w in random_wrenches(wrenches, 16, seed=feet):
-        # what the stance cannot produce at all is told apart by the equalities; the judge is asked about the rest
+        # what the stance cannot produce at all is told apart by the equalities; the judge decides the rest
         E = wrenches.equalities
         w = w - np.linalg.pinv(E) @ E @ w if len(E) else w
-        wanted = judge.margin(state.com, w)
-        assert wrenches.margin(w) == pytest.approx(wanted, abs=2e-5 * np.linalg.norm(w))
-        if abs(wanted) > 1e-3:
-            assert wrenches.contains(w) == (wanted > 0)
-            found.append(wanted > 0)
+        expected = judge.margin(state.com, w)
+        assert wrenches.margin(w) == pytest.approx(expected, abs=2e-5 * np.linalg.norm(w))
+        if abs(expected) > 1e-3:
+            assert wrenches.contains(w) == (expected > 0)
+            found.append(expected > 0)
     assert 2 <= sum(found) <= len(found) - 2
 
 
@@ -431,10 +431,7 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
         (lambda: wrench_set(state, contacts).reach([np.nan] * 6), "direction holds nan"),
         (lambda: wrench_set(state, contacts).reach(np.zeros(6)), "direction is the zero wrench"),
         (lambda: wrench_set(state, contacts).torques([1.0]), r"force has shape \(1,\)"),
-        (
-            lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
-            "one FrictionPolyhedron for each of the 2",
-        ),
+        (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "one FrictionPolyhedron for each of the 2"),
     ]
     for call, message in cases:
         with pytest.raises(InputError, match=message):

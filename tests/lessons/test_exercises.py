@@ -113,6 +113,12 @@ def test_wrong_answers_to_00_1_get_the_hint_that_fits() -> None:
     assert missed("00.1", wrong) == []
 
 
+def test_the_hints_of_every_exercise_are_tried() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("test_*.py")]
+    tried = {name for text in texts for name in re.findall(r'missed\("(\d\d\.\d)"', text)}
+    assert tried == set(all_exercises())
+
+
 @pytest.mark.parametrize(("name", "share"), [("00.1", 1.0), ("01.3", 0.7)])
 def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str, share: float) -> None:
     mass = fb.load("go2").mass
@@ -121,10 +127,10 @@ def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str, share
 
 
 @pytest.mark.parametrize("name", ["01.3", "03.1", "04.2"])
-def test_many_numbers_where_one_is_asked_for_are_told_so(name: str) -> None:
+def test_many_numbers_where_one_is_needed_are_told_so(name: str) -> None:
     assert missed(name, [(np.zeros(12), "One number is asked for")]) == []
 
 
 @pytest.mark.parametrize(("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))])
-def test_an_unknown_wrong_count_is_asked_what_it_counts(name: str, count: Any) -> None:
+def test_an_unknown_wrong_count_is_told_to_say_what_it_counts(name: str, count: Any) -> None:
     assert missed(name, [(count, "What is counted")]) == []

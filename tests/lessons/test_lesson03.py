@@ -38,14 +38,7 @@ def turned(forces: Any, R: Any) -> Any:
 
 def test_03_1_knows_each_wrong_count() -> None:
     assert right("03.1", 11)
-    wrong = {
-        12: "moves nothing",
-        1: "do not move",
-        6: "components",
-        9: "three feet",
-        5: "legs move",
-        10: "more than",
-    }
+    wrong = {12: "moves nothing", 1: "do not move", 6: "components", 9: "three feet", 5: "legs move", 10: "more than"}
     assert missed("03.1", [*wrong.items(), ([11, 11], "shape")]) == []
 
 
@@ -111,7 +104,7 @@ def test_03_3_knows_what_is_wrong() -> None:
 
 
 @pytest.mark.parametrize("frames", [(), ("FL_foot", "FR_foot", "RL_foot"), ("FL_foot",)], ids=len)
-def test_a_direction_gives_the_base_what_was_asked_for_with_least_change_of_forces(frames: tuple[str, ...]) -> None:
+def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forces(frames: tuple[str, ...]) -> None:
     space = space_of(GO2, *frames)
     desired = [0.3, -0.2, 1.0, 0.1, 0.5, -0.4] if len(frames) != 1 else [0, 0, 1.0, 0, 0, 0]
     step = direction(space, base=desired)

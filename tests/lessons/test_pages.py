@@ -110,10 +110,10 @@ def browser() -> Iterator[Any]:
 def test_a_page_is_whole_in_a_browser_without_network(built: Path, browser: Any) -> None:
     page = browser.new_page(viewport={"width": 800, "height": 500})
     said: list[str] = []
-    asked: list[str] = []
+    requested: list[str] = []
     page.on("console", lambda line: said.append(line.text))
     page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: asked.append(request.url))
+    page.on("request", lambda request: requested.append(request.url))
     page.context.set_offline(True)
     page.goto(built.as_uri())
 
@@ -134,7 +134,7 @@ def test_a_page_is_whole_in_a_browser_without_network(built: Path, browser: Any)
         picture = np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
         assert np.std(picture) > 10  # a robot on a light ground, not an empty canvas
     assert said == []
-    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
+    assert [url for url in requested if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     page.close()
 
 

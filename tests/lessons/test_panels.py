@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import ipywidgets as widgets
 import numpy as np
 import pytest
+from waiting import until
 
 import floatbase as fb
 from floatbase.lessons import SliderPanel, live, push_panel, slider_panel
@@ -117,13 +118,6 @@ def panel() -> Iterator[Pushed]:
     yield made
     made.run.close()
     made.view.close()
-
-
-def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
-    stop = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < stop, "waited in vain"
-        time.sleep(0.01)
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def mujocos_momentum_rate(state: fb.State, contacts: fb.Contacts, forces: Array,
 
     And q̈ of MuJoCo, in our coordinates.
     """
-    judge = judges.Mujoco(state.robot).at(state)
+    judge = judges.Mujoco(state.robot).move_to(state)
     model, data = judge.model, judge.data
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
     owners = [contact.name for contact in contacts for _ in contact.point_names]
@@ -64,7 +64,7 @@ def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
     """In motion, under random forces and torques; the rate against differences of MuJoCo's momentum along MuJoCo's motion."""
     rng = np.random.default_rng(2)
     for state in judges.states(name, 3):
-        judge, contacts = judges.Mujoco(state.robot).at(state), judges.stance(state.robot)
+        judge, contacts = judges.Mujoco(state.robot).move_to(state), judges.stance(state.robot)
         found = mujocos_momentum(judge, judge.data.qpos.copy(), judge.data.qvel.copy())
         assert judges.relative(objectives.momentum(state), found) < 1e-9
         forces = state.robot.weight * rng.normal(size=contacts.k)
@@ -141,8 +141,8 @@ def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name:
 # (22) --------------------------------------------------------------------------------------------------------------------
 
 
-def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_wanted(name: str) -> None:
-    """(22) is zero at its minimum on a full stance, and forces that attain it accelerate the CoM and the momentum as asked."""
+def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name: str) -> None:
+    """(22) is zero at its minimum on a full stance, and forces that attain it move CoM and momentum as desired."""
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
         contacts = judges.stance(state.robot)
@@ -195,7 +195,7 @@ def test_the_force_bias_is_the_squared_friction_plus_alpha_times_the_squared_dis
         assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(tangential + alpha * normal, rel=1e-10)
 
 
-def test_with_the_bias_the_forces_of_a_wanted_wrench_are_unique_and_cvxpys() -> None:
+def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() -> None:
     """(22) + w (23): what §3.1.1 is for. Without the bias six directions cost nothing."""
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, normals=LEAN)
@@ -240,10 +240,10 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
     eom = stand(name, seed)
     found = objectives.torque_for_forces(eom)
     tau0 = rng.normal(size=eom.d)
-    wanted = dynamics.forces_from_torques(eom)(tau0)
-    assert found.gap(wanted) < 1e-6 * np.linalg.norm(wanted)
-    tau = found.torque(wanted)
-    qdd = judges.aba(eom, tau, wanted)
+    expected = dynamics.forces_from_torques(eom)(tau0)
+    assert found.gap(expected) < 1e-6 * np.linalg.norm(expected)
+    tau = found.torque(expected)
+    qdd = judges.aba(eom, tau, expected)
     assert np.max(np.abs(eom.A @ qdd - eom.b)) < 1e-6 * max(1.0, np.abs(qdd).max())
     assert np.linalg.norm(tau) <= np.linalg.norm(tau0) * (1 + 1e-9)
     # (25) about τ0, whose torques change by dtau with the forces held
@@ -273,12 +273,12 @@ def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> N
 
 @pytest.mark.parametrize("exponent", [3, 5, 7])
 def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_rank(exponent: int) -> None:
-    """solo8 almost symmetric with 0.1 rad/s of noise: (25) taken to the letter asks for hundreds of N·m and more."""
+    """solo8 almost symmetric with 0.1 rad/s of noise: (25) taken to the letter needs hundreds of N·m and more."""
     standing, contacts = judges.load("solo8").standing(), fb.Contacts.points(judges.load("solo8"))
-    wanted = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
+    desired = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
     rng = np.random.default_rng(0)
     near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).replace(v=0.1 * rng.normal(size=14))
-    there, here = (objectives.torque_for_forces(fb.equations_of_motion(s, contacts)).torque(wanted) for s in (standing, near))
+    there, here = (objectives.torque_for_forces(fb.equations_of_motion(s, contacts)).torque(desired) for s in (standing, near))
     assert np.max(np.abs(here - there)) < 0.3  # N·m
 
 
@@ -291,39 +291,39 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
             dynamics.forces_from_torques(eom),
             dynamics.undetermined_forces(eom),
         )
-        wanted = 10.0 * rng.normal(size=12)
+        desired = 10.0 * rng.normal(size=12)
         tau, unseen = cp.Variable(8), cp.Variable(N.shape[1])
         reach = zeta.A @ tau + zeta.b + N @ unseen
-        cp.Problem(cp.Minimize(cp.sum_squares(reach - wanted))).solve(**TIGHT)
+        cp.Problem(cp.Minimize(cp.sum_squares(reach - desired))).solve(**TIGHT)
         nearest = reach.value
-        assert found.gap(wanted) > 1.0
-        assert found.gap(wanted) == pytest.approx(np.linalg.norm(nearest - wanted), rel=1e-5)
-        assert np.allclose(found.nearest(wanted), nearest, atol=1e-4)
-        assert found.gap(found.nearest(wanted)) < 1e-7
-        again = zeta(found.torque(found.nearest(wanted)))
-        assert np.allclose(eom.J.T @ again, eom.J.T @ found.nearest(wanted), atol=1e-5)
+        assert found.gap(desired) > 1.0
+        assert found.gap(desired) == pytest.approx(np.linalg.norm(nearest - desired), rel=1e-5)
+        assert np.allclose(found.nearest(desired), nearest, atol=1e-4)
+        assert found.gap(found.nearest(desired)) < 1e-7
+        again = zeta(found.torque(found.nearest(desired)))
+        assert np.allclose(eom.J.T @ again, eom.J.T @ found.nearest(desired), atol=1e-5)
 
 
 @pytest.mark.parametrize("name", ["go2", "solo12", "anymal_kinova"])
 def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
     eom = stand(name, 1)
     found = objectives.torque_for_forces(eom)
-    wanted = 30.0 * np.random.default_rng(0).normal(size=eom.k)
-    assert found.gap(wanted) < 1e-8
-    assert np.allclose(found.nearest(wanted), wanted, atol=1e-8)
-    assert np.allclose(dynamics.forces_from_torques(eom)(found.torque(wanted)), wanted, atol=1e-6)
+    desired = 30.0 * np.random.default_rng(0).normal(size=eom.k)
+    assert found.gap(desired) < 1e-8
+    assert np.allclose(found.nearest(desired), desired, atol=1e-8)
+    assert np.allclose(dynamics.forces_from_torques(eom)(found.torque(desired)), desired, atol=1e-6)
 
 
 def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration() -> None:
     """What `TorqueForForces` promises for d < k: min ‖J q̈ - b‖ with that λ, then the smallest τ."""
     eom = stand("solo8", 0)
-    wanted = 10.0 * np.random.default_rng(3).normal(size=12)
+    desired = 10.0 * np.random.default_rng(3).normal(size=12)
     x = cp.Variable(8)
-    free = np.linalg.solve(eom.M, eom.J.T @ wanted - eom.h)
+    free = np.linalg.solve(eom.M, eom.J.T @ desired - eom.h)
     gap = eom.A @ free + eom.A @ np.linalg.solve(eom.M, eom.S) @ x - eom.b
     cp.Problem(cp.Minimize(cp.sum_squares(gap))).solve(**TIGHT)
-    tau = objectives.torque_for_forces(eom).torque(wanted)
-    left = eom.A @ judges.aba(eom, tau, wanted) - eom.b
+    tau = objectives.torque_for_forces(eom).torque(desired)
+    left = eom.A @ judges.aba(eom, tau, desired) - eom.b
     assert np.linalg.norm(left) > 1.0
     assert np.linalg.norm(left) == pytest.approx(np.linalg.norm(gap.value), rel=1e-6)
 

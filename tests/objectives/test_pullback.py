@@ -60,9 +60,9 @@ def least(eom: EquationsOfMotion, residuals: dict[str, tuple[Array, Array]], fix
         sides.append(value)
     E, e = np.vstack(rows), np.concatenate(sides)
     kkt = np.block([[H, E.T], [E, np.zeros((len(E), len(E)))]])
-    wanted = np.concatenate([g, e])
-    found = np.linalg.lstsq(kkt, wanted, rcond=1e-12)[0]
-    assert np.max(np.abs(kkt @ found - wanted)) < 1e-8 * np.max(np.abs(wanted))
+    right = np.concatenate([g, e])
+    found = np.linalg.lstsq(kkt, right, rcond=1e-12)[0]
+    assert np.max(np.abs(kkt @ found - right)) < 1e-8 * np.max(np.abs(right))
     parts = {block: found[part] for block, part in at.items()}
     return sum(0.5 * float(np.sum((A @ parts[block] - r) ** 2)) for block, (A, r) in residuals.items())
 
@@ -180,10 +180,10 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
     )
     still = np.zeros(18)
     smallest, best = (f(cost, space, "qdd")(still) for f in (objectives.seen_from_smallest, objectives.seen_from_best))
-    wanted = least(
+    expected = least(
         eom, {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))}, {"qdd": still}
     )
-    assert best == pytest.approx(wanted, rel=1e-6)
+    assert best == pytest.approx(expected, rel=1e-6)
     assert smallest / best == pytest.approx(29.0, abs=0.5)
 
 
@@ -237,16 +237,16 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
     """
     eom = eom_of("solo8", 4)
     space = dynamics.feasible_space(eom)
-    wanted = np.arange(12.0)
+    desired = np.arange(12.0)
     for weight in (1e-2, 1e-6, 1e-10):
         cost = objectives.cost_on_space(
             space,
             tau=Quadratic.from_residual(np.eye(8), np.zeros(8)),
-            forces=Quadratic.from_residual(np.eye(12), wanted, weight),
+            forces=Quadratic.from_residual(np.eye(12), desired, weight),
         )
         beta = objectives.best_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)
-        assert np.allclose(N.T @ (space.forces(beta) - wanted), 0.0, atol=1e-3), weight
+        assert np.allclose(N.T @ (space.forces(beta) - desired), 0.0, atol=1e-3), weight
 
 
 def test_a_block_that_does_not_exist_is_named() -> None:

@@ -27,28 +27,28 @@ def cases(name: str) -> list[tuple[EquationsOfMotion, np.ndarray, np.random.Gene
     return found
 
 
-def test_the_centre_of_mass_residual_is_its_acceleration_less_the_one_asked_for(name: str) -> None:
+def test_the_centre_of_mass_residual_is_its_acceleration_less_the_desired_one(name: str) -> None:
     for eom, qdd, rng in cases(name):
         target, velocity, feed = rng.normal(size=(3, 3))
         task = fb.CoMTask(target, velocity, feed, kp=7.0, kd=3.0)
         actual = judges.acceleration_of(lambda s: s.com, eom.state, qdd)
         moving = judges.derivative(lambda s: s.com, eom.state, eom.state.v)
-        wanted = feed - 7.0 * (eom.state.com - target) - 3.0 * (moving - velocity)
-        assert np.allclose(task.residual(eom)(qdd), actual - wanted, atol=2e-5)
+        desired = feed - 7.0 * (eom.state.com - target) - 3.0 * (moving - velocity)
+        assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=2e-5)
 
 
-def test_the_frame_residual_is_its_acceleration_less_the_one_asked_for(name: str) -> None:
+def test_the_frame_residual_is_its_acceleration_less_the_desired_one(name: str) -> None:
     for eom, qdd, rng in cases(name):
         frame = eom.robot.frames[-1]
         target, velocity, feed = rng.normal(size=(3, 3))
         task = fb.FrameTask(frame, target, velocity, feed, kp=7.0, kd=3.0)
         actual = judges.acceleration_of(lambda s, f=frame: s.point(f), eom.state, qdd)
         moving = judges.derivative(lambda s, f=frame: s.point(f), eom.state, eom.state.v)
-        wanted = feed - 7.0 * (eom.state.point(frame) - target) - 3.0 * (moving - velocity)
-        assert np.allclose(task.residual(eom)(qdd), actual - wanted, atol=2e-5)
+        desired = feed - 7.0 * (eom.state.point(frame) - target) - 3.0 * (moving - velocity)
+        assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=2e-5)
 
 
-def test_the_orientation_residual_is_the_angular_acceleration_less_the_one_asked_for(name: str) -> None:
+def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_one(name: str) -> None:
     for eom, qdd, rng in cases(name):
         frame = eom.robot.frames[-1]
         R = eom.state.frame_pose(frame).rotation
@@ -59,8 +59,8 @@ def test_the_orientation_residual_is_the_angular_acceleration_less_the_one_asked
         step = 1e-5
         ahead, behind = (judges.along(eom.state, eom.state.v, t).frame_pose(frame).rotation for t in (step, -step))
         moving = judges.turn_between(ahead, behind) / (2.0 * step)
-        wanted = feed - 7.0 * error - 3.0 * (moving - velocity)
-        assert np.allclose(task.residual(eom)(qdd), actual - wanted, atol=5e-5)
+        desired = feed - 7.0 * error - 3.0 * (moving - velocity)
+        assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=5e-5)
 
 
 def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(name: str) -> None:
@@ -69,8 +69,8 @@ def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_a
         target = robot.random_state(int(rng.integers(1000)), 0.2)
         task = fb.PostureTask(target.q, kp=7.0, kd=3.0)
         e = state.q[-robot.d :] - target.q[-robot.d :]
-        wanted = qdd[-robot.d :] + 7.0 * e + 3.0 * state.v[-robot.d :]
-        assert np.allclose(task.residual(eom)(qdd), wanted, atol=1e-9)
+        expected = qdd[-robot.d :] + 7.0 * e + 3.0 * state.v[-robot.d :]
+        assert np.allclose(task.residual(eom)(qdd), expected, atol=1e-9)
 
 
 def test_the_posture_of_the_base_does_not_count() -> None:
@@ -92,7 +92,7 @@ def test_force_and_torque_residuals_are_actual_minus_target(name: str) -> None:
         assert np.allclose(fb.TorqueTask(np.ones(eom.d)).residual(eom)(tau), tau - 1.0)
 
 
-def test_a_resting_robot_that_stands_where_it_should_is_asked_for_no_acceleration(name: str) -> None:
+def test_a_resting_robot_that_stands_where_it_should_is_given_no_acceleration(name: str) -> None:
     state = judges.load(name).standing()
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
     for task in fb.standing_tasks(state):
@@ -128,9 +128,9 @@ def test_damping_is_critical_unless_it_is_given() -> None:
 def test_a_target_is_copied_when_a_task_is_made() -> None:
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.none())
-    goal = state.com.copy()
-    task = fb.CoMTask(goal)
-    goal += 1.0
+    target = state.com.copy()
+    task = fb.CoMTask(target)
+    target += 1.0
     assert np.allclose(task.residual(eom).b, 0.0, atol=1e-9)
     forces = np.zeros(12)
     hold = fb.ForceTask(forces)
@@ -142,12 +142,12 @@ def test_a_target_is_copied_when_a_task_is_made() -> None:
 def test_the_posture_of_standing_tasks_keeps_go2_12_mm_short_of_a_target_30_mm_away_and_a_lighter_one_does_not() -> None:
     robot = judges.load("go2")
     standing, contacts = robot.standing(), fb.Contacts.points(robot)
-    wanted = standing.com + [0.0, 0.03, 0.0]
+    target = standing.com + [0.0, 0.03, 0.0]
     _, upright, posture = fb.standing_tasks(standing)
     left = []
     for joints in (posture, fb.PostureTask(standing.q, weight=1e-3)):
-        controller = fb.WholeBodyController(robot, contacts, [fb.CoMTask(wanted), upright, joints])
+        controller = fb.WholeBodyController(robot, contacts, [fb.CoMTask(target), upright, joints])
         run = fb.rollout(fb.Simulation(robot), controller, 3.0, control_period=2e-3)
-        left.append(1e3 * float((wanted - run.com[-1])[1]))  # mm
+        left.append(1e3 * float((target - run.com[-1])[1]))  # mm
     assert 11.5 < left[0] < 13.5
     assert abs(left[1]) < 1.0

@@ -140,7 +140,7 @@ def test_it_agrees_with_daqp_on_20_problems_of_every_robot_and_records_an_honest
 
 
 def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
-    """The problems of consecutive ticks while the centre of mass is asked to sway more than a slippery floor allows."""
+    """The problems of consecutive ticks while the centre of mass has a target that sways more than a slippery floor allows."""
     robot = judges.load(name)
     state = robot.standing()
     com = fb.CoMTask(lambda t: state.com + np.array([0.0, 0.1 * np.sin(6.0 * t), 0.0]), kp=300.0)

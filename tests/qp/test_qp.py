@@ -92,15 +92,15 @@ def test_the_equality_space_holds_all_solutions_and_nothing_else(seed: int, n: i
 
 @pytest.mark.parametrize("solver", solvers())
 def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver: str) -> None:
-    rooms = {
-        room: QP(np.eye(2), [-3.0, 0.0], np.eye(2), [1.0, 2.0], [[1.0, 0.0]], [room], inequality_names=("wall",))
-        for room in (5.0, 1.0, 0.5)
+    problems = {
+        right: QP(np.eye(2), [-3.0, 0.0], np.eye(2), [1.0, 2.0], [[1.0, 0.0]], [right], inequality_names=("wall",))
+        for right in (5.0, 1.0, 0.5)
     }
-    for room in (5.0, 1.0):
-        assert np.allclose(solve(rooms[room], solver).x, [1.0, 2.0], atol=1e-8)
-        assert solve(rooms[room], solver).residuals.stationarity < 1e-6
+    for right in (5.0, 1.0):
+        assert np.allclose(solve(problems[right], solver).x, [1.0, 2.0], atol=1e-8)
+        assert solve(problems[right], solver).residuals.stationarity < 1e-6
     with pytest.raises(InfeasibleError, match="wall") as caught:
-        solve(rooms[0.5], solver)
+        solve(problems[0.5], solver)
     assert caught.value.rows == ("wall",)
 
 

@@ -173,7 +173,7 @@ def residual_torque(solution: Solution) -> float:
     """How far, N·m, one Newton step on the optimality conditions of the active rows would still move a torque.
 
     The residuals are summed in whole fractions, without rounding: what is small along a direction of little curvature would
-    not show in numbers of 16 digits. Then equations in these digits say what step they ask for.
+    not show in numbers of 16 digits. Then equations in these digits say what step they need.
     """
     qp = solution.qp
     active = np.flatnonzero(solution.inequality_multipliers > 0.0)

@@ -20,7 +20,7 @@ def test_a_model_of_our_own_is_the_same_to_mujoco(path: Path) -> None:
     robot = fb.load_urdf(path)
     assert robot.is_floating
     state = robot.random_state(0)
-    judge = judges.Mujoco(robot).at(state)
+    judge = judges.Mujoco(robot).move_to(state)
     assert judges.relative(state.M, judge.M) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
 

@@ -63,7 +63,7 @@ def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says
 
 def test_a_standing_robot_has_every_foot_on_the_ground_and_rests(floating) -> None:
     state = floating.standing()
-    judge = judges.mujoco_of(floating.name).at(state)
+    judge = judges.mujoco_of(floating.name).move_to(state)
     for foot in floating.feet:
         body = judge.body(foot.frame)
         R, p = judge.data.xmat[body].reshape(3, 3), judge.data.xpos[body]
@@ -83,7 +83,7 @@ def test_a_standing_robot_has_its_centre_of_mass_over_its_feet(floating) -> None
     assert np.all(hull.equations @ np.append(state.com[:2], 1.0) < -0.01)
 
 
-def test_a_robot_stands_at_the_height_asked_for(floating) -> None:
+def test_a_robot_stands_at_the_requested_height(floating) -> None:
     usual = floating.standing()
     state = floating.standing(height=0.97 * usual.q[2])
     assert state.q[2] == pytest.approx(0.97 * usual.q[2], abs=1e-9)

@@ -22,7 +22,7 @@ def test_frames_lie_in_the_world_where_mujoco_has_them(name: str) -> None:
     robot, judge = judges.load(name), judges.mujoco_of(name)
     frames = [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]
     for state in judges.states(name, N):
-        judge.at(state)
+        judge.move_to(state)
         for frame in frames:
             placement = robot.model.frames[robot.frame_id(frame)].placement
             body = judge.body(frame)
@@ -37,7 +37,7 @@ def test_frames_lie_in_the_world_where_mujoco_has_them(name: str) -> None:
 def test_frame_jacobians_agree_with_mujoco_in_the_world_aligned_frame(name: str) -> None:
     robot, judge = judges.load(name), judges.mujoco_of(name)
     for state in judges.states(name, N):
-        judge.at(state)
+        judge.move_to(state)
         for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
             linear, angular = judge.jacobian(frame, state.point(frame))
             assert np.allclose(state.frame_jacobian(frame), np.vstack([linear, angular]), atol=1e-9)
@@ -48,14 +48,14 @@ def test_frame_drift_is_the_change_of_j_v_along_v(name: str) -> None:
     robot = judges.load(name)
     for state in judges.states(name, N):
         for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
-            wanted = judges.drift_of(lambda s, f=frame: s.frame_jacobian(f), state)
-            assert np.allclose(state.frame_drift(frame), wanted, atol=1e-7), frame
+            expected = judges.drift_of(lambda s, f=frame: s.frame_jacobian(f), state)
+            assert np.allclose(state.frame_drift(frame), expected, atol=1e-7), frame
 
 
 def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_derivatives(name: str) -> None:
     judge = judges.mujoco_of(name)
     for state in judges.states(name, N):
-        judge.at(state)
+        judge.move_to(state)
         if judge.robot.is_floating:  # MuJoCo counts a fixed base's bolted links in, Pinocchio does not
             assert np.allclose(state.com, judge.data.subtree_com[1], atol=1e-9)
         assert np.allclose(state.com_jacobian, judges.jacobian_of(lambda s: s.com, state), atol=1e-7)
@@ -91,7 +91,7 @@ def test_difference_undoes_integrate(seed: int, which: str) -> None:
     assert not np.allclose(state.difference(reached.q), dv, atol=1e-3)
 
 
-def test_a_state_computes_from_a_copy_and_can_not_be_written_to(name: str) -> None:
+def test_a_state_computes_from_a_copy_and_gives_copies_of_its_poses(name: str) -> None:
     robot = judges.load(name)
     q, v = robot.standing().q.copy(), np.zeros(robot.nv)
     state = fb.State(robot, q, v)
@@ -99,18 +99,24 @@ def test_a_state_computes_from_a_copy_and_can_not_be_written_to(name: str) -> No
     q += 1.0
     v += 1.0
     assert np.array_equal(fb.State(robot, state.q, state.v).com, com)
-    for array in (state.q, state.v, state.M, state.h, state.com, state.com_jacobian, state.joint_transforms):
-        with pytest.raises(ValueError, match="read-only"):
-            array[...] = 0.0
     pose = state.frame_pose("base")
     pose.translation = pose.translation + 1.0
     assert not np.allclose(state.frame_pose("base").translation, pose.translation)
 
 
+def test_a_state_answers_the_same_in_any_order_of_questions(name: str) -> None:
+    questions = [lambda s, k=key: getattr(s, k) for key in ("M", "h", "com_drift", "com_jacobian")]
+    questions += [lambda s: s.frame_drift("base"), lambda s: s.frame_jacobian("base")]
+    one, other = judges.load(name).random_state(5), judges.load(name).random_state(5)
+    first = [ask(one) for ask in questions]
+    second = [ask(other) for ask in questions[::-1]][::-1]
+    assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+
+
 def test_joint_transforms_are_where_mujoco_has_the_joints(name: str) -> None:
     robot, judge = judges.load(name), judges.mujoco_of(name)
     state = robot.random_state(1)
-    judge.at(state)
+    judge.move_to(state)
     for joint in robot.joint_names:
         T = state.joint_transforms[robot.model.getJointId(joint)]
         body = int(judge.model.joint(joint).bodyid[0])

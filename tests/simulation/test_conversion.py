@@ -62,7 +62,7 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
         assert np.allclose(judge.convert.q(qpos), q, atol=1e-12)
         assert np.allclose(judge.convert.v(qpos, qvel), v, atol=1e-12)
         state = fb.State(robot, q, v)
-        assert judges.relative(state.M, judge.at(state).M) < 1e-9
+        assert judges.relative(state.M, judge.move_to(state).M) < 1e-9
         assert judges.relative(state.h, judge.h) < 1e-9
 
 
@@ -74,7 +74,7 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and
     sim, state = fb.Simulation(loose, timestep=1e-4), loose.random_state(0)
     sim.reset(state)
     assert np.allclose(sim.q, state.q)
-    assert np.allclose(judges.Mujoco(loose).at(state).M, state.M, atol=1e-9)
+    assert np.allclose(judges.Mujoco(loose).move_to(state).M, state.M, atol=1e-9)
     lift = fb.Push([0.0, 0.0, 2.0 * loose.weight], duration=1.0)  # it falls upwards with g
     sim.reset(state.replace(v=np.zeros(12)))
     for _ in range(200):
@@ -86,7 +86,7 @@ def test_a_foot_without_a_possible_inertia_is_joined_to_the_leg_that_carries_it(
     """hyq's feet are links of a small mass without inertia, which MuJoCo refuses; nothing is welded to them from below."""
     robot = fb.load("hyq", feet=["lf_foot", "lh_foot", "rf_foot", "rh_foot"], foot_radius=0.02)
     state = robot.random_state(0)
-    judge = judges.Mujoco(robot).at(state)
+    judge = judges.Mujoco(robot).move_to(state)
     assert judges.relative(state.M, judge.M) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
 
@@ -111,7 +111,7 @@ def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_pa
     urdf.write_text(f'<robot name="turned">{links}{joints}</robot>')
     robot = fb.load_urdf(urdf, feet=["toe"])
     state = robot.random_state(0)
-    judge = judges.Mujoco(robot).at(state)
+    judge = judges.Mujoco(robot).move_to(state)
     assert judges.relative(state.M, judge.M) < 1e-12
     assert judges.relative(state.h, judge.h) < 1e-12
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 
 import judges
 import numpy as np
 import pytest
+from waiting import until
 
 import floatbase as fb
 from floatbase.simulation import SEEN, Live
@@ -29,13 +29,6 @@ def run(slices: list[fb.Rollout]) -> Iterator[Live]:
     live = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append)
     yield live
     live.close()
-
-
-def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
-    stop = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < stop, "waited in vain"
-        time.sleep(0.01)
 
 
 def test_it_runs_pauses_and_goes_on_where_it_was(run: Live, slices: list[fb.Rollout]) -> None:
@@ -271,8 +264,8 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
     run.pause()
     run.close()
     assert delay.steps == sum(len(s) for s in slices) * 2  # steps of the physics, two for each tick
-    asked = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])
-    np.testing.assert_allclose(slices[1].tau[0], asked, atol=1e-9)
+    desired = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])
+    np.testing.assert_allclose(slices[1].tau[0], desired, atol=1e-9)
     run.reset()
     until(lambda: delay.resets == 1)
     run.close()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import judges
 import numpy as np
 import pytest
+from judges import limp
 
 import floatbase as fb
 from floatbase.errors import FloatbaseError, InputError, SimulationError, UnknownNameError
@@ -16,17 +16,6 @@ from floatbase.simulation import Ground
 GO2 = judges.load("go2")
 SIM = fb.Simulation(GO2)
 UP = [0.0, 0.0, 1.0]
-
-
-@dataclass
-class Torques:
-    """The simplest command."""
-
-    tau: np.ndarray
-
-
-def limp(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
-    return Torques(np.zeros(12))
 
 
 @pytest.mark.parametrize(

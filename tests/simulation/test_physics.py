@@ -33,7 +33,7 @@ def flying(name: str, seed: int | None = None, height: float = 5.0, speed: float
 def energy(state: State) -> float:
     """½ vᵀ M v + m g z, J, with M from the judge."""
     robot = state.robot
-    M = judges.mujoco_of(robot.name).at(state).M
+    M = judges.mujoco_of(robot.name).move_to(state).M
     return float(0.5 * state.v @ M @ state.v) + robot.weight * float(state.com[2])
 
 
@@ -135,8 +135,8 @@ def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name: str) -
         sim.reset(start)
         sim.step(np.zeros(robot.d), (fb.Push(force, frame=frame),))
         gained = angular_momentum(sim.state) - angular_momentum(start)
-        wanted = 1e-4 * np.cross(start.point(frame) - start.com, force)
-        assert np.allclose(gained, wanted, atol=2e-2 * np.linalg.norm(wanted)), frame
+        expected = 1e-4 * np.cross(start.point(frame) - start.com, force)
+        assert np.allclose(gained, expected, atol=2e-2 * np.linalg.norm(expected)), frame
 
 
 def test_pushes_add_up() -> None:
@@ -186,8 +186,8 @@ def test_each_motor_turns_its_own_joint(name: str) -> None:
         sim.reset(start)
         sim.step(tau)
         eom = fb.equations_of_motion(start, fb.Contacts.none())
-        wanted = judges.aba(eom, tau, np.zeros(0))
-        assert np.allclose(sim.v / 1e-5, wanted, rtol=1e-3, atol=1e-3 * np.max(np.abs(wanted))), robot.joint_names[i]
+        expected = judges.aba(eom, tau, np.zeros(0))
+        assert np.allclose(sim.v / 1e-5, expected, rtol=1e-3, atol=1e-3 * np.max(np.abs(expected))), robot.joint_names[i]
 
 
 def test_measured_forces_are_what_changes_the_momentum(name: str) -> None:

@@ -14,9 +14,8 @@ from floatbase.dynamics import contact_space
 
 @cache
 def stood(name: str, duration: float, push: bool = False) -> fb.Rollout:
-    """A robot that stands, at 1 kHz; with a push of 30 N for 0.1 s after 0.5 s where that is asked for."""
-    robot = judges.load(name)
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+    """A robot that stands, at 1 kHz; with a push of 30 N for 0.1 s after 0.5 s where that is requested."""
+    robot, controller = judges.load(name), judges.controller_of(name)
     pushes = [fb.Push([15.0, 26.0, 0.0], start=0.5, duration=0.1)] if push else []
     return fb.rollout(fb.Simulation(robot), controller, duration, pushes)
 

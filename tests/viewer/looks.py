@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import time
-from collections.abc import Callable
 
 import numpy as np
 from browsers import SCREENSHOTS
@@ -24,16 +22,6 @@ WHERE = """(path) => {
 }"""
 EYE = "viewer.camera.position.toArray()"
 DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render"
-
-PATIENCE = 60.0  # s for what takes a moment on an idle machine: no test may fail because others keep the machine busy
-
-
-def until(true: Callable[[], bool]) -> None:
-    """Wait until it is true."""
-    deadline = time.monotonic() + PATIENCE
-    while not true():
-        assert time.monotonic() < deadline, "it has not come true"
-        time.sleep(0.01)
 
 
 def settle(page, title: str | None = None) -> None:

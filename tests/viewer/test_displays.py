@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
+from waiting import PATIENCE, until
 
 from floatbase.robots import Robot, State
 from floatbase.viewer import COM, Viewer, Window, wire
 
-from .looks import CONTEXTS, DRAWN, EYE, PATIENCE, hue_pixels, picture, until
+from .looks import CONTEXTS, DRAWN, EYE, hue_pixels, picture
 from .test_window import commands_in, connect, in_a_loop
 
 HEIGHT = "viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.z"

@@ -18,15 +18,14 @@ import pytest
 import umsgpack
 from browsers import CHROMIUM, FLAGS
 from jupyter_client.manager import start_new_kernel
+from waiting import PATIENCE, until
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
 from floatbase.viewer import Viewer, Window, wire
 
-from .looks import PATIENCE, until
-
 MB = 1 << 20
-HUNG = 15.0  # s: half of what a page may take over a frame, so a call that waits for a page takes longer
+HUNG = 5.0  # s: a sixth of what a page may take over a frame, so a call that waits for a page takes longer
 
 
 def memory() -> int:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
 import pytest
+from waiting import until
 
 from floatbase import Contacts, Simulation, WholeBodyController, standing_tasks
 from floatbase.__main__ import main
@@ -50,14 +50,6 @@ def playground(go2: Robot) -> Iterator[Playground]:
     started.start()
     yield started
     started.close()
-
-
-def until(condition: Callable[[], bool], wait: Callable[[], object] = lambda: time.sleep(0.02), seconds: float = 30.0) -> None:
-    """Wait until a condition holds; with a page, `wait` must let it work."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        wait()
 
 
 def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) -> None:

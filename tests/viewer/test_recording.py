@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import umsgpack
 from browsers import SCREENSHOTS
+from waiting import until
 
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
@@ -19,7 +20,7 @@ from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Push, Rollout
 from floatbase.viewer import ALARM, CONE, CONE_ALPHA, MEASURED, Picture, Viewer, plots, recording, wire
 
-from .looks import SMALL, picture, settle, until
+from .looks import SMALL, picture, settle
 
 matplotlib.use("agg")
 

@@ -106,13 +106,13 @@ def test_the_unit_cone_and_arrow_are_of_unit_size(viewer: Viewer, standing: Stat
 def test_a_cone_says_whether_its_force_is_inside_on_the_surface_or_outside(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
-    wanted = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
+    expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
     viewer.show(standing, contacts, forces=forces)
-    assert colours(viewer, "/meshcat/cone/") == wanted
+    assert colours(viewer, "/meshcat/cone/") == expected
     viewer.show(standing, contacts, planned=forces)
-    assert colours(viewer, "/meshcat/cone/") == wanted
+    assert colours(viewer, "/meshcat/cone/") == expected
     viewer.show(standing, contacts, forces=forces, planned=np.tile([0, 0, 30.0], 4))
-    assert colours(viewer, "/meshcat/cone/") == wanted
+    assert colours(viewer, "/meshcat/cone/") == expected
     viewer.show(standing, contacts, forces=-forces)
     assert set(colours(viewer, "/meshcat/cone/").values()) == {ALARM}
 

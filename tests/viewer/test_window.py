@@ -25,11 +25,10 @@ import pytest
 import tornado.httpclient
 import tornado.websocket
 import umsgpack
+from waiting import PATIENCE, until
 
 from floatbase.errors import FloatbaseError, ViewerError
 from floatbase.viewer import Window, wire
-
-from .looks import PATIENCE, until
 
 
 def window_threads() -> list[threading.Thread]:
