@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
-from floatbase.robots import State, spread_corners
+from floatbase.robots import State, checked_corners
 
 UP = read_only([0.0, 0.0, 1.0])
 DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry concrete
@@ -43,7 +43,7 @@ class Contact(Protocol):
     def row_names(self) -> tuple[str, ...]: ...
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m."""
+        """World positions of the points, shape (n, 3), m, with n = len(point_names)."""
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """J of (4): Jᵀ λ is the generalised force of λ at time t, s; shape (k, nv)."""
@@ -142,7 +142,7 @@ class FlatFootContact:
 
     def __post_init__(self) -> None:
         check_ground(self)
-        object.__setattr__(self, "corners", spread_corners(self.frame, self.corners))
+        object.__setattr__(self, "corners", checked_corners(self.frame, self.corners))
 
     @property
     def name(self) -> str:

@@ -8,11 +8,11 @@ means: an active row holds with equality. x is an optimum, for H positive semide
 
     H x + g + Aᵀ ν + Gᵀ μ = 0     stationarity: the rows balance the objective's slope
     A x = b,  G x ≤ h             feasibility
-    μ ≥ 0                         a table top pushes, it never pulls
+    μ ≥ 0                         a multiplier is never negative: a table top pushes, it never pulls
     μ_i (G x - h)_i = 0           complementarity: only the rows we rest on are active
 
-μ_i is what one unit of room on row i (h_i + 1) would lower the objective by, to first order; ν_i likewise, of either
-sign. Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
+μ_i is what one unit more in h_i would lower the objective by, to first order; ν_i likewise in b_i, of either sign.
+Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ class Foot:
         object.__setattr__(self, "radius", positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
         object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
-            object.__setattr__(self, "corners", spread_corners(self.frame, self.corners))
+            object.__setattr__(self, "corners", checked_corners(self.frame, self.corners))
 
     @property
     def is_flat(self) -> bool:
@@ -222,8 +222,8 @@ def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", fi
             raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
 
 
-def spread_corners(frame: str, requested: npt.ArrayLike) -> Array:
-    """The corners, (n, 3), m, of a foot, checked: on one line they cannot hold all six motions. Raises `InputError`."""
+def checked_corners(frame: str, requested: npt.ArrayLike) -> Array:
+    """The corners of a foot, (n, 3), m, in its frame, checked: on one line they hold no six motions. Raises `InputError`."""
     corners = checked(f"corners of {frame}", requested, (None, 3), "m")
     if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=_AREA_TOLERANCE) < 2:
         raise InputError(f"the corners of {frame} span no area; a flat foot needs at least 3 that are not on one line.")

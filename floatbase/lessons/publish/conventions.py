@@ -11,8 +11,8 @@ from floatbase import conventions
 
 _PACKAGE = Path(floatbase.__file__).parent
 _WITHOUT_TOLERANCES = ("lessons", "viewer")  # their numbers choose what is drawn, not what is answered
-# NAME = 1e-9  # the reason
-_TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = (-?[0-9.]+(?:e-?[0-9]+)?)  # (.+)$", re.MULTILINE)
+# NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int()
+_TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)  # (.+)$", re.MULTILINE)
 
 
 def page() -> str:
@@ -56,7 +56,7 @@ def _with_table_of_symbols(text: str) -> str:
 
 
 def tolerances() -> Iterator[tuple[str, str, str, str]]:
-    """File, name, value and reason of every numeric constant of the package, as its source states them."""
+    """File, name, value and reason of every numeric constant of the package, each as its source states it."""
     for path in sorted(_PACKAGE.rglob("*.py")):
         place = path.relative_to(_PACKAGE)
         if place.parts[0] not in _WITHOUT_TOLERANCES:
