@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
+import pytest
 from scipy.optimize import linprog
 
 import floatbase as fb
@@ -35,6 +36,8 @@ def load(name: str) -> Robot:
 
 FLOATING = tuple(name for name in ROBOTS if load(name).is_floating)
 FLAT = tuple(name for name in ROBOTS if load(name).feet and all(foot.is_flat for foot in load(name).feet))
+every_robot = pytest.fixture(params=ROBOTS)(lambda request: request.param)  # `name = judges.every_robot` runs a file on each
+every_floating_robot = pytest.fixture(params=FLOATING)(lambda request: request.param)
 BALLS = tuple(name for name in FLOATING if name not in FLAT)
 
 
@@ -219,6 +222,13 @@ def aba(eom: EquationsOfMotion, tau: Array, forces: Array) -> Array:
         joint = model.frames[model.getFrameId(frame)].parentJoint
         wrenches[joint] += data.oMi[joint].actInv(pin.Force(force, np.cross(point, force)))
     return np.asarray(pin.aba(model, data, state.q, state.v, robot.S @ tau, wrenches))
+
+
+def constrained(eom: EquationsOfMotion, tau: Array, b: Array | None = None) -> tuple[Array, Array]:
+    """q̈ and the smallest λ of (7) for given τ by least squares of the whole system: no ζ, no η. b: of (5), eom.b by default."""
+    kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
+    x = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b if b is None else b]), rcond=1e-11)[0]
+    return x[: eom.nv], x[eom.nv :]
 
 
 def relative(found: npt.ArrayLike, expected: npt.ArrayLike) -> float:

@@ -212,13 +212,13 @@ def test_every_task_with_targets_that_move() -> None:
         assert difference(both, state, 0.3 * t) < TORQUE
 
 
+LINK = """<link name="{}"><inertial><mass value="1"/><origin xyz="0.1 0 0.2"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+
 def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) -> None:
     """A continuous joint is (cos, sin) in q."""
-    links = "".join(
-        f'<link name="l{i}"><inertial><mass value="1"/><origin xyz="0.1 0 0.2"/>'
-        '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-        for i in range(3)
-    )
+    links = "".join(LINK.format(f"l{i}") for i in range(3))
     joints = "".join(
         f'<joint name="j{i}" type="{kind}"><parent link="l{i}"/><child link="l{i + 1}"/><origin xyz="0 0 0.3"/>'
         f'<axis xyz="{axis}"/><limit effort="50" velocity="9" lower="-3" upper="3"/></joint>'
@@ -246,13 +246,9 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
 
 def test_a_single_joint_takes_the_readable_path(tmp_path: Path) -> None:
     """Pinocchio's Jacobians of one joint have one dimension less."""
-    link = (
-        '<link name="{}"><inertial><mass value="1"/><origin xyz="0.1 0 0.2"/>'
-        '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    )
     urdf = tmp_path / "pendulum.urdf"
     urdf.write_text(
-        f'<robot name="pendulum">{link.format("wall")}{link.format("bob")}'
+        f'<robot name="pendulum">{LINK.format("wall")}{LINK.format("bob")}'
         '<joint name="pin" type="revolute"><parent link="wall"/><child link="bob"/><axis xyz="0 1 0"/>'
         '<limit effort="50" velocity="9" lower="-3" upper="3"/></joint></robot>'
     )
@@ -375,8 +371,8 @@ def test_the_path_is_visible_and_can_be_chosen() -> None:
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
     state = robot.standing()
-    for path in ("compiled", "readable"):
-        controller = fb.WholeBodyController(robot, contacts, tasks, path=path)
+    for requested, path in (("auto", "compiled"), ("compiled", "compiled"), ("readable", "readable")):
+        controller = fb.WholeBodyController(robot, contacts, tasks, path=requested)
         assert controller.path == controller(state.q, state.v).path == path
         assert path in repr(controller)
         assert controller.path_reason

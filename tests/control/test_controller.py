@@ -213,22 +213,15 @@ def test_every_row_of_the_problem_has_a_name_of_its_own() -> None:
         assert len(set(qp.inequality_names)) == len(qp.inequality_names) == len(qp.G)
 
 
-def test_the_order_of_tasks_does_not_matter() -> None:
+def test_the_order_of_tasks_and_of_contacts_does_not_matter() -> None:
     robot = judges.load("go2")
-    state = robot.random_state(3)
-    tasks = fb.standing_tasks(robot.standing())
-    one, other = (fb.WholeBodyController(robot, fb.Contacts.points(robot), t) for t in (tasks, tasks[::-1]))
-    assert np.allclose(one(state.q, state.v).tau, other(state.q, state.v).tau, atol=1e-8)
-
-
-def test_the_order_of_contacts_does_not_matter() -> None:
-    robot = judges.load("go2")
-    state = robot.random_state(3)
-    tasks, contacts = fb.standing_tasks(robot.standing()), fb.Contacts.points(robot)
+    state, tasks, contacts = robot.random_state(3), fb.standing_tasks(robot.standing()), fb.Contacts.points(robot)
     turned = fb.Contacts.points(robot, frames=contacts.names[::-1])
-    one, other = (fb.WholeBodyController(robot, c, tasks)(state.q, state.v) for c in (contacts, turned))
-    assert np.allclose(one.tau, other.tau, atol=1e-7)
-    assert np.allclose(one.forces.reshape(4, 3), other.forces.reshape(4, 3)[::-1], atol=1e-6)
+    stances = ((contacts, tasks), (contacts, tasks[::-1]), (turned, tasks))
+    one, two, three = (fb.WholeBodyController(robot, *given)(state.q, state.v) for given in stances)
+    assert np.allclose(one.tau, two.tau, atol=1e-8)
+    assert np.allclose(one.tau, three.tau, atol=1e-7)
+    assert np.allclose(one.forces.reshape(4, 3), three.forces.reshape(4, 3)[::-1], atol=1e-6)
 
 
 def test_the_same_state_gets_the_same_answer_whatever_came_before() -> None:

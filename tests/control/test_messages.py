@@ -66,9 +66,7 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: controller()(1.1 * STATE.q, STATE.v), InputError, r"has length 1.1; it must be 1\. Divide it by its length"),
     ],
 )
-def test_bad_input_is_answered_with_what_is_wrong_and_what_would_be_right(
-    make: Callable[[], object], kind: type[FloatbaseError], text: str
-) -> None:
+def test_bad_input_is_told_what_would_be_right(make: Callable[[], object], kind: type[FloatbaseError], text: str) -> None:
     with pytest.raises(kind, match=text):
         make()
 

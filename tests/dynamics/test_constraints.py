@@ -77,11 +77,9 @@ def wheel_of_the_disc(normal: npt.ArrayLike = Z) -> RollingWheel:
 
 
 def motion(state: fb.State, *contacts: object, t: float = 0.0) -> tuple[Array, Array]:
-    """q̈ and λ under no torque, from the whole system (7) by least squares: no ζ, no η."""
+    """q̈ and λ under no torque."""
     eom = fb.equations_of_motion(state, fb.Contacts(list(contacts)), t)
-    kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
-    x = np.linalg.lstsq(kkt, np.concatenate([-eom.h, eom.b]), rcond=1e-12)[0]
-    return x[: eom.nv], x[eom.nv :]
+    return judges.constrained(eom, np.zeros(eom.d))
 
 
 def world_acceleration(state: fb.State, qdd: Array) -> tuple[Array, Array]:

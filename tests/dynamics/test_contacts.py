@@ -16,9 +16,7 @@ from floatbase.simulation import Ground
 N = 10
 
 
-@pytest.fixture(params=judges.FLOATING)
-def name(request: pytest.FixtureRequest) -> str:
-    return request.param
+name = judges.every_floating_robot
 
 
 def tilted(name: str, seed: int) -> fb.Contacts:

@@ -14,9 +14,7 @@ from floatbase.dynamics import contact_inertia_inverse
 N = 10
 
 
-@pytest.fixture(params=judges.ROBOTS)
-def name(request: pytest.FixtureRequest) -> str:
-    return request.param
+name = judges.every_robot
 
 
 def test_inertia_agrees_with_mujoco(name: str) -> None:

@@ -21,9 +21,7 @@ from floatbase.dynamics import (
 N = 5
 
 
-@pytest.fixture(params=judges.ROBOTS)
-def name(request: pytest.FixtureRequest) -> str:
-    return request.param
+name = judges.every_robot
 
 
 def test_the_parts_sum_to_h(name: str) -> None:

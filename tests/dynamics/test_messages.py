@@ -73,9 +73,7 @@ ALL = fb.Contacts.points(GO2)
         ),
     ],
 )
-def test_bad_input_is_answered_with_what_is_wrong_and_what_would_be_right(
-    make: Callable[[], object], kind: type[FloatbaseError], text: str
-) -> None:
+def test_bad_input_is_told_what_would_be_right(make: Callable[[], object], kind: type[FloatbaseError], text: str) -> None:
     with pytest.raises(kind, match=text):
         make()
 

@@ -99,13 +99,6 @@ def judged(eom: EquationsOfMotion) -> tuple[Array, Array]:
     return judge.M, np.vstack([np.zeros((0, eom.nv)), *J])
 
 
-def constrained(eom: EquationsOfMotion, tau: Array) -> tuple[Array, Array]:
-    """q̈ and the smallest λ of (7) for given τ from one least-squares solve of the whole system."""
-    kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
-    x = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b]), rcond=1e-11)[0]
-    return x[: eom.nv], x[eom.nv :]
-
-
 def held(eom: EquationsOfMotion) -> EquationsOfMotion:
     """The same with the velocity nearest to its own that the contacts allow: A v = 0."""
     v = eom.state.v - np.linalg.pinv(eom.A, rcond=1e-9) @ (eom.A @ eom.state.v)
@@ -446,7 +439,7 @@ def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str
     rng = np.random.default_rng(0)
     for case, eom in held_cases(name):
         tau = 5.0 * rng.normal(size=eom.d)
-        qdd, forces = constrained(eom, tau)
+        qdd, forces = judges.constrained(eom, tau)
         assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-6, case
         found = dynamics.forces_from_torques(eom)(tau)
         assert judges.relative(found, forces) < 1e-6, case
@@ -548,7 +541,7 @@ def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
     for case, eom in held_cases(name):
         space = dynamics.feasible_space(eom)
         tau = 5.0 * rng.normal(size=eom.d)
-        qdd, forces = constrained(eom, tau)
+        qdd, forces = judges.constrained(eom, tau)
         N = dynamics.undetermined_forces(eom)
         for unseen in (np.zeros(N.shape[1]), 30.0 * rng.normal(size=N.shape[1])):
             point = (qdd, tau, forces + N @ unseen if eom.k else forces)

@@ -210,9 +210,7 @@ def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone(
 
 
 @given(seeds, facets, mus, st.booleans())
-def test_a_projection_stays_put_and_what_it_takes_away_pulls_against_the_whole_cone(
-    seed: int, n: int, mu: float, inside: bool
-) -> None:
+def test_a_projection_is_the_nearest_point_of_the_cone(seed: int, n: int, mu: float, inside: bool) -> None:
     """Moreau: p in K, (f - p) · p = 0, (f - p) · k ≤ 0 for all k in K; together they make p the nearest point."""
     rng = np.random.default_rng(seed)
     polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)

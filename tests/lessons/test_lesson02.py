@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
+import judges
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -29,26 +29,19 @@ def moving(go2: Robot) -> fb.State:
     return slow.replace(v=8 * slow.v)
 
 
-def motion(eom: Any, tau: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """As the lesson has it, by least squares."""
-    system = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
-    both = np.linalg.lstsq(system, np.concatenate([eom.S @ tau - eom.h, b]), rcond=None)[0]
-    return both[: eom.nv], both[eom.nv :]
-
-
 def test_pinned_feet_stay_with_b_and_leave_without(go2: Robot) -> None:
     contacts = lesson02.pins(go2)
-    kept = lesson02.strayed(lesson02.collapse(go2.standing(), contacts, motion, True, 0.1), contacts)
-    gone = lesson02.strayed(lesson02.collapse(go2.standing(), contacts, motion, False, 0.1), contacts)
+    kept = lesson02.strayed(lesson02.collapse(go2.standing(), contacts, judges.constrained, True, 0.1), contacts)
+    gone = lesson02.strayed(lesson02.collapse(go2.standing(), contacts, judges.constrained, False, 0.1), contacts)
     assert kept[0] == gone[0] == 0.0
     assert gone[-1] > 20 * kept[-1]
 
 
 def test_constant_torques_record_what_the_equation_says(go2: Robot) -> None:
     contacts = fb.Contacts.points(go2)
-    record = lesson02.run_constant(go2, contacts, np.zeros(12), motion, duration=0.01)
+    record = lesson02.run_constant(go2, contacts, np.zeros(12), judges.constrained, duration=0.01)
     eom = fb.equations_of_motion(record.state(3), contacts)
-    assert np.allclose(record.planned[3], motion(eom, np.zeros(12), eom.b)[1])
+    assert np.allclose(record.planned[3], judges.constrained(eom, np.zeros(12), eom.b)[1])
     assert not record.tau.any()
 
 
@@ -70,7 +63,7 @@ def test_the_equation_is_drawn_and_the_collapse_is_played(go2: Robot) -> None:
     figure = lesson02.draw_equation(fb.equations_of_motion(state, contacts))
     assert [axis.get_title() for axis in figure.axes] == ["M q̈", "+ h", "= S τ", "+ Jᵀ λ"]
     assert [label.get_text() for label in figure.axes[3].get_xticklabels()] == ["FL", "FR", "RL", "RR"]
-    states = lesson02.collapse(state, contacts, motion, True, 0.02)
+    states = lesson02.collapse(state, contacts, judges.constrained, True, 0.02)
     view = fb.Viewer(go2)
     try:
         assert "with b" in str(lesson02.play_collapse(view, states, states, contacts, 0.02).window.scene.file_commands())

@@ -25,6 +25,7 @@ from floatbase.lessons.lesson03 import (
 )
 
 GO2 = fb.load("go2")
+WOBBLE = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])  # forces without a sum and without a moment
 
 
 def torques() -> Any:
@@ -76,8 +77,7 @@ def test_03_2_knows_sign_transpose_frame_and_what_does_not_belong() -> None:
 def test_03_3_takes_any_forces_that_balance() -> None:
     eom = standing_go2()
     forces = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0]
-    wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
-    less = forces + (20 - forces[2]) * wobble
+    less = forces + (20 - forces[2]) * WOBBLE
     sideways = internal_forces(eom) @ internal_forces(eom).T @ np.eye(12)[1]
     assert right("03.3", less)
     assert right("03.3", less + 5 * sideways)
@@ -86,7 +86,6 @@ def test_03_3_takes_any_forces_that_balance() -> None:
 def test_03_3_knows_what_is_wrong() -> None:
     eom = standing_go2()
     forces = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0]
-    wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
     vertical = np.array([0, 0, 1.0])
     short = forces.copy()
     short[2] = 20.0
@@ -95,8 +94,8 @@ def test_03_3_knows_what_is_wrong() -> None:
         "Nothing has changed": forces,
         "add up to the weight": short,
         "moments": moved,
-        "mind the sign": forces - (20 - forces[2]) * wobble,
-        "carries 30.0 N": forces + (30 - forces[2]) * wobble,
+        "mind the sign": forces - (20 - forces[2]) * WOBBLE,
+        "carries 30.0 N": forces + (30 - forces[2]) * WOBBLE,
         "shape": forces.reshape(4, 3),
         "no answer yet": None,
     }

@@ -35,9 +35,7 @@ def slider_of(view: fb.Viewer, low: float, first: float, high: float) -> tuple[w
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_a_slider_goes_in_round_steps_through_its_first_value(
-    view: fb.Viewer, low: float, first: float, high: float, step: float
-) -> None:
+def test_a_slider_goes_through_its_first_value(view: fb.Viewer, low: float, first: float, high: float, step: float) -> None:
     slider, drawn = slider_of(view, low, first, high)
     assert slider.step == pytest.approx(step, rel=1e-12)
     for bound in (low, first, high):
@@ -47,9 +45,7 @@ def test_a_slider_goes_in_round_steps_through_its_first_value(
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_what_a_slider_shows_is_what_is_computed_with(
-    view: fb.Viewer, low: float, first: float, high: float, step: float
-) -> None:
+def test_a_slider_shows_what_is_computed_with(view: fb.Viewer, low: float, first: float, high: float, step: float) -> None:
     slider, drawn = slider_of(view, low, first, high)
     for i in range(60):
         slider.value = min(low + i * slider.step, high)  # as a browser adds them up

@@ -19,9 +19,7 @@ TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol
 LEAN = judges.random_normals(4, 5)
 
 
-@pytest.fixture(params=judges.FLOATING)
-def name(request: pytest.FixtureRequest) -> str:
-    return request.param
+name = judges.every_floating_robot
 
 
 def mujocos_momentum(judge: judges.Mujoco, qpos: Array, qvel: Array) -> Array:

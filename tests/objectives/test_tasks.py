@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import judges
 import numpy as np
-import pytest
 
 import floatbase as fb
 from floatbase.dynamics import EquationsOfMotion
@@ -12,9 +11,7 @@ from floatbase.dynamics import EquationsOfMotion
 N = 5
 
 
-@pytest.fixture(params=judges.ROBOTS)
-def name(request: pytest.FixtureRequest) -> str:
-    return request.param
+name = judges.every_robot
 
 
 def cases(name: str) -> list[tuple[EquationsOfMotion, np.ndarray, np.random.Generator]]:

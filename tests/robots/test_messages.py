@@ -66,9 +66,7 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: GO2.standing().difference([1.0]), InputError, r"q has shape \(1,\); it must have shape \(19,\)"),
     ],
 )
-def test_bad_input_is_answered_with_what_is_wrong_and_what_would_be_right(
-    make: Callable[[], object], kind: type[FloatbaseError], text: str
-) -> None:
+def test_bad_input_is_told_what_would_be_right(make: Callable[[], object], kind: type[FloatbaseError], text: str) -> None:
     with pytest.raises(kind, match=text):
         make()
 

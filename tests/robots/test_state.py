@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import judges
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,9 +12,7 @@ import floatbase as fb
 N = 10
 
 
-@pytest.fixture(params=judges.ROBOTS)
-def name(request: pytest.FixtureRequest) -> str:
-    return request.param
+name = judges.every_robot
 
 
 def test_frames_lie_in_the_world_where_mujoco_has_them(name: str) -> None:

@@ -12,6 +12,7 @@ import pytest
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators, Hydraulics
 
+CONTROLLER = judges.controller_of("go2")
 PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),)  # N: a fifth of go2's weight for 0.2 s
 
 
@@ -32,25 +33,13 @@ def sim() -> fb.Simulation:
     return fb.Simulation(judges.load("go2"))
 
 
-@pytest.fixture(scope="module")
-def controller() -> fb.WholeBodyController:
-    robot = judges.load("go2")
-    return fb.WholeBodyController(robot, fb.Contacts.points(robot, mu=0.7), fb.standing_tasks(robot.standing()))
-
-
-def stand(
-    sim: fb.Simulation,
-    controller: fb.WholeBodyController,
-    bandwidth: float,
-    pushes: tuple[fb.Push, ...] = (),
-    duration: float = 3.0,
-) -> fb.Rollout:
+def stand(sim: fb.Simulation, bandwidth: float, pushes: tuple[fb.Push, ...] = (), duration: float = 3.0) -> fb.Rollout:
     """go2 through force loops of a bandwidth, Hz, set out with the torques it stands with."""
     sim.reset()
     q, v = sim.q, sim.v
     actuators = HydraulicActuators(sim.robot, Hydraulics(loop_bandwidth=bandwidth))
-    actuators.reset(controller(q, v).tau, q[7:])
-    return fb.rollout(sim, controller, duration, pushes, actuators=actuators)
+    actuators.reset(CONTROLLER(q, v).tau, q[7:])
+    return fb.rollout(sim, CONTROLLER, duration, pushes, actuators=actuators)
 
 
 def sway(rollout: fb.Rollout) -> float:
@@ -61,21 +50,17 @@ def sway(rollout: fb.Rollout) -> float:
 # what the loop and the record do
 
 
-def test_without_actuators_the_torques_applied_are_the_desired_ones(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
+def test_without_actuators_applied_torques_are_desired_ones(sim: fb.Simulation) -> None:
     sim.reset()
-    rollout = fb.rollout(sim, controller, 0.02, control_period=4e-3)
+    rollout = fb.rollout(sim, CONTROLLER, 0.02, control_period=4e-3)
     assert rollout.tau.shape == rollout.tau_desired.shape == (5, 12)
     assert np.array_equal(rollout.tau, rollout.tau_desired)
 
 
-def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mean(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
+def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mean(sim: fb.Simulation) -> None:
     sim.reset()
     lag = Lag(0.1)
-    rollout = fb.rollout(sim, controller, 0.012, control_period=4e-3, actuators=lag)
+    rollout = fb.rollout(sim, CONTROLLER, 0.012, control_period=4e-3, actuators=lag)
     assert len(lag.calls) == 12 and {dt for *_, dt in lag.calls} == {1e-3}
     for tick in range(3):
         calls = lag.calls[4 * tick : 4 * tick + 4]
@@ -85,14 +70,14 @@ def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mea
         assert np.allclose(rollout.tau[tick], mean, rtol=1e-12)
 
 
-def test_the_physics_gets_what_the_actuators_give(sim: fb.Simulation, controller: fb.WholeBodyController) -> None:
+def test_the_physics_gets_what_the_actuators_give(sim: fb.Simulation) -> None:
     """Actuators that give nothing let the robot fall as a limp one does."""
 
     def limp(q: np.ndarray, v: np.ndarray, t: float) -> SimpleNamespace:
         return SimpleNamespace(tau=np.zeros(12))
 
     sim.reset()
-    held_back = fb.rollout(sim, controller, 0.1, actuators=Lag(0.0))
+    held_back = fb.rollout(sim, CONTROLLER, 0.1, actuators=Lag(0.0))
     sim.reset()
     assert np.array_equal(held_back.q, fb.rollout(sim, limp, 0.1).q)
     assert held_back.q[-1, 2] < held_back.q[0, 2] - 0.01
@@ -112,13 +97,13 @@ def test_joints_without_limits_reach_the_actuators_as_angles() -> None:
     assert np.allclose(rates, [v for *_, v, _ in lag.calls][1:], atol=1e-6)
 
 
-def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation, controller: fb.WholeBodyController) -> None:
+def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation) -> None:
     """Two rollouts of 0.05 s are one of 0.1 s."""
     records = []
     for parts in ((0.1,), (0.05, 0.05)):
         sim.reset()
         actuators = HydraulicActuators(sim.robot)
-        rows = [fb.rollout(sim, controller, duration, actuators=actuators).tau for duration in parts]
+        rows = [fb.rollout(sim, CONTROLLER, duration, actuators=actuators).tau for duration in parts]
         records.append(np.vstack(rows))
     assert np.array_equal(records[0], records[1])
 
@@ -149,11 +134,9 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
 # go2 on slower and slower force loops
 
 
-def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
+def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(sim: fb.Simulation) -> None:
     """50 Hz, 0.5 s: centre of mass within 0.3 mm, feet within 0.2 mm; torques within 0.2 N·m of the desired ones."""
-    rollout = stand(sim, controller, 50.0, duration=0.5)
+    rollout = stand(sim, 50.0, duration=0.5)
     assert rollout.outcome == "completed"
     assert sway(rollout) < 3e-4
     assert np.max(rollout.slip()) < 2e-4
@@ -162,25 +145,21 @@ def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
     assert np.max(error[-100:]) < 5e-3
 
 
-def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
+def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(sim: fb.Simulation) -> None:
     """12 mm both, the same to 0.1 mm, when 30 N push for 0.2 s."""
     sim.reset()
-    ideal = fb.rollout(sim, controller, 0.6, PUSH)
-    hydraulic = stand(sim, controller, 50.0, PUSH, 0.6)
+    ideal = fb.rollout(sim, CONTROLLER, 0.6, PUSH)
+    hydraulic = stand(sim, 50.0, PUSH, 0.6)
     assert ideal.outcome == hydraulic.outcome == "completed"
     assert sway(ideal) == pytest.approx(0.012, abs=1e-3)
     assert sway(hydraulic) == pytest.approx(sway(ideal), abs=1e-4)
 
 
-def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
+def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(sim: fb.Simulation) -> None:
     """Above the 0.84 Hz below which a task, all else ideal, grows because its torque lags."""
     assert growth(0.85) < 0.0 < growth(0.83)
-    assert stand(sim, controller, 1.0, PUSH).outcome == "fell"
-    assert stand(sim, controller, 1.5, PUSH, duration=2.5).outcome == "completed"
+    assert stand(sim, 1.0, PUSH).outcome == "fell"
+    assert stand(sim, 1.5, PUSH, duration=2.5).outcome == "completed"
 
 
 def growth(bandwidth: float) -> float:
@@ -191,13 +170,11 @@ def growth(bandwidth: float) -> float:
     return float(np.max(np.roots(characteristic).real))
 
 
-def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints(
-    sim: fb.Simulation, controller: fb.WholeBodyController
-) -> None:
+def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints(sim: fb.Simulation) -> None:
     """A spool of 1 Hz hardly moves: the torques lag, but each joint stands on a stiff spring of oil."""
     sim.reset()
     actuators = HydraulicActuators(sim.robot, Hydraulics(valve_bandwidth=1.0))
-    actuators.reset(controller(sim.q, sim.v).tau, sim.q[7:])
-    rollout = fb.rollout(sim, controller, 1.0, PUSH, actuators=actuators)
+    actuators.reset(CONTROLLER(sim.q, sim.v).tau, sim.q[7:])
+    rollout = fb.rollout(sim, CONTROLLER, 1.0, PUSH, actuators=actuators)
     assert rollout.outcome == "completed"
     assert sway(rollout) < 0.015

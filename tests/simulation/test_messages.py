@@ -74,9 +74,7 @@ UP = [0.0, 0.0, 1.0]
         (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), UnknownNameError, "'bse'; near names: base"),
     ],
 )
-def test_bad_input_is_answered_with_what_is_wrong_and_what_would_be_right(
-    make: Callable[[], object], kind: type[FloatbaseError], text: str
-) -> None:
+def test_bad_input_is_told_what_would_be_right(make: Callable[[], object], kind: type[FloatbaseError], text: str) -> None:
     with pytest.raises(kind, match=text):
         make()
 

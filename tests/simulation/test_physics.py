@@ -43,9 +43,7 @@ def angular_momentum(state: State) -> np.ndarray:
     return np.array(pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v).angular)
 
 
-@pytest.fixture(params=judges.FLOATING)
-def name(request: pytest.FixtureRequest) -> str:
-    return request.param
+name = judges.every_floating_robot
 
 
 def test_a_robot_in_the_air_falls_with_g(name: str) -> None:

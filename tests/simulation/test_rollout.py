@@ -103,9 +103,7 @@ def test_a_controller_that_fails_at_once_leaves_an_empty_record(sim: fb.Simulati
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, None, "much"])
-def test_nan_or_infinite_torques_end_the_record_like_a_fall_and_the_rows_before_are_kept(
-    sim: fb.Simulation, number: object
-) -> None:
+def test_nan_or_infinite_torques_end_the_record_and_rows_before_are_kept(sim: fb.Simulation, number: object) -> None:
     inner = judges.controller_of("go2")
 
     def goes_wild(q: np.ndarray, v: np.ndarray, t: float) -> Torques:

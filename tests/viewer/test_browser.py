@@ -19,7 +19,7 @@ NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 LIGHT, DARK, CHANGE = 220, 70, 60  # brightness of 255 of a push's arrow or outline, and its least difference to what it hides
 
 
-def test_what_is_shown_is_in_the_page_and_what_is_not_shown_any_more_has_gone(
+def test_the_page_has_what_is_shown_and_no_more(
     page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
     viewer.show(standing, contacts, forces=forces, title="go2 stands")

@@ -228,9 +228,7 @@ TARGET = "viewer.controls.target.toArray()"
 STEP = 0.01  # m: what the eye does not see in a page that follows a robot through metres
 
 
-def test_the_camera_goes_with_the_robot_and_on_with_one_that_is_drawn_afresh(
-    page, viewer: Viewer, go2: Robot, standing: State
-) -> None:
+def test_the_camera_goes_with_the_robot(page, viewer: Viewer, go2: Robot, standing: State) -> None:
     page.set_viewport_size(SMALL)
     viewer.play(record(go2, walk=1.0), paused=True)
     page.goto(viewer.url)

@@ -64,9 +64,7 @@ def test_arrows_start_at_the_contact_and_are_force_times_scale_long(
             np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
-def test_arrows_are_never_hair_thin_nor_thicker_than_long(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_arrows_are_neither_thin_nor_stout(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     for factor in (0.01, 0.1, 1.0, 10.0):
         viewer.show(standing, contacts, forces=factor * forces)
         for matrix in matrices(viewer, "/meshcat/measured/").values():
@@ -103,16 +101,11 @@ def test_the_unit_cone_and_arrow_are_of_unit_size(viewer: Viewer, standing: Stat
             assert np.linalg.norm(points[:, :2], axis=1).max() == pytest.approx(radius, abs=1e-3)
 
 
-def test_a_cone_says_whether_its_force_is_inside_on_the_surface_or_outside(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_a_cone_says_where_its_force_is(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
-    viewer.show(standing, contacts, forces=forces)
-    assert colours(viewer, "/meshcat/cone/") == expected
-    viewer.show(standing, contacts, planned=forces)
-    assert colours(viewer, "/meshcat/cone/") == expected
-    viewer.show(standing, contacts, forces=forces, planned=np.tile([0, 0, 30.0], 4))
-    assert colours(viewer, "/meshcat/cone/") == expected
+    for shown in ({"forces": forces}, {"planned": forces}, {"forces": forces, "planned": np.tile([0, 0, 30.0], 4)}):
+        viewer.show(standing, contacts, **shown)
+        assert colours(viewer, "/meshcat/cone/") == expected, shown
     viewer.show(standing, contacts, forces=-forces)
     assert set(colours(viewer, "/meshcat/cone/").values()) == {ALARM}
 
@@ -212,9 +205,7 @@ def test_polyhedra_light_the_facets_that_are_reached(go2: Robot, standing: State
     viewer.close()
 
 
-def test_what_is_not_passed_is_not_drawn_and_nothing_old_remains(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_what_is_not_passed_is_not_drawn(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     viewer.show(standing, com=False)
     bare = paths(viewer)
     viewer.show(standing, contacts, forces=forces, planned=forces, title="full")
@@ -269,9 +260,7 @@ def legend(viewer: Viewer) -> list[str]:
     return [text for _, text in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
 
 
-def test_the_legend_names_what_is_in_the_picture_and_nothing_else(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     viewer.show(standing, contacts, forces, planned=forces, support=True, push=("base", [0, 30.0, 0]), ghost=standing)
     cone = ["friction cone: force inside", "friction cone: surface reached", "friction cone: force outside"]
     assert legend(viewer) == [
