@@ -10,6 +10,7 @@ import numpy.typing as npt
 from floatbase.errors import InputError
 
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
+_NO_LENGTH = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
 
 
 def read_only(value: Any) -> Array:
@@ -54,7 +55,7 @@ def unit_vector(name: str, value: Any) -> Array:
     """`value` scaled to unit length, shape (3,); a zero vector is an `InputError`."""
     vector = checked(name, value, (3,))
     length = float(np.linalg.norm(vector))
-    if length < 1e-9:
+    if length < _NO_LENGTH:
         raise InputError(f"{name} is the zero vector; it must have a direction.")
     return read_only(vector / length)
 
@@ -65,4 +66,4 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def _text(shape: tuple[int | None, ...]) -> str:
-    return str(shape).replace("None", "any")
+    return str(tuple(n if n is None else int(n) for n in shape)).replace("None", "any")

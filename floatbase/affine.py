@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,8 @@ from floatbase._arrays import Array, checked, positive, read_only
 from floatbase.errors import InputError
 
 FLAT = 1e-12  # curvature below this part of the largest counts as none
+_CONCAVE = 1e-9  # part of the largest curvature that one may be negative by: rounding of pullbacks
+_SLOPE = 1e-7  # part of 1 + the largest |g| that a slope without curvature may have: rounding of pullbacks
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +35,9 @@ class Affine:
         object.__setattr__(self, "A", checked("A", self.A, (None, None)))
         object.__setattr__(self, "b", checked("b", self.b, (self.A.shape[0],)))
         object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Affine, (self.A, self.b, dict(self.blocks))  # a mapping proxy can be neither pickled nor copied
 
     @staticmethod
     def linear(A: npt.ArrayLike) -> Affine:
@@ -205,11 +211,11 @@ class Quadratic:
         N = checked("N", N, (self.n, None))
         values, vectors = np.linalg.eigh(N.T @ self.H @ N)
         largest = float(np.abs(values).max(initial=0.0))
-        if values.size and values[0] < -1e-9 * largest:
+        if values.size and values[0] < -_CONCAVE * largest:
             raise InputError(f"the cost has no minimum: its smallest curvature is {values[0]:.3g}.")
         curved = values > FLAT * largest
         slope = vectors.T @ (N.T @ self.g)
-        if np.any(np.abs(slope[~curved]) > 1e-7 * (1.0 + float(np.abs(self.g).max(initial=0.0)))):
+        if np.any(np.abs(slope[~curved]) > _SLOPE * (1.0 + float(np.abs(self.g).max(initial=0.0)))):
             raise InputError(
                 "the cost has no minimum: it falls for ever along a direction without curvature. Add a cost there."
             )

@@ -40,7 +40,7 @@ class SolverError(FloatbaseError):
 
 
 class SimulationError(FloatbaseError):
-    """The physics cannot be built or stepped as asked."""
+    """The physics cannot be built or stepped as requested."""
 
 
 class ViewerError(FloatbaseError):

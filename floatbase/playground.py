@@ -14,7 +14,6 @@ from typing import Any
 
 import floatbase as fb
 from floatbase.errors import ViewerError
-from floatbase.objectives import Task
 from floatbase.robots import Robot
 from floatbase.simulation import SEEN, Live, advice
 from floatbase.viewer import push_at
@@ -82,10 +81,8 @@ class Playground:
     def _controller(self) -> fb.WholeBodyController:
         """The controller that the controls request."""
         standing = self.robot.standing()
-        tasks: tuple[Task, ...] = (fb.PostureTask(standing.q),)
-        if self.robot.is_floating:
-            rotation = standing.frame_pose("base").rotation
-            tasks = (fb.CoMTask(standing.com + self.shift), fb.OrientationTask("base", rotation), *tasks)
+        _, level, posture = fb.standing_tasks(standing)
+        tasks = (fb.CoMTask(standing.com + self.shift), level, posture) if self.robot.is_floating else (posture,)
         lifted = [frame for frame, stands in self.stance.items() if not stands]
         contacts = fb.Contacts.feet(self.robot, self.mu).without(*lifted)
         return fb.WholeBodyController(self.robot, contacts, tasks, facets=self.facets)

@@ -62,9 +62,10 @@ def controller_of(name: str, **options: object) -> fb.WholeBodyController:
 
 @dataclass
 class Torques:
-    """The simplest command: torques alone."""
+    """The simplest command: torques, with or without planned forces."""
 
-    tau: Array
+    tau: object
+    forces: object = None
 
 
 def limp(q: Array, v: Array, t: float) -> Torques:

@@ -73,10 +73,9 @@ class HydraulicActuators:
         self.reset()
 
     def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
-        """Close the valves, with pressures that give the joints torques tau, as far as the supply goes.
+        """Close the valves, with pressures that give torques tau, (d,) N·m, zero by default, as far as the supply goes.
 
-        tau: (d,) N·m, zero by default. q_joints: (d,) rad, the centre by default. A rollout does not reset actuators; a robot
-        that is to stand from the start needs the torques that it stands with.
+        q_joints: (d,) rad, the centre by default. A robot that is to stand from the start needs the torques it stands with.
         """
         cylinders = self.cylinders
         tau = checked("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
@@ -96,8 +95,7 @@ class HydraulicActuators:
         tau_desired: (d,) N·m.
         q_joints, v_joints: (d,) rad and rad/s at the start. The oil's spring answers to them and acts on the next ones, which
             is stable (symplectic Euler) for √(L² k / inertia) dt < 2; at 1 ms the catalogue's robots reach 1.7.
-        dt: s. The oil is integrated in equal steps of 0.2 ms at most: the spool exactly, the pressures by a linearly implicit
-            Euler step.
+        dt: s, integrated in equal steps of 0.2 ms at most: the spool exactly, the pressures by linearly implicit Euler.
         """
         cylinders = self.cylinders
         pose = cylinders.pose(q_joints)

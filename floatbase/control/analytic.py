@@ -101,7 +101,5 @@ class AnalyticController:
         """The tick: the minimum over β, mapped back to (q̈, τ, λ)."""
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         space = feasible_space(eom)
-        on_qdd, on_tau, on_forces = self.objective(eom)
-        beta = cost_on_space(space, on_qdd, on_tau, on_forces).minimiser()
-        qdd, tau, forces = space(beta)
+        qdd, tau, forces = space(cost_on_space(space, *self.objective(eom)).minimiser())
         return AnalyticCommand(read_only(tau), read_only(forces), read_only(qdd))

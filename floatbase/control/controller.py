@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -62,23 +62,30 @@ class WholeBodyController:
             raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
         problem = Problem(robot, contacts, tasks, Limits(limits, facets, inside, min_normal_force))
-        problem.check_shapes()
-        self._set_up(problem, solver, path)
+        problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
+        self._prepare(problem, solver, path)
 
-    def _set_up(self, problem: Problem, solver: str, path: Path) -> None:
-        """Keep a checked problem, and prepare the compiled tick where it can be had."""
+    def _prepare(self, problem: Problem, solver: str, path: Path, warm_up: bool = True) -> None:
+        """Keep a checked problem, and prepare the compiled tick where it can be had. warm_up: run it once, outside the loop."""
+        self.problem, self.solver, self.requested_path = problem, solver, path
         check_solver(solver)
         if path not in get_args(Path):
             raise unknown_name("path", path, get_args(Path))
-        self.problem, self.solver, self.requested_path = problem, solver, path
         reason = "it was requested" if path == "readable" else obstacle(problem, solver)
         if reason and path == "compiled":
             raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
         self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
         self.path_reason = reason or "the tasks and contacts are the package's own" + cache_warning()
         self.compiled = None if reason else Compiled(problem)
-        if self.compiled is not None:
+        if self.compiled is not None and warm_up:
             self.compiled.warm_up()
+
+    def __getstate__(self) -> tuple[Problem, str, Path]:
+        """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""
+        return self.problem, self.solver, self.requested_path
+
+    def __setstate__(self, state: tuple[Problem, str, Path]) -> None:
+        self._prepare(*state)
 
     @property
     def robot(self) -> Robot:
@@ -140,21 +147,11 @@ class WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""
         contacts = self.contacts if contacts is None else contacts
         problem = replace(self.problem, contacts=contacts, tasks=self.tasks if tasks is None else tasks)
-        other = self._of(problem, self.solver, self.requested_path)
+        other = object.__new__(type(self))
+        other._prepare(problem, self.solver, self.requested_path, warm_up=self.compiled is None)
         if tasks is not None or other.compiled is None:  # the compiled tick's tables found that known tasks fit new contacts
-            problem.check_shapes()
+            problem.qp(self.robot.standing())
         return other
-
-    @classmethod
-    def _of(cls, problem: Problem, solver: str, path: Path) -> WholeBodyController:
-        """A controller of a problem that was checked already."""
-        controller = cls.__new__(cls)
-        controller._set_up(problem, solver, path)
-        return controller
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""
-        return self._of, (self.problem, self.solver, self.requested_path)
 
     def __repr__(self) -> str:
         return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from floatbase._arrays import Array, positive
+from floatbase._arrays import Array, positive, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError
@@ -43,15 +43,14 @@ class Limits:
         limits = np.ravel(self.torque_limits)
         object.__setattr__(self, "torque_limits", torque_limits_of(limits.size, limits))
         object.__setattr__(self, "min_normal_force", positive("min_normal_force", self.min_normal_force, "N", allow_zero=True))
-        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets)  # raises for a wrong number of facets
-        object.__setattr__(self, "facets", polyhedron.facets)
+        object.__setattr__(self, "facets", FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets).facets)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
     """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning there.
 
-    Raises `InputError` for values of a wrong kind; `check_shapes` looks at names and shapes.
+    Raises `InputError` for values of a wrong kind; `qp` does so for names and shapes that do not fit.
     """
 
     robot: Robot
@@ -64,14 +63,10 @@ class Problem:
             raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(self.robot).__name__}.")
         if not isinstance(self.contacts, Contacts):
             raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(self.contacts).__name__}.")
+        if not isinstance(self.limits, Limits):
+            raise InputError(f"limits must be Limits, not {type(self.limits).__name__}.")
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         torque_limits_of(self.robot.d, self.limits.torque_limits)
-
-    def check_shapes(self) -> None:
-        """Raise for frames that do not exist and for shapes that do not fit: now, and not in the loop."""
-        eom = equations_of_motion(self.robot.standing(), self.contacts)
-        for task in self.tasks:
-            _residual(task, eom, 0.0)
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The QP at a state and a time t in s."""
@@ -147,7 +142,7 @@ def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
     if np.max(gap, initial=0.0) > INCONSISTENT + MOTION_NOISE * motion:
         rows = [_equality_names(eom.robot, eom.contacts)[eom.nv + i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
         raise InfeasibleError(
-            f"these motions cannot be kept together: {', '.join(rows)}. At least one of their constraints has to go.", rows
+            f"these motions are inconsistent: {', '.join(rows)}. At least one of their constraints has to go.", rows
         )
     return A, b
 
@@ -166,7 +161,7 @@ def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple
         h[rows.stop - 1] = -limits.min_normal_force
         names += [RowLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
         names.append(RowLabel(f"{point} normal force", "normal force", point))
-    return G, h, tuple(names)
+    return read_only(G), read_only(h), tuple(names)
 
 
 @lru_cache(maxsize=64)
@@ -176,7 +171,7 @@ def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[RowL
     rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
     sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]
     names = tuple(RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side, joint in sides)
-    return np.vstack([rows, -rows]), np.tile(bound, 2), names
+    return read_only(np.vstack([rows, -rows])), read_only(np.tile(bound, 2)), names
 
 
 @lru_cache(maxsize=64)

@@ -34,7 +34,6 @@ class LinearConstraint:
     mu: ClassVar[float] = np.inf  # there is no friction to run out of
     normal: ClassVar[Array] = UP  # plays no part
     point_names: ClassVar[tuple[str, ...]] = ()
-    J_is_A: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if int(self.m) != self.m or self.m < 1:

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
-from floatbase.robots import State, spread_corners
+from floatbase.robots import State, checked_corners
 
 UP = read_only([0.0, 0.0, 1.0])
 DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry concrete
@@ -27,7 +27,6 @@ class Contact(Protocol):
     point_names: one for each point that carries a force; empty for a constraint whose forces have no friction cone.
     k: number of force components.
     row_names: one for each row of (5).
-    J_is_A: whether each force component acts along one row of (5), so that J = A.
     """
 
     @property
@@ -42,11 +41,9 @@ class Contact(Protocol):
     def k(self) -> int: ...
     @property
     def row_names(self) -> tuple[str, ...]: ...
-    @property
-    def J_is_A(self) -> bool: ...
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m."""
+        """World positions of the points, shape (n, 3), m, with n = len(point_names)."""
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """J of (4): Jᵀ λ is the generalised force of λ at time t, s; shape (k, nv)."""
@@ -62,7 +59,6 @@ class OnePoint:
     frame: str
     k: ClassVar[int] = 3
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
-    J_is_A: ClassVar[bool] = True
 
     @property
     def name(self) -> str:
@@ -80,14 +76,15 @@ class OnePoint:
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """Jacobian of the body's point at the contact, shape (3, nv), world-aligned."""
-        return self.constraint(state, t)[0]
+        J = state.frame_jacobian(self.frame)
+        return read_only(J[:3] - pin.skew(self._arm(state)[0]) @ J[3:])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A = J and b = -J̇ q̇, shapes (3, nv) and (3,), m/s², where J q̇ = v_frame + ω × arm."""
         arm, arm_rate = self._arm(state)
-        J, drift, omega = (f(self.frame) for f in (state.frame_jacobian, state.frame_drift, state.frame_velocity))
-        b = -(drift[:3] + cross(drift[3:], arm) + cross(omega[3:], arm_rate))
-        return read_only(J[:3] - pin.skew(arm) @ J[3:]), read_only(b)
+        drift, omega = state.frame_drift(self.frame), state.frame_velocity(self.frame)[3:]
+        b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))
+        return self.jacobian(state, t), read_only(b)
 
     def _arm(self, state: State) -> tuple[Array, Array]:
         """From the frame's origin to the contact point, m, and its derivative, m/s; shapes (3,), world."""
@@ -142,11 +139,10 @@ class FlatFootContact:
     normal: Array = field(default_factory=lambda: UP)
     mu: float = DEFAULT_MU
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z", "angular x", "angular y", "angular z")  # world-aligned
-    J_is_A: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check_ground(self)
-        object.__setattr__(self, "corners", spread_corners(self.frame, self.corners))
+        object.__setattr__(self, "corners", checked_corners(self.frame, self.corners))
 
     @property
     def name(self) -> str:

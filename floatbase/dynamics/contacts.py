@@ -65,10 +65,8 @@ class Contacts:
         each = _feet(robot, frames, mu, normals)
         for foot, *_ in each:
             if not foot.is_flat:
-                raise InputError(
-                    f"{foot.frame} of {robot.name} is not a flat foot; use fb.Contacts.points, or load the robot with "
-                    "feet=[floatbase.robots.Foot(frame, corners=…)]."
-                )
+                instead = "use fb.Contacts.points, or load the robot with feet=[floatbase.robots.Foot(frame, corners=…)]"
+                raise InputError(f"{foot.frame} of {robot.name} is not a flat foot; {instead}.")
         return Contacts([_contact(*one) for one in each])
 
     @staticmethod
@@ -130,18 +128,13 @@ class Contacts:
         b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
-    def rows(self, state: State, t: float = 0.0) -> tuple[Array, Array, Array]:
-        """J of (4), shape (k, nv), with A, shape (m, nv), and b, shape (m,), of (5), all at time t, s."""
-        A, b = self.constraint(state, t)
-        return A if all(contact.J_is_A for contact in self.items) else self.jacobian(state, t), A, b
-
     def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
         return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
 
     def force_slice(self, name: str) -> slice:
         """Which entries of λ belong to a contact."""
         contact = self[name]
-        start = sum(before.k for before in self.items[: self.items.index(contact)])
+        start = sum(before.k for before in self.items[: self.names.index(name)])
         return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
@@ -160,13 +153,13 @@ class Contacts:
 
     def only(self, *names: str) -> Contacts:
         """The contacts of these names, in the order they have here."""
-        chosen = [self[name] for name in names]
-        return Contacts([contact for contact in self.items if contact in chosen])
+        chosen = [self[name].name for name in names]
+        return Contacts([contact for contact in self.items if contact.name in chosen])
 
     def without(self, *names: str) -> Contacts:
         """The contacts but those of these names."""
-        dropped = [self[name] for name in names]
-        return Contacts([contact for contact in self.items if contact not in dropped])
+        dropped = [self[name].name for name in names]
+        return Contacts([contact for contact in self.items if contact.name not in dropped])
 
     def __getitem__(self, name: str) -> Contact:
         if name not in self.names:

@@ -82,5 +82,5 @@ def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> Equ
         raise InputError(f"equations_of_motion needs a State first, not {type(state).__name__}.")
     if not isinstance(contacts, Contacts):
         raise InputError(f"equations_of_motion needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
-    J, A, b = contacts.rows(state, t)
+    J, (A, b) = contacts.jacobian(state, t), contacts.constraint(state, t)
     return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)

@@ -73,8 +73,7 @@ def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
 
     Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f remains. Ṁ
     comes from central differences of M along the motion, which know nothing of C; their error is about 1e-10 of the two terms.
-
-    C: shape (nv, nv), the matrix to try, `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
+    C: shape (nv, nv), `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
     """
     C = coriolis_matrix(state) if C is None else checked("C", C, (state.robot.nv, state.robot.nv))
     dt = _STEP / max(1.0, float(np.max(np.abs(state.v), initial=0.0)))
@@ -85,8 +84,7 @@ def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
 def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
     """App. A, the one-link robot: ω × (ω × r), shape (3,), m/s², of a point on a link that turns at constant rate.
 
-    omega: (3,) rad/s; r: (3,) m, from a point of the axis to the point of the link, both in one frame, which is the
-    answer's too. It points at the axis and has the size ω² times the distance from it.
+    omega: (3,) rad/s; r: (3,) m, from a point of the axis to the link's, both in the answer's frame. It points at the axis.
     """
     omega = checked("omega", omega, (3,), "rad/s")
     return read_only(np.cross(omega, np.cross(omega, checked("r", r, (3,), "m"))))

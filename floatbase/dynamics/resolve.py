@@ -44,9 +44,8 @@ def contact_space(eom: EquationsOfMotion) -> ContactSpace:
     """The resolved part of the contacts of (7), by singular values of A (tolerance `MOTION_TOLERANCE`).
 
     Where J loses rank (solo8 on four feet), nearby states have a singular value σ that measured angles and velocities cannot
-    tell from 0, and ζ would multiply their noise in b by 1/σ². Such a direction is left out altogether: no row holds it, no
-    force is spent on it. Newton's law still holds exactly, and A q̈ - b is off by at most σ |q̈| beside the part of b that A
-    cannot meet. A stance well away from such places has no such direction.
+    tell from 0, and ζ would multiply their noise in b by 1/σ². Such a direction is left out: no row holds it, no force is
+    spent on it. Newton's law still holds exactly. A q̈ - b is off by at most σ |q̈| beside the part of b that A cannot meet.
     Raises `InputError` when forces and rows of a contact do not fit each other.
     """
     U, s, rows = _resolved(eom)
@@ -66,10 +65,7 @@ def contact_space(eom: EquationsOfMotion) -> ContactSpace:
 
 
 def resolved_motion(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(5) A, shape (m, nv), and b, shape (m,), m/s², without the directions that A resolves badly (see `contact_space`).
-
-    Both are as they were at a stance well away from a loss of rank, but for parts of b that A cannot meet.
-    """
+    """(5) A, shape (m, nv), and b, shape (m,), m/s², without the directions that A resolves badly (see `contact_space`)."""
     U, s, Vt = _resolved(eom)
     return read_only(U * s @ Vt), read_only(U @ (U.T @ eom.b))
 

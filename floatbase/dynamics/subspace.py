@@ -75,17 +75,17 @@ class FeasibleSpace:
 
     @cached_property
     def qdd(self) -> Affine:
-        """(17) β -> q̈."""
+        """(17) β -> q̈, (dimension,) to (nv,), m/s² and rad/s²: base in the base frame, then joints."""
         return self.map["qdd"]
 
     @cached_property
     def tau(self) -> Affine:
-        """(17) β -> τ."""
+        """(17) β -> τ, (dimension,) to (d,), N·m."""
         return self.map["tau"]
 
     @cached_property
     def forces(self) -> Affine:
-        """(17) β -> λ."""
+        """(17) β -> λ, (dimension,) to (k,), N, world, ordered as the contacts' points."""
         return self.map["forces"]
 
     def coordinates(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
@@ -153,8 +153,8 @@ class Dimensions:
 def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Counts every dimension of §2.2 at this state.
 
-    The rank of J is decided once (`contact_space`). B and C are then counted by their own singular values, with the resolved
-    rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
+    `contact_space` decides the rank of J. B and C are counted by their own singular values, with the resolved rows and their
+    forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
     space = contact_space(eom)
     reactions = np.linalg.qr(eom.J.T @ space.lift)[0]

@@ -89,7 +89,9 @@ class WrenchSet:
         return self._halfspaces[1]
 
     def margin(self, wrench: npt.ArrayLike) -> float:
-        """How far inside its facets every contact force can be, N, when together they make the wrench, shape (6,).
+        """How far inside its facets every contact force can be, N, when together they make the wrench.
+
+        wrench: shape (6,), world: force, N, then moment about `about`, N·m.
 
         The largest t for which there are f_i with margin ≥ t each, and t below the normal force's limit. -inf where no forces
         make the wrench (see `equalities`), +inf where contacts that face each other can be squeezed as hard as one likes.
@@ -164,7 +166,7 @@ class WrenchSet:
                 endless = "contacts can be squeezed against each other without limit"
                 raise InputError(f"this slice of the wrench set has no end: {endless}. Give max_normal_force.")
             if result.status == INFEASIBLE:
-                raise InfeasibleError("no contact forces add up to what was asked for.")
+                raise InfeasibleError("no contact forces add up to the requested force.")
             return scale * (values @ result.x)
 
         try:

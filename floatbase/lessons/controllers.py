@@ -12,6 +12,8 @@ from floatbase._arrays import Array
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
 
+_STEP = 1e-4  # s to each side for the central difference of a path: smooth over a second, it is off by 1e-8 of its velocity
+
 
 @dataclass(frozen=True, eq=False)
 class Torques:
@@ -68,8 +70,8 @@ def joint_servo(
     offset = path if path is not None else lambda t: np.zeros(d)
 
     def controller(q: Array, v: Array, t: float) -> Torques:
-        rate = (offset(t + 1e-4) - offset(t - 1e-4)) / 2e-4
-        error = q[-d:] - state.q[-d:] - offset(t)
+        rate = (offset(t + _STEP) - offset(t - _STEP)) / (2.0 * _STEP)
+        error = -state.difference(q)[-d:] - offset(t)
         return Torques(steady - stiffness * error - damping * (v[-d:] - rate))
 
     return controller

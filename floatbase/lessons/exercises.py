@@ -58,7 +58,7 @@ def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
 
 def _wrong_shape(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
     if not expected:
-        return f"One number is asked for; this has shape {given}."
+        return f"The answer is one number; this has shape {given}."
     if not given:
         return f"This is a single number; the answer should have shape {expected}."
     flat = sorted(given) == sorted((1, *expected))

@@ -20,11 +20,8 @@ def cost_on_space(
     space: β -> (q̈, τ, λ), as from `feasible_space`.
     qdd, tau, forces: costs on vectors of shape (nv,), (d,) and (k,).
     """
-    total = Quadratic.zero(space.dimension)
-    for cost, part in ((qdd, space.qdd), (tau, space.tau), (forces, space.forces)):
-        if cost is not None:
-            total = total + cost.pullback(part)
-    return total
+    parts = ((qdd, space.qdd), (tau, space.tau), (forces, space.forces))
+    return sum((cost.pullback(part) for cost, part in parts if cost is not None), Quadratic.zero(space.dimension))
 
 
 def smallest_coordinates(space: FeasibleSpace, block: Block) -> Affine:

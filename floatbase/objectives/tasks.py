@@ -63,7 +63,7 @@ def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
     for name in targets:
         target = getattr(task, name)
         if target is not None and not callable(target):
-            flat = np.ravel(target) if shape == (None,) else target  # forces may come as (n, 3)
+            flat = target if task.block == "qdd" else np.ravel(target)  # forces may come as (n, 3)
             kept[name] = checked(f"{name} of {task.name}", flat, shape)
     for name, value in kept.items():
         object.__setattr__(task, name, value)

@@ -195,6 +195,8 @@ def _feasible_start(problem: QP, y: Array, rows: list[int]) -> _Walk:
     elastic = InequalityQP(
         H=np.zeros((n + 1, n + 1)),
         g=np.eye(n + 1)[-1],
+        A=np.zeros((0, n + 1)),
+        b=np.zeros(0),
         G=np.block([[problem.G, -(size * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]),
         h=np.append(problem.h, 0.0),
         row_lengths=np.append(size, 1.0),

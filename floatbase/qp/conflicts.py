@@ -18,7 +18,7 @@ from floatbase.qp.linear_programs import OPTIMAL, linear_program
 FEASIBILITY_TOLERANCE = 1e-9  # how far a solver may violate an inequality of unit length: N, N·m; well above rounding
 SHARE = 1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
 _ROUNDING = 1e-12  # part of the largest |h| that a linear program may leave as a violation
-_HIGHS = 1e-10  # the smallest tolerance that HiGHS can be asked for
+_HIGHS = 1e-10  # the smallest tolerance that HiGHS takes
 _FEW = 4  # rows that are listed in one line
 
 
@@ -32,7 +32,7 @@ def infeasible(rows: Iterable[str]) -> InfeasibleError:
     if len(labels) > _FEW:
         kinds: dict[str, list[str]] = {}
         for label in labels:
-            kinds.setdefault(label.kind, []).append(label.owner if label.index is None else label)
+            kinds.setdefault(label.kind, []).append(label.owner if label.number is None else label)
         text = "".join(f"\n  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()) + "\n"
     return InfeasibleError(
         f"no point satisfies all rows. Given the equalities, these are in conflict:{text}"

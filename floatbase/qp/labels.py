@@ -14,22 +14,22 @@ class RowLabel(str):
     text: the name; label and text are equal, so `"FL_foot facet 2" in command.active` asks as one expects.
     kind: what the row says, such as "friction", "upper torque limit" or "dynamics"; "other rows" for a plain text.
     owner: the foot, joint or contact that it says it of; the text itself by default.
-    index: which of its owner's rows of that kind, or None where the owner has one.
+    number: which of its owner's rows of that kind, or None where the owner has one.
     """
 
-    __slots__ = ("index", "kind", "owner")
+    __slots__ = ("kind", "number", "owner")
 
     kind: str
     owner: str
-    index: int | None  # type: ignore[assignment]  # a text's own method of that name finds a part of it
+    number: int | None
 
-    def __new__(cls, text: str, kind: str = "other rows", owner: str | None = None, index: int | None = None) -> RowLabel:
+    def __new__(cls, text: str, kind: str = "other rows", owner: str | None = None, number: int | None = None) -> RowLabel:
         label = super().__new__(cls, text)
-        label.kind, label.owner, label.index = kind, text if owner is None else owner, index
+        label.kind, label.owner, label.number = kind, text if owner is None else owner, number
         return label
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return RowLabel, (str(self), self.kind, self.owner, self.index)
+        return RowLabel, (str(self), self.kind, self.owner, self.number)
 
 
 def row_labels(names: Iterable[str], rows: int, kind: str) -> tuple[RowLabel, ...]:

@@ -8,19 +8,20 @@ means: an active row holds with equality. x is an optimum, for H positive semide
 
     H x + g + Aᵀ ν + Gᵀ μ = 0     stationarity: the rows balance the objective's slope
     A x = b,  G x ≤ h             feasibility
-    μ ≥ 0                         a table top pushes, it never pulls
+    μ ≥ 0                         a multiplier is never negative: a table top pushes, it never pulls
     μ_i (G x - h)_i = 0           complementarity: only the rows we rest on are active
 
-μ_i is what one unit of room on row i (h_i + 1) would lower the objective by, to first order; ν_i likewise, of either
-sign. Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
+μ_i is what one unit more in h_i would lower the objective by, to first order; ν_i likewise in b_i, of either sign.
+Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, fields
+from functools import cached_property, partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,10 @@ class QP:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = {part.name: getattr(self, part.name) for part in fields(self)}
+        return partial(type(self), **values | {"blocks": dict(self.blocks)}), ()  # a mapping proxy cannot be pickled
+
     @property
     def n(self) -> int:
         """Number of variables."""
@@ -109,7 +114,9 @@ class QP:
         G, h = self.G @ Z, self.h - self.G @ x0
         G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_lengths] = 0.0
         h[np.abs(h) <= _ROUNDING * (np.abs(self.G) @ np.abs(x0) + np.abs(self.h))] = 0.0
-        return InequalityQP(H, g, G, h, self.row_lengths, self.inequality_names)
+        return InequalityQP(
+            H, g, self.A[:0] @ Z, self.b[:0], G, h, inequality_names=self.inequality_names, row_lengths=self.row_lengths
+        )
 
     @cached_property
     def row_lengths(self) -> Array:
@@ -123,12 +130,15 @@ class QP:
         return f"QP({self.n} variables, {len(self.A)} equalities, {len(self.G)} inequalities)"
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class InequalityQP(QP):
     """A `QP` without equalities, made from another one, whose `row_lengths` (l,) are given rather than measured."""
 
-    def __init__(self, H: Array, g: Array, G: Array, h: Array, row_lengths: Array, inequality_names: tuple[str, ...]):
-        super().__init__(H, g, np.zeros((0, len(g))), np.zeros(0), G, h, inequality_names=inequality_names)
-        vars(self)["row_lengths"] = row_lengths
+    row_lengths: Array = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "row_lengths", checked("row_lengths", self.row_lengths, (len(self.G),)))
 
 
 def _without_rounding(value: Array, terms: float) -> Array:

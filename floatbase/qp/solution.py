@@ -76,7 +76,7 @@ class Solution:
 
     @property
     def multipliers(self) -> dict[str, float]:
-        """Multiplier of each active inequality row, by name: what a unit of room there would lower the objective by."""
+        """Multiplier of each active inequality row, by name: what one unit more in h would lower the objective by."""
         mu = dict(zip(self.qp.inequality_names, self.inequality_multipliers, strict=True))
         return {name: float(mu[name]) for name in self.active}
 

@@ -105,10 +105,10 @@ def load_urdf(
         model = _model(urdf, floating)
     except (RuntimeError, ValueError) as error:
         raise InputError(f"Pinocchio cannot read {urdf.name} as a URDF: {error}") from None
-    for i in range(2 if floating else 1, model.njoints):
-        if model.joints[i].nv != 1:
+    for joint in list(model.joints)[2 if floating else 1 :]:
+        if joint.nv != 1:
             raise InputError(
-                f"joint {model.names[i]!r} of {urdf.name} moves in {model.joints[i].nv} ways; a motor drives one. Make it "
+                f"joint {model.names[joint.id]!r} of {urdf.name} moves in {joint.nv} ways; a motor drives one. Make it "
                 "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
             )
     return Robot(
@@ -137,8 +137,8 @@ def unbolted(robot: Robot, plate: bool = False) -> Robot:
         tree.remove(element)
     urdf = Path(tempfile.mkdtemp(dir=_scratch().name)) / f"{robot.name}.urdf"
     urdf.write_text(ElementTree.tostring(tree, encoding="unicode"), encoding="utf-8")
-    half, thick = 0.5 * PLATE[0], PLATE[1]
-    corners = np.array([[x, y, -thick] for x, y in ((half, half), (half, -half), (-half, -half), (-half, half))])
+    width, thick = PLATE
+    corners = np.array([[x * width, y * width, -thick] for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))])
     loose = load_urdf(urdf, name=robot.name, package_dirs=robot.package_dirs, torque_limits=robot.torque_limits)
     return replace(
         loose,
@@ -179,8 +179,7 @@ def _reference(model: pin.Model, loader: Any, srdf: Path | None, entry: Entry) -
             pin.loadRotorParameters(model, str(srdf), False)
             model.armature = model.rotorInertia * model.rotorGearRatio**2
         pin.loadReferenceConfigurations(model, str(srdf), False)
-        references = {reference.key(): reference.data() for reference in model.referenceConfigurations}
-        q = np.array(references.get(loader.ref_posture, q))
+        q = np.array({found.key(): found.data() for found in model.referenceConfigurations}.get(loader.ref_posture, q))
     for joint, angle in entry.joints.items():
         q[model.idx_qs[model.getJointId(joint)]] = angle
     return read_only(pin.normalize(model, q))

@@ -41,7 +41,7 @@ class Foot:
         object.__setattr__(self, "radius", positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
         object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
-            object.__setattr__(self, "corners", spread_corners(self.frame, self.corners))
+            object.__setattr__(self, "corners", checked_corners(self.frame, self.corners))
 
     @property
     def is_flat(self) -> bool:
@@ -133,9 +133,8 @@ class Robot:
     @cached_property
     def base(self) -> str:
         """Name of the base link's frame."""
-        root = 1 if self.is_floating else 0
-        bodies = (frame for frame in self.model.frames if frame.type == pin.FrameType.BODY and frame.parentJoint == root)
-        return str(next(bodies, self.model.frames[0]).name)
+        root, frames = int(self.is_floating), self.model.frames
+        return str(next((f for f in frames if f.type == pin.FrameType.BODY and f.parentJoint == root), frames[0]).name)
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
@@ -217,16 +216,14 @@ def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", fi
         part = slice(model.idx_qs[i] + positions, model.idx_qs[i] + model.nqs[i])
         length = float(np.linalg.norm(q[part]))
         if model.nqs[i] != model.nvs[i] and abs(length - 1.0) > UNIT_LENGTH_TOLERANCE:
-            what = f"{name}[{part.start}:{part.stop}]"
-            if i == 1 and positions == 3:
-                what = f"the base quaternion {what} (x y z w)"
-            else:
-                what += f", {'cosine and sine' if len(q[part]) == 2 else 'the quaternion'} of {model.names[i]!r},"
+            what, numbers = f"{name}[{part.start}:{part.stop}]", "cosine and sine" if len(q[part]) == 2 else "the quaternion"
+            floating = i == 1 and positions == 3
+            what = f"the base quaternion {what} (x y z w)" if floating else f"{what}, {numbers} of {model.names[i]!r},"
             raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
 
 
-def spread_corners(frame: str, requested: npt.ArrayLike) -> Array:
-    """The corners, (n, 3), m, of a foot, checked: on one line they cannot hold all six motions. Raises `InputError`."""
+def checked_corners(frame: str, requested: npt.ArrayLike) -> Array:
+    """The corners of a foot, (n, 3), m, in its frame, checked: on one line they hold no six motions. Raises `InputError`."""
     corners = checked(f"corners of {frame}", requested, (None, 3), "m")
     if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=_AREA_TOLERANCE) < 2:
         raise InputError(f"the corners of {frame} span no area; a flat foot needs at least 3 that are not on one line.")

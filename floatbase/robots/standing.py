@@ -48,9 +48,8 @@ def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Arr
         R, J = state.frame_pose(foot.frame).rotation, state.frame_jacobian(foot.frame)
         rows.append(J[2] - (pin.skew(R @ foot.middle) @ J[3:])[2])
         if foot.is_flat:
-            up = R[:, 2]
-            errors += [up[0], up[1]]
-            rows += list((-pin.skew(up) @ J[3:])[:2])  # d(up)/dt = ω × up
+            errors += [*R[:2, 2]]
+            rows += [*(-pin.skew(R[:, 2]) @ J[3:])[:2]]  # d(up)/dt = ω × up
     R, J_base = state.frame_pose("base").rotation, np.eye(6, state.robot.nv)
     target = posture.q[:2] if height is None else [*posture.q[:2], height]
     errors += [*pin.log3(posture.frame_pose("base").rotation.T @ R), *(state.q[: len(target)] - target)]

@@ -108,12 +108,15 @@ class State:
         return read_only(pin.getFrameVelocity(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED).vector)
 
     def frame_drift(self, frame: str) -> Array:
-        """J̇ v of a frame's origin, shape (6,): its linear [m/s²] and angular [rad/s²] acceleration when q̈ = 0."""
+        """J̇ v of the frame named `frame`, shape (6,), world axes: its origin's acceleration when q̈ = 0, m/s² and rad/s²."""
         motion = pin.getFrameClassicalAcceleration(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED)
         return read_only(motion.vector)
 
     def integrate(self, dv: npt.ArrayLike) -> Array:
-        """The configuration reached by moving along dv, shape (nv,), for one unit of time; shape (nq,)."""
+        """The configuration, shape (nq,), at the end of a motion dv.
+
+        dv: shape (nv,), velocity times time: base part, m and rad, in the base frame, then joints.
+        """
         return read_only(pin.integrate(self.robot.model, self.q, checked("dv", dv, (self.robot.nv,))))
 
     def difference(self, q: npt.ArrayLike) -> Array:

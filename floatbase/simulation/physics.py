@@ -75,8 +75,6 @@ class Simulation:
         self._point_of_geom[self._balls] = np.arange(len(self._balls))
         self._below = self.model.geom_size[self._balls, :1] * self.ground.normal
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
-        self._base_position = self.data.xpos[self._base]  # a view into MuJoCo's memory, as the next one
-        self._base_vertical = self.data.xmat[self._base].reshape(3, 3)[:, 2]
         self.reset()
 
     @property
@@ -121,7 +119,7 @@ class Simulation:
         if not self.robot.is_floating:
             return False
         sunk = self._start_height - self._base_height() > (1.0 - _FALLEN_HEIGHT) * self._stature
-        return sunk or float(self._base_vertical @ self._start_vertical) < _FALLEN_COSINE
+        return sunk or float(self._base_vertical() @ self._start_vertical) < _FALLEN_COSINE
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing upright on the ground's plane by default, at time 0."""
@@ -134,9 +132,9 @@ class Simulation:
         self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
         self._start_height = self._stature = self._base_height()
-        self._start_vertical = self._base_vertical.copy()
+        self._start_vertical = self._base_vertical()
         if self._stature <= _LEAST_STATURE:  # it lies: a fall is measured by the way to the centre of mass
-            self._stature = float(np.linalg.norm(state.com - self._base_position))
+            self._stature = float(np.linalg.norm(state.com - self.data.xpos[self._base]))
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
@@ -157,13 +155,12 @@ class Simulation:
 
     def contact_forces(self) -> Array:
         """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world, ordered as `point_names`."""
-        forces = np.zeros((len(self._balls), 3))
-        if self.data.ncon:
-            contact = self.data.contact
-            in_frame = self.data.efc_force[contact.efc_address[:, None] + np.arange(3)]
-            # one plane (geom 0), so one frame for all contacts: its rows are normal and tangents, from the plane to the ball
-            forces[self._point_of_geom[contact.geom[:, 1]]] = in_frame @ contact.frame[0].reshape(3, 3)
-        return forces
+        forces, wrench, contact = np.zeros((len(self._balls), 3)), np.zeros(6), self.data.contact
+        for i, (_, ball) in enumerate(contact.geom):  # from the plane to the ball
+            mujoco.mj_contactForce(self.model, self.data, i, wrench)
+            forces[self._point_of_geom[ball]] = wrench[:3]
+        # one plane, so one frame for all contacts: its rows are normal and tangents
+        return forces @ contact.frame[0].reshape(3, 3) if len(contact) else forces
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the lowest point of each ball along the ground's normal."""
@@ -177,11 +174,9 @@ class Simulation:
             return int(self.model.joint(joint).bodyid[0])
         if self.robot.is_floating:
             return self._base
-        moving = [f.name for f in self.robot.model.frames if f.parentJoint > 0 and f.type == pin.FrameType.BODY]
-        raise InputError(
-            f"a push at {push.frame!r} moves nothing: {self.robot.name} is bolted to the ground there. "
-            f"Push a link that moves: {', '.join(moving)}."
-        )
+        moving = ", ".join(f.name for f in self.robot.model.frames if f.parentJoint > 0 and f.type == pin.FrameType.BODY)
+        held = f"{self.robot.name} is bolted to the ground there"
+        raise InputError(f"a push at {push.frame!r} moves nothing: {held}. Push a link that moves: {moving}.")
 
     def _apply(self, push: Push) -> None:
         """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""
@@ -201,7 +196,11 @@ class Simulation:
 
     def _base_height(self) -> float:
         """Height of the base's origin over the ground, m."""
-        return float(self.ground.normal @ self._base_position)
+        return float(self.ground.normal @ self.data.xpos[self._base])
+
+    def _base_vertical(self) -> Array:
+        """The base's z axis, shape (3,), world."""
+        return self.data.xmat[self._base, 2::3].copy()
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"

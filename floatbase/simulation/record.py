@@ -154,10 +154,9 @@ class Recorder:
 
     def _planned(self, contacts: Contacts) -> Array:
         """Planned forces at the contacts, shape (n, k)."""
-        forces, entries = np.full((self._n, contacts.k), np.nan), {}
-        for stance in dict.fromkeys(self._stances):
-            parts = [np.r_[contacts.force_slice(name)] for name in stance.names]
-            entries[stance] = np.concatenate([np.zeros(0, dtype=int), *parts])
+        forces, numbers = np.full((self._n, contacts.k), np.nan), np.arange(contacts.k)
+        stances = dict.fromkeys(self._stances)
+        entries = {stance: [i for name in stance.names for i in numbers[contacts.force_slice(name)]] for stance in stances}
         for row, stance, planned in zip(forces, self._stances, self._plans, strict=True):
             if planned is not None:
                 row[:] = 0.0

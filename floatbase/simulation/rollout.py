@@ -60,8 +60,8 @@ def rollout(
         joints get the controller's torques, within the motors' limits. Its memory lasts from one rollout to the next: reset
         it with the simulation.
 
-    A fall, a divergence of the physics, an error of the package that the controller raises, NaN or infinite torques end the
-    rollout: `outcome` says so, and the rows up to there are returned.
+    A fall, a divergence of the physics, an error of the package that the controller raises, torques that are no finite numbers
+    end the rollout: `outcome` says so, and the rows up to there are returned.
     Raises `InputError` for a control period or a duration that is no whole number of periods, for a push that moves nothing,
     for a controller that cannot be called as controller(q, v, t), and for an answer without `.tau`.
     """
@@ -79,9 +79,9 @@ def rollout(
         except FloatbaseError as failure:
             return record.finished(pushes, "controller failed", failure)
         stance = _stance(sim, controller)
-        planned = _planned(command, stance)
         try:
             desired = _desired(sim, command)
+            planned = _planned(command, stance)
             tau, forces = _act(sim, desired, substeps, pushes, actuators)
         except _NotFinite as failure:
             return record.finished(pushes, "controller failed", failure)
@@ -111,9 +111,7 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
         raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
     robot = getattr(controller, "robot", sim.robot)
     if robot is not sim.robot:
-        raise InputError(
-            f"the controller is one for {robot!r}, the simulation holds {sim.robot!r}: make both from one fb.load."
-        )
+        raise InputError(f"the controller is for {robot!r}, the simulation holds {sim.robot!r}: make both from one fb.load.")
     if not isinstance(pushes, Sequence):
         raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {pushes!r}.")
     for push in pushes:
@@ -135,7 +133,7 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
 
 
 class _NotFinite(InputError):
-    """NaN or infinite torques: they end the rollout, where other mistakes in a controller are raised."""
+    """Torques that are NaN, infinite or no numbers: they end the rollout, other mistakes in a controller are raised."""
 
 
 def _stance(sim: Simulation, controller: Controller) -> Contacts:
@@ -173,10 +171,11 @@ def _torques(sim: Simulation, name: str, tau: Any) -> Array:
     try:
         return checked(name, tau, (sim.robot.d,), "N·m")
     except InputError:
-        if np.shape(tau) != (sim.robot.d,):
+        entries = np.array(tau, dtype=object)
+        if entries.shape != (sim.robot.d,):
             raise
-        i = int(np.argmin(np.isfinite(tau)))
-        raise _NotFinite(f"{name} hold {np.asarray(tau)[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
+        i = [isinstance(x, float | int | np.floating | np.integer) and np.isfinite(x) for x in entries].index(False)
+        raise _NotFinite(f"{name} hold {entries[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
 
 
 def _planned(command: Any, stance: Contacts) -> Array | None:

@@ -11,7 +11,6 @@ import sys
 import time
 from pathlib import Path
 from threading import Thread
-from types import SimpleNamespace
 
 import judges
 import numba
@@ -174,21 +173,6 @@ def test_an_edited_function_is_compiled_anew_and_an_old_one_is_loaded(tmp_path: 
     vectors.write_text(text.replace("return a[0] * b[0] +", "return 10.0 * a[0] * b[0] +"), encoding="utf-8")
     assert run() == ["24.0", "0"]
     assert run() == ["24.0", "1"]
-
-
-def test_old_files_on_disk_do_not_pile_up(tmp_path: Path) -> None:
-    for i in range(40):
-        file = tmp_path / f"tick.{i}.nbc"
-        file.touch()
-        os.utime(file, (i, i))
-    loaded = SimpleNamespace(stats=SimpleNamespace(cache_misses={}, cache_path=str(tmp_path)))
-    jit.remove_old_files(loaded)
-    assert len(list(tmp_path.iterdir())) == 40
-    compiled = SimpleNamespace(stats=SimpleNamespace(cache_misses={"signature": 1}, cache_path=str(tmp_path)))
-    jit.remove_old_files(compiled)
-    left = {file.name for file in tmp_path.iterdir()}
-    assert 4 <= len(left) <= 20
-    assert left == {f"tick.{i}.nbc" for i in range(40 - len(left), 40)}, "the newest are kept"
 
 
 def test_the_tick_compiles_where_no_folder_can_be_written_to(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -355,9 +355,7 @@ def test_inconsistent_motions_are_named_and_not_averaged() -> None:
         robot, fb.Contacts.points(robot) + fb.Contacts([drive]), fb.standing_tasks(robot.standing())
     )
     state = robot.standing()
-    with pytest.raises(
-        fb.InfeasibleError, match="these motions cannot be kept together: motion FL_foot z, motion drive of"
-    ) as e:
+    with pytest.raises(fb.InfeasibleError, match="these motions are inconsistent: motion FL_foot z, motion drive of") as e:
         controller(state.q, state.v, 1.0)
     assert e.value.rows == ("motion FL_foot z", "motion drive of FL_foot row 2")
 

@@ -43,6 +43,7 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, r"target forces has shape \(3,\); .*\(12,\)"),
         (lambda: controller(fb.TorqueTask(np.zeros(3))), InputError, r"target torques has shape \(3,\); .*\(12,\)"),
         (lambda: controller(fb.CoMTask(lambda t: [0.0])), InputError, r"position has shape \(1,\); it must have shape \(3,\)"),
+        (lambda: fb.PostureTask(STATE.q[None]), InputError, r"q of posture has shape \(1, 19\)"),
         (lambda: fb.CoMTask([0.0, 0.0]), InputError, r"position of centre of mass has shape \(2,\); .*\(3,\)"),
         (lambda: fb.CoMTask([0.0, 0.0, np.nan]), InputError, r"position of centre of mass holds nan at index \[2\]"),
         (lambda: fb.CoMTask(UP, velocity=[1.0]), InputError, r"velocity of centre of mass has shape \(1,\)"),

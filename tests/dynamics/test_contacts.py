@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import judges
 import numpy as np
 import pytest
@@ -27,6 +29,39 @@ def tilted(name: str, seed: int) -> fb.Contacts:
 
 def owners(contacts: fb.Contacts) -> list[str]:
     return [contact.name for contact in contacts for _ in contact.point_names]
+
+
+@dataclass
+class Pad:
+    """A contact of a user's own, compared by ==, which two arrays cannot be."""
+
+    name: str
+    normal: np.ndarray
+    mu = 1.0
+    k = 3
+    row_names = ("x", "y", "z")
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        return (self.name,)
+
+    def positions(self, state: fb.State) -> np.ndarray:
+        return state.point(self.name)[None]
+
+    def jacobian(self, state: fb.State, t: float = 0.0) -> np.ndarray:
+        return state.frame_jacobian(self.name)[:3]
+
+    def constraint(self, state: fb.State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        return self.jacobian(state), -state.frame_drift(self.name)[:3]
+
+
+def test_contacts_of_a_users_own_are_chosen_by_name() -> None:
+    contacts = fb.Contacts([Pad("FL_foot", np.array([0.0, 0.0, 1.0])), Pad("FR_foot", np.array([0.0, 0.0, 1.0]))])
+    assert contacts.force_slice("FR_foot") == slice(3, 6)
+    assert contacts.only("FR_foot").names == contacts.without("FL_foot").names == ("FR_foot",)
+    state = judges.load("go2").standing()
+    eom, feet = fb.equations_of_motion(state, contacts), [PointContact(name) for name in contacts.names]
+    assert np.allclose(eom.J, fb.equations_of_motion(state, fb.Contacts(feet)).J, atol=1e-12)
 
 
 def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str) -> None:

@@ -128,7 +128,7 @@ def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str, share
 
 @pytest.mark.parametrize("name", ["01.3", "03.1", "04.2"])
 def test_many_numbers_where_one_is_needed_are_told_so(name: str) -> None:
-    assert missed(name, [(np.zeros(12), "One number is asked for")]) == []
+    assert missed(name, [(np.zeros(12), "The answer is one number")]) == []
 
 
 @pytest.mark.parametrize(("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))])

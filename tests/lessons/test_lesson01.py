@@ -35,6 +35,12 @@ def test_a_servo_follows_its_path_at_its_ends(arm: Robot) -> None:
     assert np.allclose(servo(state.q, state.v, 9.0).tau, np.arange(6.0) + 7.0 * np.eye(6)[2])
 
 
+def test_a_servo_turns_joints_without_limits_back_too() -> None:
+    state = fb.load("kinova").standing()  # three of its joints are (cos, sin) in q
+    turned = state.integrate(0.1 * np.eye(6)[0])
+    assert np.allclose(joint_servo(state)(turned, state.v, 0.0).tau, -10.0 * np.eye(6)[0])
+
+
 @pytest.mark.parametrize("thrust", [30.0, -30.0])
 def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(go2: Robot, thrust: float) -> None:
     view, contacts = fb.Viewer(go2, scale=0.003), fb.Contacts.points(go2)

@@ -165,7 +165,7 @@ def test_a_file_page_gives_back_its_scene_and_other_texts_hold_none() -> None:
         viewer_page.scene_in("<html></html>")
 
 
-def test_the_command_says_plainly_that_a_lesson_is_not_there(
+def test_a_lesson_that_is_not_there_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["publish", "pages", str(tmp_path / "no.ipynb"), "--to", str(tmp_path)])

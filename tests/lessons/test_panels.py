@@ -126,7 +126,7 @@ def panel() -> Iterator[Pushed]:
         (30.0, 30.0, (np.sqrt(0.75), 0.5, 0), "pushed with 30 N towards 30° for 0.1 s"),
     ],
 )
-def test_the_handle_pushes_where_it_points_and_the_arrow_stays_to_be_seen(
+def test_the_handle_pushes_where_it_points(
     panel: Pushed, force: float, towards: float, way: tuple[float, ...], words: str
 ) -> None:
     panel.towards.value = towards

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 
 import judges
@@ -13,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from floatbase.affine import Affine
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.qp import (
     INFEASIBLE,
@@ -172,11 +174,22 @@ def test_the_error_of_an_infeasible_problem_names_its_rows_and_says_what_to_do(s
     assert "Loosen or drop any one of them" in str(caught.value)
 
 
-def test_labels_are_texts_that_know_their_kind_owner_and_index() -> None:
+def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
+    qp = QP(np.eye(2), np.ones(2), np.ones((1, 2)), np.ones(1), np.eye(2), np.ones(2), blocks={"tau": slice(0, 1)})
+    solution = solve(qp)
+    for copied in (copy.deepcopy(solution), pickle.loads(pickle.dumps(solution))):
+        assert np.array_equal(copied["tau"], solution["tau"]) and copied.active == solution.active
+        assert copied.qp.reduced.row_lengths.tolist() == pickle.loads(pickle.dumps(qp.reduced)).row_lengths.tolist()
+    assert np.array_equal(replace(qp.reduced, h=np.zeros(2)).row_lengths, qp.row_lengths)
+    space = Affine.stack(first=qp.equality_space, second=qp.equality_space)
+    assert np.array_equal(pickle.loads(pickle.dumps(space))["second"].A, copy.deepcopy(space)["first"].A)
+
+
+def test_labels_are_texts_that_know_their_kind_owner_and_number() -> None:
     label = RowLabel("FL_foot facet 2", "friction", "FL_foot", 2)
     assert label == "FL_foot facet 2" and label in {"FL_foot facet 2": 1}
     for same in (label, copy.deepcopy(label), pickle.loads(pickle.dumps(label))):
-        assert (same, same.kind, same.owner, same.index) == ("FL_foot facet 2", "friction", "FL_foot", 2)
+        assert (same, same.kind, same.owner, same.number) == ("FL_foot facet 2", "friction", "FL_foot", 2)
     qp = QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=(label, "roof"))
     assert [name.kind for name in qp.inequality_names] == ["friction", "other rows"]
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 
 import judges
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -275,6 +277,23 @@ def test_an_arm_bolted_to_the_ground_accelerates_as_the_equations_say() -> None:
     sim.step(tau)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     assert np.allclose((sim.v - state.v) / 1e-5, judges.aba(eom, tau, np.zeros(0)), rtol=1e-3, atol=1e-2)
+
+
+def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone() -> None:
+    sim = fb.Simulation(judges.load("go2"))
+    sim.model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    sim.step(np.zeros(12))
+    before = sim.state.com_velocity
+    sim.step(np.zeros(12))
+    change = sim.robot.mass * ((sim.state.com_velocity - before) / sim.timestep - G)
+    assert np.allclose(sim.contact_forces().sum(axis=0), change, atol=0.01 * sim.robot.weight)
+
+
+def test_a_copy_of_a_simulation_falls_as_the_simulation_does() -> None:
+    sim = copy.deepcopy(fb.Simulation(judges.load("go2")))
+    for _ in range(1500):
+        sim.step(np.zeros(12))
+    assert sim.fallen
 
 
 def test_resetting_gives_the_same_run_again() -> None:

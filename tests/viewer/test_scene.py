@@ -52,7 +52,7 @@ def test_every_joint_stands_where_the_state_says(viewer: Viewer, go2: Robot) -> 
 
 
 @pytest.mark.parametrize("factor", [0.02, 1.0, 7.0])
-def test_arrows_start_at_the_contact_and_are_force_times_scale_long(
+def test_arrows_start_at_contacts(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray, factor: float
 ) -> None:
     viewer.show(standing, contacts, forces=factor * forces, planned=0.5 * factor * forces)

@@ -120,8 +120,6 @@ class Compiled:
 
     def warm_up(self) -> None:
         """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it."""
-        from floatbase.control.tick.jit import remove_old_files
-
         standing = self._problem.robot.standing()
         given = np.array(standing.q), np.array(standing.v), 0.0
         with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about half a minute'}."):
@@ -130,7 +128,6 @@ class Compiled:
             except (EOFError, UnpicklingError):  # a power cut left half a file on disk: forget it, and compile again
                 self._tick.recompile()
                 self(*given)
-        remove_old_files(self._tick)
 
     def empty_answer(self) -> Array:
         """An array for the numbers of one tick."""
@@ -145,12 +142,13 @@ class Compiled:
 
     def multipliers(self, numbers: Array, n_active: int) -> Array:
         """Multipliers of all inequality rows of the readable QP, from what a call returned."""
-        has_row = np.tile(np.isfinite(self._problem.limits.torque_limits), 2)  # the readable QP has rows for these limits only
-        n_force_rows = self._problem.contacts.n_points * (self._problem.limits.facets + 1)
+        limits, n_points = self._problem.limits, self._problem.contacts.n_points
+        limited = np.isfinite(limits.torque_limits)  # the readable QP has rows for these joints only
+        has_row = np.concatenate([np.full(n_points * (limits.facets + 1), True), limited, limited])
         mu, active = numbers[self.forces.stop :].reshape(2, -1)[:, :n_active]
-        multipliers = np.zeros(n_force_rows + has_row.size)
+        multipliers = np.zeros(has_row.size)
         multipliers[active.astype(np.int64)] = np.maximum(mu, 0.0)
-        return multipliers[np.concatenate([np.full(n_force_rows, True), has_row])]
+        return multipliers[has_row]
 
     def _targets_at(self, t: float) -> Array | None:
         """All targets at time t, in an array of their own, as other threads may run ticks too. None for a bad target."""

@@ -8,19 +8,10 @@ import numpy as np
 
 from floatbase.control.tick.elimination import Space, add_product
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.kinematics import (
-    Bodies,
-    angular_jacobian,
-    centre_of_mass,
-    frame_pose,
-    point_jacobian,
-    point_velocity,
-)
+from floatbase.control.tick.kinematics import Bodies, body_jacobian, centre_of_mass, frame_pose, point_velocity
 from floatbase.control.tick.memory import clear, take_matrix, take_vector
 from floatbase.control.tick.tables import COM, FORCE, FRAME, ORIENTATION, POSTURE, TORQUE
 from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
-
-NO_ROTATION = 1e-10  # part by which a target's columns may miss length 1 and right angles: `nearest_rotation` leaves 1e-15
 
 
 class TaskTable(NamedTuple):
@@ -42,20 +33,17 @@ class Cost(NamedTuple):
 
 @jit
 def rotation_error(R, target):
-    """e = log(R targetᵀ), world; and False where `target` is no rotation or the angle is too large."""
-    valid = dot(cross(target[0], target[1]), target[2]) > 0.0
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        valid &= abs(dot(target[a], target[a]) - 1.0) <= NO_ROTATION and abs(dot(target[a], target[b])) <= NO_ROTATION
+    """e = log(R targetᵀ), world, for two rotations; and False where the angle is too large."""
     e = times(0.5, plus(plus(cross(target[0], R[0]), cross(target[1], R[1])), cross(target[2], R[2])))
     sine = np.sqrt(dot(e, e))
     cosine = 0.5 * (dot(target[0], R[0]) + dot(target[1], R[1]) + dot(target[2], R[2]) - 1.0)
     scale = 1.0 + sine * sine / 6.0 if sine < 1e-4 else np.arctan2(sine, cosine) / sine
-    return times(scale, e), valid and cosine > -0.9  # beyond, the sine no longer tells the axis
+    return times(scale, e), cosine > -0.9  # beyond, the sine no longer tells the axis
 
 
 @jit
 def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
-    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for a bad target.
+    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for an angle too large.
 
     rows: (3, nv) receives the Jacobian.
     """
@@ -72,12 +60,12 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
     else:
         R, p = frame_pose(bodies, joint, tasks.frames, i)
         if kind == ORIENTATION:
-            angular_jacobian(bodies, joint, rows, 0)
+            body_jacobian(bodies, joint, False, p, rows, 0)
             e_dot, drift = row_part(bodies.velocity, joint, 3), row_part(bodies.drift, joint, 3)
             columns = targets[first:after].reshape(3, 3)
             e, valid = rotation_error(R, (column_part(columns, 0, 0), column_part(columns, 0, 1), column_part(columns, 0, 2)))
         else:
-            point_jacobian(bodies, joint, p, rows, 0)
+            body_jacobian(bodies, joint, True, p, rows, 0)
             e_dot, drift = point_velocity(bodies, joint, p)
             e = minus(p, row_part(target, 0, first))
     return e, minus(e_dot, row_part(target, 0, after)), minus(drift, row_part(target, 0, after + 3)), valid
@@ -100,7 +88,7 @@ def posture_error(tree, q, v, target, base, e, e_dot):
 
 @jit
 def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Space, base, workspace, cost: Cost):
-    """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns the number of its rows in use, -1 for a bad target.
+    """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns its number of rows, -1 for an angle too large.
 
     q, v: (nq,), (nv,), the state.
     base: number of rows of (7) without a motor, 6 or 0.

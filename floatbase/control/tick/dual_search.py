@@ -150,8 +150,7 @@ def times_row(W, row, d):
 def directions(W, U, d, q, z, r):
     """How β and the multipliers move as the multiplier of a new row grows by 1, from d (nb,) = W times that row.
 
-    z: (nb,) receives the step of β.
-    r: (nb,) receives the decrease of the q multipliers.
+    z, r: (nb,) receive the step of β and the decrease of the q multipliers.
     """
     n, j = d.size, q
     clear(z)

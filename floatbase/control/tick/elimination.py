@@ -34,7 +34,7 @@ def gauss_jordan(B, first, last, top, columns, weights, lengths, pivots):
 
     B: (·, n + 1), the right-hand side in the last column; rows first:last have other entries in the first `columns` only.
     top: rows from there on are cleared of the pivots.
-    weights: (columns,), each row takes the pivot of the largest weight × |entry|.
+    weights: (n,), each row takes the pivot of the largest weight × |entry|.
     lengths: of each row of B, before the elimination.
     pivots: receives the column of each row's pivot.
     """
@@ -117,17 +117,14 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
     and for λ where the contacts already hold it.
     """
     m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
-    lengths, motion_weights = take_vector(workspace, m + base), take_vector(workspace, nv)
-    base_weights = take_vector(workspace, n)
+    lengths, of_motion, of_base = take_vector(workspace, m + base), take_vector(workspace, n), take_vector(workspace, n)
     for c in range(n):
-        base_weights[c] = 1.0 if c < base else (0.1 if c < nv else 0.01)
-    for c in range(nv):
-        motion_weights[c] = 0.05 if c < base else 1.0
+        of_motion[c], of_base[c] = (0.05, 1.0) if c < base else (1.0, 0.1 if c < nv else 0.01)
     equalities(A, b, M, h, J, base, lengths, B)
-    least = gauss_jordan(B, 0, m, 0, nv, motion_weights, lengths, pivots)
+    least = gauss_jordan(B, 0, m, 0, nv, of_motion, lengths, pivots)
     if least <= LOST_ROW:
         return least, least
-    return least, min(least, gauss_jordan(B, m, m + base, m, n, base_weights, lengths, pivots))
+    return least, min(least, gauss_jordan(B, m, m + base, m, n, of_base, lengths, pivots))
 
 
 @jit

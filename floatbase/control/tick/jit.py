@@ -23,7 +23,6 @@ from floatbase.robots import UNIT_LENGTH_TOLERANCE
 # Without numba's run time, which counts references to every array that is made, sliced or passed on: that took a quarter of the
 # tick. What is compiled so can neither make an array nor return one.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "_nrt": False}
-_FILES = 16  # kept on disk: two for each processor and version of Python that share the folder, and each edit adds some (1 MB)
 
 jit: Callable[..., Any] = partial(numba.njit, **_OPTIONS)
 jit_inline: Callable[..., Any] = partial(numba.njit, inline="always", **_OPTIONS)  # part of its caller, so it may return arrays
@@ -50,11 +49,3 @@ def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
         global cache_on_disk
         cache_on_disk = False
         return jit(function)
-
-
-def remove_old_files(function: Any) -> None:
-    """Remove all but the newest files in the folder of a cached function, if it was compiled anew."""
-    if function.stats.cache_misses and function.stats.cache_path:
-        files = sorted(Path(function.stats.cache_path).glob("*.nb?"), key=lambda file: -file.stat().st_mtime)
-        for file in files[_FILES:]:
-            file.unlink(missing_ok=True)

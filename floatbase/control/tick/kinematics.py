@@ -73,23 +73,18 @@ def frame_pose(bodies: Bodies, joint, frames, i):
 
 
 @jit
-def point_jacobian(bodies: Bodies, joint, p, out, row):
-    """Write the Jacobian of the point p, world, of a joint's body into rows row:row + 3 of out (·, nv), which hold zeros."""
+def body_jacobian(bodies: Bodies, joint, linear, p, out, row):
+    """Write the Jacobian of a joint's body into rows row:row + 3 of out (·, nv), which hold zeros.
+
+    linear: True for the velocity of the body's point p, world; False for its angular velocity.
+    """
     i = joint
     while i > 0:
         for c in range(bodies.tree[i, 1], bodies.tree[i, 1] + bodies.tree[i, 2]):
-            J_c = plus(column_part(bodies.J, 0, c), cross(column_part(bodies.J, 3, c), p))
+            J_c = column_part(bodies.J, 3, c)
+            if linear:
+                J_c = plus(column_part(bodies.J, 0, c), cross(J_c, p))
             out[row, c], out[row + 1, c], out[row + 2, c] = J_c
-        i = bodies.tree[i, 0]
-
-
-@jit
-def angular_jacobian(bodies: Bodies, joint, out, row):
-    """Write the Jacobian of a body's angular velocity into rows row:row + 3 of out (·, nv), which hold zeros."""
-    i = joint
-    while i > 0:
-        for c in range(bodies.tree[i, 1], bodies.tree[i, 1] + bodies.tree[i, 2]):
-            out[row, c], out[row + 1, c], out[row + 2, c] = column_part(bodies.J, 3, c)
         i = bodies.tree[i, 0]
 
 
@@ -118,17 +113,17 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
         normal, radius = row_part(contacts.frames, i, 12), contacts.frames[i, 15]
         for j in range(first, first + count):
             point = minus(plus(p, rotate(R, row_part(contacts.points, j, 0))), times(radius, normal))
-            point_jacobian(bodies, joint, point, J, 3 * j)
+            body_jacobian(bodies, joint, True, point, J, 3 * j)
             if kind == POINT:
                 p = point
         if A.shape[0] != J.shape[0]:  # there are flat feet, of three corners or more
-            point_jacobian(bodies, joint, p, A, row)
+            body_jacobian(bodies, joint, True, p, A, row)
         _, drift = point_velocity(bodies, joint, p)
         if kind == POINT:  # the ball rolls: its lowest point moves on the ball
             angular = row_part(bodies.velocity, joint, 3)
             drift = plus(drift, times(radius, cross(angular, cross(angular, normal))))
         else:
-            angular_jacobian(bodies, joint, A, row + 3)
+            body_jacobian(bodies, joint, False, p, A, row + 3)
             b[row + 3], b[row + 4], b[row + 5] = times(-1.0, row_part(bodies.drift, joint, 3))
         b[row], b[row + 1], b[row + 2] = times(-1.0, drift)
         row += 3 if kind == POINT else 6

@@ -1,6 +1,4 @@
-"""Memory of the tick.
-
-The tick allocates nothing: it carves arrays out of a preallocated workspace. Output arrays come last.
+"""Memory of the tick, which allocates nothing: it carves arrays out of a workspace.
 
 workspace: one array of real or of whole numbers; its first entry counts how many are in use.
 """

@@ -63,10 +63,7 @@ class Dynamics:
             return np.array_equal(poses, self.views[-1]) and np.array_equal(M, M.T)
 
 
-@lru_cache(maxsize=16)
-def dynamics_of(robot: Robot) -> Dynamics:
-    """One `Dynamics` for each robot, shared by its controllers."""
-    return Dynamics(robot)
+dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one for each robot, shared by its controllers
 
 
 class Target(NamedTuple):
@@ -136,7 +133,7 @@ def _task_tables(problem: Problem) -> tuple[Any, ...]:
             elif np.shape(value) == shape:
                 target = np.asarray(value)
             elif value is not None:
-                problem.check_shapes()  # raises
+                problem.qp(problem.robot.standing())  # raises
             targets.append(target.ravel())
             first += target.size
     return table, gains, poses, np.concatenate(targets), moving

@@ -8,8 +8,8 @@ The same problem as `build_qp` makes, solved in another way that costs a fractio
     inequalities  rows that β violates                                                         (27)(28)
     dual_search   the optimum without inequalities, then one violated row after the other      App. C
 
-A tick without an answer says why: INVALID (a value is not finite, a quaternion or rotation is none), INACCURATE (its last
-digits are lost), INFEASIBLE. Then the readable path decides.
+A tick without an answer says why: INVALID (a value is not finite, a quaternion is none, an orientation is too far off),
+INACCURATE (its last digits are lost), INFEASIBLE. Then the readable path decides.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def workspace_sizes(sizes):
     nv = d + base
     n = nv + k  # and no more β than that
     contact = 12 * n_joints + (k + m) * nv + m
-    elimination = (m + base) * (n + 1) + 2 * (nv + n + m + base) + m * nv + m
+    elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
     space = (n + d) * (n + 1)
     cost = (3 * n_tasks + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
     search = (n + 1) ** 2 + 4 * n * n + 7 * n + k + d

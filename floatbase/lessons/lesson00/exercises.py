@@ -32,8 +32,8 @@ EXERCISES = (
             mistakes={
                 "That is a mass in kg; a force needs one more factor.": lambda: _go2().mass,
                 "That takes g as 10 m/s²; the physics here has 9.81.": lambda: 10 * _go2().mass,
-                "That is the share of one foot, on average; all feet are asked for.": lambda: _weight_of_links() / 4,
-                "That is what the robot does to the ground; asked is what the ground does to the robot.": lambda: (
+                "That is the share of one foot, on average; the question is about all feet.": lambda: _weight_of_links() / 4,
+                "That is what the robot does to the ground; the answer is what the ground does to the robot.": lambda: (
                     -_weight_of_links()
                 ),
             },

@@ -70,7 +70,7 @@ def _judge_thrust(answer: Any) -> Verdict:
     if abs(rate[2] + 200.0) < 0.2:
         return Verdict(False, "The size is right, the sign is not: these thrusters push the robot down.")
     if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
-        return Verdict(False, f"The forces add up to {vector_text(rate[:3])} N; asked are (0, 0, 200) N.")
+        return Verdict(False, f"The forces add up to {vector_text(rate[:3])} N; they should be (0, 0, 200) N.")
     if abs(rate[3:]).max() > 0.02:
         where = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
         return Verdict(False, f"The force is right, but it turns the robot: moment ({where}) N·m about the centre of mass.")
@@ -91,7 +91,7 @@ EXERCISES = (
                 "This is the wall's own moment about the base. The bolts answer it: look at the sign, or at the order of the "
                 "cross product.": lambda: -_bolts_moment(),
                 "The moment is taken about the centre of mass; the bolts sit at the base.": _about_the_centre_of_mass,
-                "This holds the weight's moment as well; asked is the answer to the wall alone.": _with_the_weight,
+                "This holds the weight's moment as well; the bolts should answer the wall alone.": _with_the_weight,
                 "Zero would mean that nobody answers the wall. Which lever, and which force?": lambda: np.zeros(3),
                 "This takes the height of the tool alone; it is also 11 cm to the side, and that is a lever too.": (
                     lambda: np.array([0.0, 60.0 * _pressed()[1][2], 0.0])
@@ -149,7 +149,7 @@ EXERCISES = (
                 "All four feet together carry one weight, not four.": lambda: 4 * _carried_by_friction(),
                 "That is friction times mass, in kg; a force needs one more factor.": lambda: _carried_by_friction() / 9.81,
                 "μ multiplies the normal force; it does not divide it.": lambda: _carried_by_friction() / 0.49,
-                "That is what the controller's four-sided pyramid allows. Asked is what the floor can do: the round cone.": (
+                "That is what the controller's four-sided pyramid allows. The floor can do more: the round cone.": (
                     lambda: _carried_by_friction() / np.sqrt(2.0)
                 ),
                 "Friction answers along the floor only as far as the normal force goes: multiply by μ, once.": (

@@ -204,7 +204,7 @@ EXERCISES = (
                 "ω × v is missing: the acceleration of a point is not the spatial acceleration of its body.": (
                     _drift_of_a_spatial_acceleration
                 ),
-                "This is the velocity of the foot; asked is an acceleration.": lambda: _velocity_of(
+                "This is the velocity of the foot; the answer is an acceleration.": lambda: _velocity_of(
                     _scene()[0], "FL_foot", 0.0
                 ),
                 "These are the angular rows of the drift; a point takes the linear ones, which come first.": lambda: (

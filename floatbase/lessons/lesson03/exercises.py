@@ -54,7 +54,7 @@ def _wrong_squeezes() -> dict[str, Any]:
         "This is the J of the standing robot; `tilted` has another posture, so another J.": (
             lambda: -standing_go2().J[:, 6:].T @ tilted_squeeze()[1]
         ),
-        "h is in it: that would hold the robot up as well. Asked for is only what the squeeze adds.": torques(
+        "h is in it: that would hold the robot up as well. The answer is only what the squeeze adds.": torques(
             after=lambda eom, tau: tau + eom.h[6:]
         ),
     }
@@ -102,7 +102,7 @@ EXERCISES = (
             mistakes={
                 "That is all of them. One thing can be done between two feet that moves nothing.": lambda: 12,
                 "That is how many do not move it.": lambda: 1,
-                "That is the number of force components k; asked for are directions of β.": lambda: 6,
+                "That is the number of force components k; the answer is the number of directions of β.": lambda: 6,
                 "That is for three feet.": lambda: 9,
                 "That is how many motions of the base two feet can stop; the legs move, too.": lambda: 5,
                 "You have counted more than one internal force. Which pushes of two feet turn nothing?": lambda: 10,
@@ -125,7 +125,7 @@ EXERCISES = (
             ),
             {
                 (18,): "18 numbers: these are generalised forces of base and joints. Motors reach the joints alone: see S.",
-                (12, 1): "This is a matrix with one column; a vector of shape (12,) is asked for.",
+                (12, 1): "This is a matrix with one column; the answer is a vector of shape (12,).",
                 (6,): "6 numbers: those are the base columns of J. The base has no motors.",
             },
         ),

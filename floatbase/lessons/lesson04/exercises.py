@@ -131,7 +131,7 @@ EXERCISES = (
             {
                 (18,): "18 numbers: that is the slope on q̈. One step is left to come back to the torques.",
                 (3,): "3 numbers: that is the residual. Two steps are left to come back to the torques.",
-                (12, 1): "This is a matrix with one column; a vector of shape (12,) is asked for.",
+                (12, 1): "This is a matrix with one column; the answer is a vector of shape (12,).",
                 (12, 12): "That is a curvature, shape (12, 12); the gradient is a vector.",
             },
         ),

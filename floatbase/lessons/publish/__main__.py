@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stored.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
     commands.add_parser("map", help="write equations.md, conventions.md and the README's table of lessons")
     paged = commands.add_parser("pages", help="write lessons as HTML pages, which need no kernel")
-    paged.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course, and its map, by default")
+    paged.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
     paged.add_argument("--to", type=Path, default=PAGES, metavar="FOLDER", help=f"where to write, {PAGES} by default")
     commands.add_parser("workspace", help="bring the learner's copy in notebooks/my up to date")
 
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "map":
             _map()
         elif given.command == "pages":
-            _pages(given.lessons or [*sorted(FOLDER.glob("*.ipynb")), FOLDER / "equations.md"], given.to)
+            _pages(given.lessons or [*sorted(FOLDER.glob("*.ipynb")), *sorted(FOLDER.glob("*.md"))], given.to)
         else:
             for line in prepare():
                 print(line)

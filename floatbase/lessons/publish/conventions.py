@@ -11,13 +11,13 @@ from floatbase import conventions
 
 _PACKAGE = Path(floatbase.__file__).parent
 _WITHOUT_TOLERANCES = ("lessons", "viewer")  # their numbers choose what is drawn, not what is answered
-# NAME = 1e-9  # the reason
-_TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = (-?[0-9.]+(?:e-?[0-9]+)?)  # (.+)$", re.MULTILINE)
+# NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int()
+_TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)  # (.+)$", re.MULTILINE)
 
 
 def page() -> str:
     """The page of conventions as Markdown."""
-    first, *rest = (conventions.__doc__ or "").split("\n", 1)
+    first, *rest = _with_table_of_symbols(conventions.__doc__ or "").split("\n", 1)
     rows = [f"| {room} | `{name}` | {value} | {reason} |" for room, name, value, reason in tolerances()]
     return "\n".join(
         [
@@ -38,8 +38,25 @@ def page() -> str:
     )
 
 
+def _with_table_of_symbols(text: str) -> str:
+    """The text with its indented lines, which are symbols and their meaning, as a table of Markdown."""
+    lines: list[str] = []
+    symbol = re.compile(r"^    (\S.*?)\s{2,}(.+)$")
+    for line in text.splitlines():
+        found = symbol.match(line)
+        if found and not (lines and lines[-1].startswith("| ")):
+            lines += ["", "| symbol | meaning |", "|---|---|"]
+        if found:
+            lines.append(f"| {found[1]} | {re.sub(' +', ' ', found[2])} |")
+        elif line.startswith("    "):
+            lines[-1] = f"{lines[-1][:-2]} {line.strip()} |"
+        else:
+            lines.append(line)
+    return "\n".join(lines)
+
+
 def tolerances() -> Iterator[tuple[str, str, str, str]]:
-    """File, name, value and reason of every numeric constant of the package, as its source states them."""
+    """File, name, value and reason of every numeric constant of the package, each as its source states it."""
     for path in sorted(_PACKAGE.rglob("*.py")):
         place = path.relative_to(_PACKAGE)
         if place.parts[0] not in _WITHOUT_TOLERANCES:
