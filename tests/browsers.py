@@ -30,3 +30,6 @@ def launched(*flags: str) -> Iterator[Any]:
         chromium = started.chromium.launch(executable_path=CHROMIUM, args=[*FLAGS, *flags])
         yield chromium
         chromium.close()
+
+
+browser_of_a_file = pytest.fixture(scope="module")(lambda: (yield from launched()))

@@ -285,7 +285,7 @@ def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_readable_
     assert compiled.compiled is not None and compiled.compiled(np.array(state.q), 1e-3 * v, 0.0) is not None
     assert compiled.compiled(np.array(state.q), 10.0 * v, 0.0) is None
     assert difference((compiled, readable), state.replace(v=10.0 * v)) == 0.0
-    with pytest.raises(InfeasibleError, match="these motions cannot be kept together"):
+    with pytest.raises(InfeasibleError, match="these motions are inconsistent"):
         compiled(state.q, 10.0 * v)
 
 

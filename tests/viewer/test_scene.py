@@ -336,8 +336,7 @@ def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
     assert len(cones) == 8
     for matrix in cones.values():
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
-        assert across < 0.5 * nearest
-        assert across / along == pytest.approx(0.7, rel=1e-5)
+        assert across < 0.5 * nearest and across / along == pytest.approx(0.7, rel=1e-5)
     view.close()
 
 
