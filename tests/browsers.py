@@ -32,4 +32,6 @@ def launched(*flags: str) -> Iterator[Any]:
         chromium.close()
 
 
-browser_of_a_file = pytest.fixture(scope="module")(lambda: (yield from launched()))
+@pytest.fixture(scope="module")
+def browser_of_a_file() -> Iterator[Any]:
+    yield from launched()

@@ -55,7 +55,7 @@ def test_the_page_of_conventions_is_the_one_that_the_code_makes() -> None:
     assert (FOLDER / "conventions.md").read_text(encoding="utf-8") == conventions.page(), MADE
 
 
-def test_the_page_of_conventions_shows_values_of_the_package_and_a_reason_for_every_tolerance() -> None:
+def test_the_page_of_conventions_shows_values_of_three_rooms_and_a_reason_for_every_tolerance() -> None:
     shown = {(file, name): value for file, name, value, _ in conventions.tolerances()}
     assert float(shown["linear_algebra", "RANK_TOLERANCE"]) == RANK_TOLERANCE
     assert float(shown["dynamics/resolve", "MOTION_NOISE"]) == MOTION_NOISE
