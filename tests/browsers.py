@@ -30,3 +30,8 @@ def launched(*flags: str) -> Iterator[Any]:
         chromium = started.chromium.launch(executable_path=CHROMIUM, args=[*FLAGS, *flags])
         yield chromium
         chromium.close()
+
+
+@pytest.fixture(scope="module")
+def browser_of_a_file() -> Iterator[Any]:
+    yield from launched()

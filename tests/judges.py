@@ -60,6 +60,13 @@ def controller_of(name: str, **options: object) -> fb.WholeBodyController:
     return fb.WholeBodyController(robot, stance(robot), fb.standing_tasks(robot.standing()), **options)
 
 
+def at_rest(name: str, seed: int | None = None, feet: int | None = None) -> EquationsOfMotion:
+    """A robot at rest on its first feet, or on all, standing or at random."""
+    robot, contacts = load(name), stance(load(name))
+    state = robot.standing() if seed is None else robot.random_state(seed).replace(v=np.zeros(robot.nv))
+    return fb.equations_of_motion(state, contacts.only(*contacts.names[:feet]))
+
+
 @dataclass
 class Torques:
     """The simplest command: torques, with or without planned forces."""

@@ -17,7 +17,7 @@ from typing import Any
 
 import nbformat
 import pytest
-from browsers import SCREENSHOTS, launched, needs_chromium
+from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 
 from floatbase.lessons.publish import FOLDER, read, without_outputs
 
@@ -86,9 +86,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         server.wait(timeout=20)
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from launched()
+browser = browser_of_a_file
 
 
 @pytest.mark.parametrize("name", LESSONS)

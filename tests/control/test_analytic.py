@@ -7,15 +7,14 @@ from functools import cache
 import cvxpy as cp
 import judges
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 import pytest
+from judges import Array
 
 import floatbase as fb
 from floatbase.control import AnalyticController
 from floatbase.objectives import rotational_inertia
 
-Array = npt.NDArray[np.float64]
 PERIOD = 2e-3
 
 
@@ -254,8 +253,7 @@ def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls() -> N
     """A foot is told to hold on by more than 1 N; MuJoCo's ground never does, and within half a second the robot is down."""
     run = pushed("analytic", 0.5)
     asks = np.flatnonzero(run.planned[:, 2::3].min(axis=1) < -1.0)
-    assert run.outcome == "fell"
-    assert run.time[-1] < 0.6
+    assert run.outcome == "fell" and run.time[-1] < 0.6
     assert len(asks) > 0
     assert 0.1 < run.time[asks[0]] < 0.2, "the plan pulls while the push still acts, before the fall"
     assert run.measured[:, 2::3].min() >= 0.0
@@ -265,8 +263,7 @@ def test_from_then_on_planned_and_measured_forces_have_nothing_to_do_with_each_o
     run, weight = pushed("analytic", 0.5), judges.load("go2").weight
     gap = np.abs(run.planned - run.measured).max(axis=1) / weight
     before = run.time < 0.1
-    assert gap[before][10:].max() < 0.05
-    assert gap.max() > 1.0
+    assert gap[before][10:].max() < 0.05 and gap.max() > 1.0
 
 
 def test_it_then_asks_for_more_torque_than_the_motors_can_give() -> None:

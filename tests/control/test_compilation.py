@@ -9,8 +9,8 @@ import shutil
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Thread
 
 import judges
 import numba
@@ -68,25 +68,19 @@ def test_another_layout_of_pinocchios_results_leaves_the_readable_path(monkeypat
 
 
 def test_threads_may_share_a_controller() -> None:
-    robot = judges.load("go2")
-    controller, states = judges.controller_of(robot.name), judges.states("go2", 40, 0.3)
-    expected, wrong = [controller(state.q, state.v).tau for state in states], []
+    controller, states = judges.controller_of("go2", path="compiled"), judges.states("go2", 40, 0.3)
+    expected, interval = [controller(state.q, state.v).tau for state in states], sys.getswitchinterval()
 
-    def run(shift: int) -> None:
-        for i in (np.arange(400) + shift) % len(states):
-            if not np.array_equal(controller(states[i].q, states[i].v).tau, expected[i]):
-                wrong.append(i)
+    def wrong(shift: int) -> list[int]:
+        order = (np.arange(400) + shift) % len(states)
+        return [i for i in order if not np.array_equal(controller(states[i].q, states[i].v).tau, expected[i])]
 
-    threads, interval = [Thread(target=run, args=(shift,)) for shift in (0, 13, 27)], sys.getswitchinterval()
     sys.setswitchinterval(1e-6)  # s: threads take turns in the middle of a tick
     try:
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        with ThreadPoolExecutor(3) as pool:
+            assert list(pool.map(wrong, (0, 13, 27))) == [[], [], []]
     finally:
         sys.setswitchinterval(interval)
-    assert not wrong
 
 
 def test_a_replaced_controller_compiles_nothing() -> None:
@@ -166,13 +160,11 @@ def test_an_edited_function_is_compiled_anew_and_an_old_one_is_loaded(tmp_path: 
         )
         return done.stdout.split()
 
-    assert run() == ["6.0", "0"]
-    assert run() == ["6.0", "1"]
+    assert run() == ["6.0", "0"] and run() == ["6.0", "1"]
     vectors = folder / "vectors.py"
     text = vectors.read_text(encoding="utf-8")
     vectors.write_text(text.replace("return a[0] * b[0] +", "return 10.0 * a[0] * b[0] +"), encoding="utf-8")
-    assert run() == ["24.0", "0"]
-    assert run() == ["24.0", "1"]
+    assert run() == ["24.0", "0"] and run() == ["24.0", "1"]
 
 
 def test_the_tick_compiles_where_no_folder_can_be_written_to(monkeypatch: pytest.MonkeyPatch) -> None:

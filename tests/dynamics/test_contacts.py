@@ -175,13 +175,11 @@ def test_each_contact_has_its_own_slice_of_forces_and_rows(name: str) -> None:
 def test_only_and_without_keep_the_order_and_plus_puts_contacts_behind() -> None:
     contacts = fb.Contacts.points(judges.load("go2"))
     a, b, c, d = contacts.names
-    assert contacts.only(c, a).names == (a, c)
-    assert contacts.without(b).names == (a, c, d)
+    assert contacts.only(c, a).names == (a, c) and contacts.without(b).names == (a, c, d)
     assert contacts.without(*contacts.names).names == ()
     assert (contacts.only(d) + contacts.only(a, b)).names == (d, a, b)
     assert (fb.Contacts.none() + contacts).names == contacts.names
-    assert contacts.names == (a, b, c, d)
-    assert contacts["FR_foot"].name == "FR_foot"
+    assert contacts.names == (a, b, c, d) and contacts["FR_foot"].name == "FR_foot"
     assert "FR_foot" in repr(contacts)
 
 
@@ -225,10 +223,8 @@ def test_a_frame_that_is_no_foot_can_touch_at_its_origin() -> None:
 def test_no_contacts_give_empty_rows() -> None:
     state = judges.load("go2").random_state(0)
     none = fb.Contacts([])
-    assert none.jacobian(state).shape == (0, 18)
-    assert none.constraint(state)[0].shape == (0, 18)
-    assert none.constraint(state)[1].shape == (0,)
-    assert none.normals.shape == (0, 3)
+    assert none.jacobian(state).shape == (0, 18) and none.constraint(state)[0].shape == (0, 18)
+    assert none.constraint(state)[1].shape == (0,) and none.normals.shape == (0, 3)
     assert none.positions(state).shape == (0, 3)
     assert none.k == none.n_points == len(none) == len(fb.Contacts.none()) == 0
 

@@ -16,13 +16,12 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 import scipy.linalg
+from judges import Array
 
 import floatbase as fb
 from floatbase import dynamics, linear_algebra
 from floatbase.dynamics import EquationsOfMotion, PointContact, fixed_frame
 from floatbase.robots import Foot
-
-Array = npt.NDArray[np.float64]
 
 
 def stances(name: str) -> list[fb.Contacts]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from judges import Array
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
@@ -21,7 +22,6 @@ from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction import FrictionPolyhedron, WrenchSet, wrench_set
 from floatbase.objectives import com_wrench
 
-Array = npt.NDArray[np.float64]
 seeds = st.integers(0, 100_000)
 UP = np.array([0.0, 0.0, 1.0])
 STANCES = [("go2", 4), ("go2", 3), ("go2", 2), ("go2", 1), ("talos", 2), ("talos", 1)]
@@ -376,8 +376,7 @@ def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
 def test_a_grip_from_all_sides_makes_every_wrench() -> None:
     directions = np.vstack([np.eye(3), -np.eye(3)])
     grip = of(directions, -directions, 0.7)
-    assert grip.rows.shape == (0, 6)
-    assert grip.equalities.shape == (0, 6)
+    assert grip.rows.shape == (0, 6) and grip.equalities.shape == (0, 6)
     assert all(grip.margin(w) == np.inf for w in np.random.default_rng(0).normal(size=(5, 6)))
 
 

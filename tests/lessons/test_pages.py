@@ -7,14 +7,13 @@ import io
 import re
 import runpy
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import nbformat
 import numpy as np
 import pytest
-from browsers import SCREENSHOTS, launched, needs_chromium
+from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from PIL import Image
 
@@ -101,9 +100,7 @@ def test_a_page_says_what_the_lesson_says_and_what_a_slider_does(built: Path) ->
     assert "Not yet" not in text and "FLOATBASE" not in text and "retina" not in text
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from launched()
+browser = browser_of_a_file
 
 
 @needs_chromium
@@ -165,7 +162,7 @@ def test_a_file_page_gives_back_its_scene_and_other_texts_hold_none() -> None:
         viewer_page.scene_in("<html></html>")
 
 
-def test_the_command_says_plainly_that_a_lesson_is_not_there(
+def test_a_lesson_that_is_not_there_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["publish", "pages", str(tmp_path / "no.ipynb"), "--to", str(tmp_path)])

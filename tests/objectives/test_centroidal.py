@@ -6,15 +6,14 @@ import cvxpy as cp
 import judges
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 import pytest
+from judges import Array
 
 import floatbase as fb
 from floatbase import dynamics, linear_algebra, objectives
-from floatbase.dynamics import EquationsOfMotion, fixed_frame
+from floatbase.dynamics import fixed_frame
 
-Array = npt.NDArray[np.float64]
 TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
 LEAN = judges.random_normals(4, 5)
 
@@ -215,15 +214,9 @@ def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() ->
 # (24)(25) ----------------------------------------------------------------------------------------------------------------
 
 
-def stand(name: str, seed: int | None = None) -> EquationsOfMotion:
-    robot = judges.load(name)
-    state = robot.standing() if seed is None else robot.random_state(seed).replace(v=np.zeros(robot.nv))
-    return fb.equations_of_motion(state, fb.Contacts.points(robot))
-
-
 @pytest.mark.parametrize(("name", "sign"), [("solo8", -1), ("go2", 0), ("solo12", 0), ("anymal_kinova", 1)])
 def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(name: str, sign: int) -> None:
-    eom = stand(name, 0)
+    eom = judges.at_rest(name, 0)
     found = objectives.torque_for_forces(eom)
     assert np.sign(eom.d - eom.k) == sign
     assert found.reachable.n_in == (9 if name == "solo8" else 12)  # solo8: 8 torques and one null(Jᵀ)
@@ -235,7 +228,7 @@ def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(name:
 def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: int | None) -> None:
     """min ½‖τ‖² over (q̈, τ) with (7) and λ given; a force that solo8 can give is drawn from what random torques give."""
     rng = np.random.default_rng(0)
-    eom = stand(name, seed)
+    eom = judges.at_rest(name, seed)
     found = objectives.torque_for_forces(eom)
     tau0 = rng.normal(size=eom.d)
     expected = dynamics.forces_from_torques(eom)(tau0)
@@ -258,7 +251,7 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
 
 
 def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> None:
-    eom = stand("anymal_kinova", 0)
+    eom = judges.at_rest("anymal_kinova", 0)
     found = objectives.torque_for_forces(eom)
     rng = np.random.default_rng(0)
     tau = rng.normal(size=eom.d)
@@ -283,7 +276,7 @@ def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_ra
 def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxpys() -> None:
     rng = np.random.default_rng(0)
     for seed in (None, 0, 1):
-        eom = stand("solo8", seed)
+        eom = judges.at_rest("solo8", seed)
         found, zeta, N = (
             objectives.torque_for_forces(eom),
             dynamics.forces_from_torques(eom),
@@ -304,7 +297,7 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
 
 @pytest.mark.parametrize("name", ["go2", "solo12", "anymal_kinova"])
 def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
-    eom = stand(name, 1)
+    eom = judges.at_rest(name, 1)
     found = objectives.torque_for_forces(eom)
     desired = 30.0 * np.random.default_rng(0).normal(size=eom.k)
     assert found.gap(desired) < 1e-8
@@ -314,7 +307,7 @@ def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
 
 def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration() -> None:
     """What `TorqueForForces` promises for d < k: min ‖J q̈ - b‖ with that λ, then the smallest τ."""
-    eom = stand("solo8", 0)
+    eom = judges.at_rest("solo8", 0)
     desired = 10.0 * np.random.default_rng(3).normal(size=12)
     x = cp.Variable(8)
     free = np.linalg.solve(eom.M, eom.J.T @ desired - eom.h)

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 import judges
 import numpy as np
-import numpy.typing as npt
 import pytest
+from judges import Array
 
 import floatbase as fb
 from floatbase import dynamics, objectives
 from floatbase.affine import Quadratic
 from floatbase.dynamics import EquationsOfMotion, fixed_frame
 
-Array = npt.NDArray[np.float64]
 BLOCKS = ("qdd", "tau", "forces")
-
-
-def eom_of(name: str, feet: int, seed: int | None = None) -> EquationsOfMotion:
-    """A robot at rest on its first feet, standing or at random."""
-    robot = judges.load(name)
-    contacts = judges.stance(robot)
-    state = robot.standing() if seed is None else robot.random_state(seed).replace(v=np.zeros(robot.nv))
-    return fb.equations_of_motion(state, contacts.only(*contacts.names[:feet]))
 
 
 def sizes(eom: EquationsOfMotion) -> dict[str, int]:
@@ -75,7 +66,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
     """(15) at random torques, the acceleration by one solve of the whole system."""
     rng = np.random.default_rng(0)
     for seed in (None, 0):
-        eom = eom_of(name, 4, seed)
+        eom = judges.at_rest(name, seed)
         cost = Quadratic.from_residual(*costs(eom)["qdd"])
         seen = objectives.cost_on_torques(cost, eom)
         for _ in range(5):
@@ -87,7 +78,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(name: str) -> None:
-    eom = eom_of(name, 4)
+    eom = judges.at_rest(name)
     residuals = {"qdd": costs(eom)["qdd"]}
     seen = objectives.cost_on_torques(as_quadratics(residuals)["qdd"], eom)
     assert seen(seen.minimiser()) == pytest.approx(least(eom, residuals), rel=1e-6)
@@ -97,7 +88,7 @@ def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(n
 @pytest.mark.parametrize("feet", [1, 4])
 def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(name: str, feet: int) -> None:
     """(18): q̈, τ and λ weighed at once."""
-    eom = eom_of(name, feet)
+    eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
     space = dynamics.feasible_space(eom)
     seen = objectives.cost_on_space(space, **as_quadratics(residuals))
@@ -109,7 +100,7 @@ def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_ever
 
 
 def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
-    eom = eom_of("go2", 3)
+    eom = judges.at_rest("go2", feet=3)
     space, parts = dynamics.feasible_space(eom), as_quadratics(costs(eom))
     beta = np.random.default_rng(0).normal(size=space.dimension)
     values = {b: objectives.cost_on_space(space, **{b: parts[b]})(beta) for b in BLOCKS}
@@ -121,7 +112,7 @@ def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
 
 def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
     """(18) for Q(q̈, τ, λ) that is no sum: joint power τᵀ q̇ has none, but (τ - K q̈)² does."""
-    eom = eom_of("go2", 2)
+    eom = judges.at_rest("go2", feet=2)
     space = dynamics.feasible_space(eom)
     rng = np.random.default_rng(0)
     A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
@@ -138,7 +129,7 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
 @pytest.mark.parametrize("feet", [1, 2, 4])
 def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name: str, block: str, feet: int) -> None:
     """Every block, against the minimum with that block held and everything else free; the literal reading is never below it."""
-    eom = eom_of(name, feet)
+    eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
     space = dynamics.feasible_space(eom)
     cost = objectives.cost_on_space(space, **as_quadratics(residuals))
@@ -157,7 +148,7 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name: 
 def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(name: str) -> None:
     """V_q̈ on one foot has full column rank, on four it has not: there the literal reading costs visibly more."""
     for feet, agree in ((1, True), (4, False)):
-        eom = eom_of(name, feet, 0)
+        eom = judges.at_rest(name, 0, feet)
         space, found = dynamics.feasible_space(eom), dynamics.dimensions(eom)
         assert (found.rank_V_qdd == found.null_B) == agree
         cost = objectives.cost_on_space(space, **as_quadratics(costs(eom)))
@@ -170,7 +161,7 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
 
 def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19() -> None:
     """go2, cost = friction squared and a little torque: the smallest β leaves friction in that the best β squeezes out."""
-    eom = eom_of("go2", 4)
+    eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     sideways = np.kron(np.eye(4), np.diag([1.0, 1.0, 0.0]))
     cost = objectives.cost_on_space(
@@ -202,7 +193,7 @@ def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
 
 def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
     """A reward for internal force has no least cost: said, not returned."""
-    eom = eom_of("go2", 4)
+    eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     squeeze = dynamics.internal_forces(eom)[:, 0]
     reward = objectives.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
@@ -214,7 +205,7 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
 
 def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
     """Negative curvature has no minimum either: the stationary point there is the worst, not the best."""
-    eom = eom_of("go2", 4)
+    eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     hill = objectives.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
     with pytest.raises(fb.FloatbaseError, match="no minimum: its smallest curvature is -"):
@@ -222,7 +213,7 @@ def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> 
 
 
 def test_directions_that_cost_nothing_are_left_alone() -> None:
-    eom = eom_of("go2", 4)
+    eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     free = Quadratic.zero(space.dimension)
     x = space.qdd(np.ones(space.dimension))
@@ -235,7 +226,7 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
 
     solo8 on four feet: null(Jᵀ) changes forces alone, so the torque cost leaves it to the small weight.
     """
-    eom = eom_of("solo8", 4)
+    eom = judges.at_rest("solo8")
     space = dynamics.feasible_space(eom)
     desired = np.arange(12.0)
     for weight in (1e-2, 1e-6, 1e-10):
@@ -250,12 +241,12 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
 
 
 def test_a_block_that_does_not_exist_is_named() -> None:
-    space = dynamics.feasible_space(eom_of("go2", 4))
+    space = dynamics.feasible_space(judges.at_rest("go2"))
     with pytest.raises(fb.FloatbaseError, match=r"no block 'lambda'; its blocks are \['qdd', 'tau', 'forces'\]"):
         objectives.seen_from_best(Quadratic.zero(12), space, "lambda")
 
 
 def test_a_cost_of_another_size_is_refused() -> None:
-    eom = eom_of("go2", 4)
+    eom = judges.at_rest("go2")
     with pytest.raises(fb.FloatbaseError, match="the map gives 18 numbers, the cost takes 12"):
         objectives.cost_on_torques(Quadratic.zero(12), eom)

@@ -32,11 +32,9 @@ def check_optimum(run: ActiveSetRun, tolerance: float = 1e-7) -> None:
     """Karush, Kuhn and Tucker: sufficient for a convex problem, whoever solved it."""
     qp, r = run.solution.qp, run.solution.residuals
     scale = 1.0 + float(np.max(np.abs(qp.H) @ np.abs(run.solution.x) + np.abs(qp.g)))
-    assert r.stationarity < tolerance * scale
-    assert r.equality < tolerance
+    assert r.stationarity < tolerance * scale and r.equality < tolerance
     assert r.inequality < 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_lengths, initial=1.0))
-    assert r.complementarity < tolerance * scale
-    assert r.dual == 0.0
+    assert r.complementarity < tolerance * scale and r.dual == 0.0
 
 
 def check_record(run: ActiveSetRun) -> None:
@@ -93,14 +91,12 @@ def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> No
     assert np.allclose(first.arrival, [0.25, 0.0])
     assert (second.working, second.blocking, second.length) == (("table",), None, 1.0)
     assert np.allclose(second.direction, [0.25, 0.0])
-    assert second.multipliers == {"table": pytest.approx(1.0)}
-    assert second.dropped is None
+    assert second.multipliers == {"table": pytest.approx(1.0)} and second.dropped is None
 
 
 def test_a_row_that_would_have_to_pull_is_dropped() -> None:
     first, second = active_set(table_top((0.5, 1.0)), start=(0.0, 0.0), working=["table"]).iterations
-    assert first.multipliers == {"table": pytest.approx(-1.0)}
-    assert first.dropped == "table"
+    assert first.multipliers == {"table": pytest.approx(-1.0)} and first.dropped == "table"
     assert second.working == ()
     assert np.allclose(second.arrival, [0.5, 1.0])
 

@@ -52,10 +52,8 @@ def test_every_solver_gives_the_same_optimum_and_proves_it(seed: int, n: int, m:
     found = {solver: solve(qp, solver) for solver in solvers()}
     for solution in found.values():
         r = solution.residuals
-        assert r.stationarity < 1e-5
-        assert r.equality < 1e-8
-        assert r.inequality < 1e-7
-        assert r.complementarity < 1e-5
+        assert r.stationarity < 1e-5 and r.equality < 1e-8
+        assert r.inequality < 1e-7 and r.complementarity < 1e-5
         assert r.dual == 0.0
         assert np.allclose(solution.x, found["cvxpy"].x, atol=1e-5)
         assert solution.objective <= found["cvxpy"].objective + 1e-6

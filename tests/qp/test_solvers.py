@@ -64,8 +64,7 @@ def test_the_unit_of_an_equation_does_not_make_it_disappear(solver: str, equalit
 def test_the_reduced_problem_is_the_problem_on_the_space_of_its_equalities() -> None:
     qp = judges_qp("go2", 1)
     space, inner = qp.equality_space, qp.reduced
-    assert inner.n == space.n_in
-    assert inner.inequality_names == qp.inequality_names
+    assert inner.n == space.n_in and inner.inequality_names == qp.inequality_names
     offset = qp.objective(space.b)
     for beta in np.random.default_rng(0).normal(size=(5, inner.n)):
         assert inner.objective(beta) + offset == pytest.approx(qp.objective(space(beta)), rel=1e-9)

@@ -33,8 +33,7 @@ def test_an_arm_may_be_bolted_down_or_float() -> None:
 def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand_on_a_plate() -> None:
     arm = fb.load("ur5", posture=[0.0, -1.7, 1.2, 0.5, 1.5, 0.0])
     loose, standing = unbolted(arm), unbolted(arm, plate=True)
-    assert loose.joint_names == arm.joint_names
-    assert loose.mass == pytest.approx(arm.mass)
+    assert loose.joint_names == arm.joint_names and loose.mass == pytest.approx(arm.mass)
     assert np.array_equal(loose.torque_limits, arm.torque_limits)
     for robot, height in ((loose, 1.0), (standing, PLATE[1])):
         state = robot.standing()

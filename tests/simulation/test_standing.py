@@ -30,15 +30,13 @@ def record(request: pytest.FixtureRequest) -> fb.Rollout:
 
 
 def test_it_stands_to_the_end_with_its_centre_of_mass_where_it_was(record: fb.Rollout) -> None:
-    assert record.outcome == "completed"
-    assert record.error is None
+    assert record.outcome == "completed" and record.error is None
     assert np.linalg.norm(record.final.com - record.robot.standing().com) < 5e-3
     assert np.linalg.norm(record.final.v) < 1e-2
 
 
 def test_no_foot_slips_more_than_a_millimetre(record: fb.Rollout) -> None:
-    assert record.slip().shape == (record.contacts.n_points,)
-    assert record.slip().max() < 1e-3
+    assert record.slip().shape == (record.contacts.n_points,) and record.slip().max() < 1e-3
 
 
 def test_planned_and_measured_vertical_forces_agree_at_rest(record: fb.Rollout) -> None:

@@ -19,9 +19,7 @@ NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 LIGHT, DARK, CHANGE = 220, 70, 60  # brightness of 255 of a push's arrow or outline, and its least difference to what it hides
 
 
-def test_the_page_has_what_is_shown_and_no_more(
-    page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_a_page_has_what_is_shown(page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     viewer.show(standing, contacts, forces=forces, title="go2 stands")
     page.goto(viewer.url)
     settle(page, "go2 stands")

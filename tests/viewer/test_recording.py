@@ -237,8 +237,7 @@ def test_the_camera_goes_with_the_robot(page, viewer: Viewer, go2: Robot, standi
     page.evaluate("viewer.animator.seek(1.5)")
     page.wait_for_function("!viewer.needs_render")
     after = page.evaluate(TARGET)
-    assert after[0] - before[0] == pytest.approx(1.5, abs=STEP)
-    assert after[1] == before[1]
+    assert after[0] - before[0] == pytest.approx(1.5, abs=STEP) and after[1] == before[1]
 
     viewer.show(standing, title="still").camera(follow=True)
     settle(page, "still")
@@ -326,8 +325,7 @@ def test_controls_in_the_page_call_back(page, viewer: Viewer, standing: State) -
 def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
     rollout = record(go2)
     used = plots.friction_used(rollout, rollout.measured)
-    assert used[0, 1000] == pytest.approx(0.9 / 0.6)
-    assert used[1, 1000] == 0.0
+    assert used[0, 1000] == pytest.approx(0.9 / 0.6) and used[1, 1000] == 0.0
     assert np.isnan(used[3, -1])
     figure = plots.plot(rollout)
     assert [axis.get_ylabel() for axis in figure.axes] == [
