@@ -100,7 +100,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
-        raise AttributeError(f"module 'floatbase' has no attribute {name!r}")
+        other = "other names are in its rooms, as in `from floatbase.friction import FrictionPolyhedron`"
+        raise AttributeError(f"module 'floatbase' has no attribute {name!r}; {other}")
     value = getattr(import_module(_LAZY[name]), name)
     globals()[name] = value
     return value

@@ -41,7 +41,7 @@ class Command:
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Names of the active inequality rows, such as "FL_foot facet 2" or "torque limit FL_calf_joint upper"."""
+        """Names of the active inequality rows, such as "FL_foot facet 2": `RowLabel`s, which also know kind and owner."""
         return self.solution.active
 
     @property
