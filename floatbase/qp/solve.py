@@ -80,8 +80,9 @@ def _daqp(qp: QP) -> Solution | None:
         raise unbounded(qp)
     if flag == -5:
         raise not_convex(qp, inner.H)
-    mu = np.maximum(np.asarray(info["lam"], dtype=np.float64)[:rows] * scale, 0.0) / size
-    polished = _polished(qp, np.asarray(y), mu) if flag in (1, 2) else None  # otherwise it cycled, or took too many iterations
+    if flag not in (1, 2):  # it cycled, or took too many iterations, and its numbers may be of any size
+        return _active_set(qp)
+    polished = _polished(qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / size)
     if polished is None:
         return _active_set(qp)
     return with_equality_multipliers(qp, *polished, "daqp", int(info["iterations"]))
