@@ -170,7 +170,9 @@ def test_a_kernel_is_interrupted_and_restarted_under_a_viewer() -> None:
         told = kernel.told(kernel.client.execute("print('drawing')\nwhile True: view.show(s, com=False); view.show(s)"))
         assert next(told).startswith("drawing")
         kernel.manager.interrupt_kernel()
-        assert list(told)[-1] == "KeyboardInterrupt"
+        # In the text, not as the error's name: where the interrupt lands on an instruction without a line, Python 3.11 and
+        # IPython's formatter of tracebacks print "KeyboardInterrupt" as text instead.
+        assert "KeyboardInterrupt" in "".join(told)
         assert kernel.run("view.show(s); print(view.window.is_open, len(view.canvas.picture) > 0)") == "True True\n"
 
         kernel.manager.restart_kernel(now=False)
