@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for line in prepare():
                 print(line)
     except InputError as error:
-        parser.error(str(error))
+        parser.exit(2, f"{error}\n")
 
 
 def _run(lessons: Sequence[Path]) -> None:

@@ -1,49 +1,63 @@
-"""The learner's own copy of the lessons: made once, never overwritten, kept when the course is updated.
+"""The learner's own copy of the lessons: what the learner wrote is never overwritten, the rest follows the course.
 
 `make lab` prepares it before it opens the course there. Notebooks are read as the JSON that they are, which is quick.
 """
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
+import os
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 from typing import Any
 
+from floatbase.errors import InputError
+
 FOLDER = Path(__file__).parents[3] / "notebooks"  # of the course
 MINE = "my"
-_MEMORY = ".from.json"  # for each lesson, the digest of the course's text that the learner's copy started from
+_MEMORY = ".from.json"
+_PART = (".floatbase-", ".part")  # how the hidden name begins and ends that a file has until all of it is written
+_DAMAGED = (ValueError, LookupError, TypeError, AttributeError, RecursionError)  # what JSON that is no notebook raises
+_FAILED = "{}: not brought up to date"
+# what JupyterLab writes when a notebook is only run and looked at; all else is the learner's writing
+_OF_RUN = {"execution_count", "id", "outputs"}
+_OF_CELL = {"collapsed", "execution", "jp-MarkdownHeadingCollapsed", "jupyter", "scrolled", "trusted"}
+_OF_NOTEBOOK = {"kernelspec", "language_info", "orig_nbformat", "signature", "widgets"}
 
 
 def prepare(folder: Path = FOLDER) -> list[str]:
-    """Bring the learner's copies in folder/my up to date; returns what happened, a line for each lesson that changed.
+    """Bring the learner's copies in folder/my up to date; returns a line for each file that changed, or could not be.
 
-    A lesson that is not there is copied. One that the learner has not written in is replaced when the course has a newer
-    text. One that the learner has written in stays as it is; the course's newer text is laid beside it as NAME.new.ipynb.
-    Outputs do not count as writing.
+    A lesson or page that is not there is copied. One that the learner has not written in is replaced when the course has a
+    newer text. One that the learner has written in stays as it is; the course's newer text is laid beside it as
+    NAME.new.ipynb, or NAME.new2.ipynb where the learner has gone on in the first, and so on. Outputs do not count as writing.
+
+    However this ends, each file is whole, the old or the new one, and the next call does the rest. Raises `InputError` where
+    there can be no folder/my.
     """
     mine = folder / MINE
-    mine.mkdir(exist_ok=True)
-    memory = _memory(mine / _MEMORY)
-    said = []
-    for lesson in sorted(folder.glob("*.ipynb")):
-        copy, now = mine / lesson.name, _digest(lesson)
-        if not copy.exists():
-            _copy(lesson, copy)
-            said.append(f"{lesson.name}: new")
-        elif memory.get(lesson.name) == now or _digest(copy) == now:
-            pass
-        elif _digest(copy) == memory.get(lesson.name):
-            _copy(lesson, copy)
-            said.append(f"{lesson.name}: updated")
-        else:
-            _copy(lesson, copy.with_suffix(".new.ipynb"))
-            said.append(f"{lesson.name}: yours is kept; the course's new text is in {copy.with_suffix('.new.ipynb').name}")
-        memory[lesson.name] = now
-    for page in folder.glob("*.md"):
-        _copy(page, mine / page.name)
-    (mine / _MEMORY).write_text(json.dumps(memory, indent=1), encoding="utf-8")
-    return said
+    try:
+        mine.mkdir(exist_ok=True)
+    except FileExistsError:
+        raise InputError(f"{mine} is a file or a broken link; it must be a folder. Move it away, then start again.") from None
+    except OSError as error:
+        raise InputError(f"{mine} cannot be made: {error.strerror}. See to the disk and to who may write there.") from None
+    with _alone_in(mine):
+        memory, said = _Memory(mine / _MEMORY), []
+        for source in [*sorted(folder.glob("*.ipynb")), *sorted(folder.glob("*.md"))]:
+            copy = mine / source.name
+            try:
+                said += _update(copy, _as_laid(source), memory)
+            except OSError as error:
+                said.append(f"{_FAILED.format(source.name)}: {error.strerror}. See to {source} and {copy}, then start again.")
+            except _DAMAGED:
+                said.append(f"{_FAILED.format(source.name)}: the course's own is no notebook. `git status` may say why.")
+        return [*said, *memory.said]
 
 
 def without_outputs(notebook: Any) -> Any:
@@ -55,28 +69,129 @@ def without_outputs(notebook: Any) -> Any:
     return notebook
 
 
-def _copy(source: Path, target: Path) -> None:
-    """A lesson is copied without its outputs: they would answer what the learner is asked to predict."""
-    if source.suffix == ".ipynb":
-        notebook = without_outputs(json.loads(source.read_text(encoding="utf-8")))
-        target.write_text(json.dumps(notebook, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
-    else:
-        target.write_bytes(source.read_bytes())
+class _Memory:
+    """What the course laid, name by name: a file that holds another text than one of these is the learner's.
+
+    laid: digests of the texts that the file of this name may hold. offered: of those that the learner has got for this
+    lesson, in the copy or beside it. Where they are lost or damaged, all but the course's present text is the learner's.
+    said: a line when they cannot be stored.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.said = path, list[str]()
+        self.laid: dict[str, list[Any]] = {}
+        self.offered: dict[str, list[Any]] = {}
+        with suppress(OSError, *_DAMAGED):
+            found = json.loads(path.read_bytes())
+            for kind, texts in (("laid", self.laid), ("offered", self.offered)):
+                texts.update((name, digests) for name, digests in found[kind].items() if isinstance(digests, list))
+
+    def remember(self, texts: dict[str, list[Any]], name: str, digest: str) -> None:
+        """Store a digest in one of the two."""
+        if digest in texts.setdefault(name, []):
+            return
+        texts[name].append(digest)
+        try:
+            _write(self.path, json.dumps({"laid": self.laid, "offered": self.offered}, indent=1).encode())
+            self.said = []
+        except OSError as error:
+            self.said = [
+                f"{self.path.name}: cannot be stored: {error.strerror}. Nothing of yours is lost, but a later update takes "
+                f"every lesson for written in. See to {self.path}, then start again."
+            ]
+
+    def may_replace(self, path: Path) -> bool:
+        """Whether nothing is lost when another file takes this one's name. A link is the learner's, whatever it leads to."""
+        return not os.path.lexists(path) or (not path.is_symlink() and _held(path) in self.laid.get(path.name, []))
 
 
-def _memory(path: Path) -> dict[str, str]:
-    """The digests stored last time; none when there was no last time or the file was damaged."""
+def _update(copy: Path, text: bytes, memory: _Memory) -> list[str]:
+    """Bring one copy to the course's present text, or lay that beside it; what happened, in a line or none."""
+    present, is_new, said = _digest(copy.name, text), not os.path.lexists(copy), list[str]()
+    if not is_new and not copy.is_file():
+        return [f"{_FAILED.format(copy.name)}: a folder or a broken link has its name. Move {copy} away, then start again."]
+    if _held(copy) == present:
+        memory.remember(memory.laid, copy.name, present)
+    elif memory.may_replace(copy):
+        _lay(copy, text, memory)
+        said = [f"{copy.name}: {'new' if is_new else 'updated'}"]
+    elif present in memory.offered.get(copy.name, []):
+        return []
+    elif present not in [_held(path) for path in copy.parent.iterdir() if path.match(f"{copy.stem}.new*{copy.suffix}")]:
+        names = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
+        target = next(path for path in names if memory.may_replace(path))
+        _lay(target, text, memory)
+        said = [f"{copy.name}: yours is kept; the course's new text is in {target.name}"]
+    memory.remember(memory.offered, copy.name, present)
+    return said
+
+
+def _lay(target: Path, text: bytes, memory: _Memory) -> None:
+    """Put a text of the course under a name that is free, or that another text of the course has."""
+    # remembered first: after an interrupt in between, what was laid must not count as the learner's
+    memory.remember(memory.laid, target.name, _digest(target.name, text))
+    _write(target, text, lambda: memory.may_replace(target))
+
+
+def _write(target: Path, text: bytes, may_replace: Callable[[], bool] = lambda: True) -> None:
+    """All of a file or nothing. may_replace: asked at the last moment, for the learner may save just now."""
+    part = target.with_name(secrets.token_hex(4).join(_PART))
     try:
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError):
-        return {}
+        with part.open("xb") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        if not may_replace():
+            raise FileExistsError(0, "it was written in just now", str(target))
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
 
 
-def _digest(path: Path) -> str:
-    """A digest of what is written in a notebook's cells, without outputs; of its bytes when it cannot be read."""
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Other processes wait, and what killed ones left is removed; without a lock where the file system has none."""
+    lock = None
+    with suppress(OSError):
+        lock = os.open(folder, os.O_RDONLY)
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        for part in folder.glob("*".join(_PART)):
+            part.unlink()
     try:
-        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-        text = "\0".join(f"{cell['cell_type']}\0{''.join(cell['source'])}" for cell in cells)
-    except (ValueError, LookupError, TypeError):  # a damaged notebook is still the learner's: it counts as written in
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    return hashlib.sha256(text.encode()).hexdigest()
+        yield
+    finally:
+        if lock is not None:
+            os.close(lock)
+
+
+def _as_laid(source: Path) -> bytes:
+    """A lesson is laid without its outputs: they would answer what the learner is asked to predict."""
+    data = source.read_bytes()
+    if source.suffix != ".ipynb":
+        return data
+    return (json.dumps(without_outputs(json.loads(data)), indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
+
+
+def _digest(name: str, data: bytes) -> str:
+    """A digest of what is written in a file: of a notebook without what Jupyter writes, of all bytes of any other."""
+    if name.endswith(".ipynb"):
+        with suppress(*_DAMAGED):  # a damaged notebook is still the learner's
+            data = json.dumps(_written(json.loads(data)), sort_keys=True).encode()
+    return hashlib.sha256(data).hexdigest()
+
+
+def _held(path: Path) -> str | None:
+    """The digest of a file; None where there is no file."""
+    return _digest(path.name, path.read_bytes()) if path.is_file() else None
+
+
+def _written(notebook: Any) -> Any:
+    """What is written in a notebook: cells and metadata. Empty cells are not: Shift+Enter in the last one adds such."""
+    cells = []
+    for cell in notebook["cells"]:
+        metadata = {key: value for key, value in cell["metadata"].items() if key not in _OF_CELL}
+        parts = {**cell, "source": "".join(cell["source"]), "metadata": metadata}
+        parts = {key: value for key, value in parts.items() if value and key not in _OF_RUN}
+        if len(parts) > 1:  # more than its type
+            cells.append(parts)
+    return cells, {key: value for key, value in notebook["metadata"].items() if key not in _OF_NOTEBOOK}
