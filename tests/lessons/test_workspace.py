@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import resource
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import nbformat
+import numpy as np
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
+from floatbase.errors import InputError
+from floatbase.lessons import progress
 from floatbase.lessons.publish import MINE, prepare
+
+KILLS = 20
+LESSON, NEW, NEW2 = "00_a.ipynb", "00_a.new.ipynb", "00_a.new2.ipynb"
 
 
 def write(path: Path, source: str, output: str = "") -> None:
@@ -24,56 +37,265 @@ def source(path: Path) -> str:
     return nbformat.read(path, as_version=4).cells[0].source
 
 
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()} - {".from.json"}
+
+
 @pytest.fixture
 def course(tmp_path: Path) -> Path:
-    write(tmp_path / "00_a.ipynb", "first = 1")
+    write(tmp_path / LESSON, "first = 1")
     return tmp_path
 
 
-def test_a_copy_does_not_answer_what_it_asks_the_learner_to_predict(course: Path) -> None:
-    write(course / "00_a.ipynb", "first = 1", output="1\n")
+@pytest.fixture
+def mine(course: Path) -> Path:
+    """The learner's folder, prepared."""
+    (course / "page.md").write_text("a page, 1")
+    write(course / "01_b.ipynb", "first = 1")
     prepare(course)
-    assert nbformat.read(course / MINE / "00_a.ipynb", as_version=4).cells[0].outputs == []
+    return course / MINE
+
+
+def update(course: Path, n: int = 2) -> None:
+    for lesson in course.glob("*.ipynb"):
+        write(lesson, f"first = {n}")
+    (course / "page.md").write_text(f"a page, {n}")
+
+
+def test_a_copy_does_not_answer_what_it_asks_the_learner_to_predict(course: Path) -> None:
+    write(course / LESSON, "first = 1", output="1\n")
+    prepare(course)
+    assert nbformat.read(course / MINE / LESSON, as_version=4).cells[0].outputs == []
 
 
 def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
-    assert prepare(course) == ["00_a.ipynb: new"]
-    write(course / MINE / "00_a.ipynb", "first = 'my answer'")
+    assert prepare(course) == [f"{LESSON}: new"]
+    write(course / MINE / LESSON, "first = 'my answer'")
     assert prepare(course) == []
-    assert source(course / MINE / "00_a.ipynb") == "first = 'my answer'"
+    assert source(course / MINE / LESSON) == "first = 'my answer'"
 
 
 def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
     prepare(course)
-    write(course / MINE / "00_a.ipynb", "first = 1", output="1\n")
-    write(course / "00_a.ipynb", "first = 2")
-    assert prepare(course) == ["00_a.ipynb: updated"]
-    assert source(course / MINE / "00_a.ipynb") == "first = 2"
+    write(course / MINE / LESSON, "first = 1", output="1\n")
+    write(course / LESSON, "first = 2")
+    assert prepare(course) == [f"{LESSON}: updated"]
+    assert source(course / MINE / LESSON) == "first = 2"
 
 
-def test_a_newer_lesson_is_laid_beside_one_that_was_written_in(course: Path) -> None:
+@pytest.mark.parametrize("forget", [False, True])
+def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forget: bool) -> None:
+    """Whichever file the learner goes on in, and also when it is not known any more what was laid."""
+    write(mine / LESSON, "first = 'my answer'")
+    for n, name in ((2, NEW), (3, NEW2)):
+        update(mine.parent, n)
+        if forget:
+            (mine / ".from.json").unlink()
+        assert f"{LESSON}: yours is kept; the course's new text is in {name}" in prepare(mine.parent)
+        assert source(mine / name) == f"first = {n}"
+        write(mine / name, f"first = 'an hour of work in {name}'")
+        (mine / "page.md").write_text("my notes")
+    update(mine.parent, 3)
+    assert prepare(mine.parent) == []
+    assert [source(mine / name)[9:-1] for name in (LESSON, NEW, NEW2)] == [
+        "my answer", f"an hour of work in {NEW}", f"an hour of work in {NEW2}",
+    ]  # fmt: skip
+    assert (mine / "page.md").read_text() == "my notes"
+
+
+def test_a_text_beside_that_nobody_wrote_in_follows_the_course_and_stays_away_once_removed(mine: Path) -> None:
+    write(mine / LESSON, "first = 'my answer'")
+    for n in (2, 3):
+        update(mine.parent, n)
+        prepare(mine.parent)
+        assert source(mine / NEW) == f"first = {n}"
+    assert files(mine) == {LESSON, NEW, "01_b.ipynb", "page.md"}
+    (mine / NEW).unlink()
+    assert prepare(mine.parent) == []
+    assert not (mine / NEW).exists()
+
+
+CHANGES: dict[str, tuple[bool, Callable[[Any], object]]] = {
+    "an attached picture": (True, lambda book: book.cells[0].update(attachments={"a.png": {"image/png": "AAAA"}})),
+    "a tag": (True, lambda book: book.cells[0].metadata.update(tags=["mine"])),
+    "a title": (True, lambda book: book.metadata.update(title="mine")),
+    "a cell": (True, lambda book: book.cells.append(new_code_cell("mine"))),
+    "another kind of cell": (True, lambda book: book.cells[0].update(cell_type="raw")),
+    "an empty cell, as after Shift+Enter": (False, lambda book: book.cells.append(new_code_cell())),
+    "a run": (False, lambda book: book.cells[0].update(execution_count=3, outputs=[new_output("stream", text="1")])),
+    "times and looks": (
+        False,
+        lambda book: book.cells[0].metadata.update(
+            execution={"iopub.status.busy": "now"}, collapsed=True, scrolled=True, trusted=True, jupyter={"source_hidden": True}
+        ),
+    ),
+    "a kernel": (False, lambda book: book.metadata.update(kernelspec={"name": "p", "display_name": "P"}, widgets={"a": 1})),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_counts_as_writing(course: Path, change: str) -> None:
+    counts, make = CHANGES[change]
     prepare(course)
-    write(course / MINE / "00_a.ipynb", "first = 'my answer'")
-    write(course / "00_a.ipynb", "first = 2")
-    assert "yours is kept" in prepare(course)[0]
-    assert source(course / MINE / "00_a.ipynb") == "first = 'my answer'"
-    assert source(course / MINE / "00_a.new.ipynb") == "first = 2"
-    assert prepare(course) == []
+    copy = course / MINE / LESSON
+    book = nbformat.read(copy, as_version=4)
+    make(book)
+    nbformat.write(book, copy)
+    before = copy.read_bytes()
+    write(course / LESSON, "first = 2")
+    prepare(course)
+    assert (copy.read_bytes() == before, (copy.parent / NEW).exists()) == (counts, counts)
 
 
-@pytest.mark.parametrize("damage", ["not json", ""])
-def test_damaged_files_cost_nothing_that_was_written(course: Path, damage: str) -> None:
-    prepare(course)
-    (course / MINE / "00_a.ipynb").write_text("half a noteb")
-    (course / MINE / ".from.json").write_text(damage)
-    prepare(course)
-    assert (course / MINE / "00_a.ipynb").read_text() == "half a noteb"
+@pytest.mark.parametrize(
+    "text",
+    [
+        "null",
+        "5",
+        "[1]",
+        '{"laid": 5}',
+        '{"laid": {}, "offered": [1]}',
+        '{"laid": {"00_a.ipynb": [1]}}',
+        "[" * 100_000,
+        "",
+        "\0",
+    ],
+)
+def test_a_damaged_memory_costs_nothing_that_was_written(mine: Path, text: str) -> None:
+    (mine / LESSON).write_text("half a noteb")
+    (mine / ".from.json").write_text(text)
+    update(mine.parent)
+    prepare(mine.parent)
+    assert (mine / LESSON).read_text() == "half a noteb"
+    assert source(mine / NEW) == source(mine / "01_b.new.ipynb") == "first = 2"
+    assert prepare(mine.parent) == []
+
+
+def linked(path: Path, to: Path) -> None:
+    path.unlink(missing_ok=True)
+    path.symlink_to(to)
+
+
+def folder(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    path.mkdir()
+
+
+OBSTACLES: dict[str, Callable[[Path], object]] = {
+    "a merge conflict in the course": lambda mine: (mine.parent / LESSON).write_text("<<<<<<< HEAD\n{}"),
+    "another form of JSON in the course": lambda mine: (mine.parent / LESSON).write_text('{"cells": [5], "metadata": null}'),
+    "a broken link in the course": lambda mine: linked(mine.parent / LESSON, mine / "nowhere"),
+    "a folder": lambda mine: folder(mine / LESSON),
+    "a broken link": lambda mine: linked(mine / LESSON, mine.parent / "nowhere.ipynb"),
+    "a memory that cannot be stored": lambda mine: folder(mine / ".from.json"),
+}
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_up_to_date(mine: Path, obstacle: str) -> None:
+    update(mine.parent)
+    OBSTACLES[obstacle](mine)
+    before = files(mine)
+    for _ in range(2):
+        (told,) = [line for line in prepare(mine.parent) if "not brought" in line or "cannot be stored" in line]
+        assert told.startswith((f"{LESSON}: ", ".from.json: "))
+    assert files(mine) - before <= {NEW, "01_b.new.ipynb", "page.new.md"}
+    texts = {path.read_text() for path in mine.glob("page*.md")}
+    assert "a page, 2" in texts
+    assert not (mine.parent / "nowhere.ipynb").exists()
+
+
+def test_nothing_is_written_through_a_link(mine: Path) -> None:
+    for name, text in ((LESSON, "1"), ("page.md", "2"), (NEW, "3")):
+        (mine.parent / text).write_text(text)
+        linked(mine / name, mine.parent / text)
+    update(mine.parent)
+    prepare(mine.parent)
+    assert [(mine.parent / text).read_text() for text in "123"] == ["1", "2", "3"]
+    assert source(mine / NEW2) == "first = 2"
+
+
+@pytest.mark.parametrize("make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")])
+def test_a_folder_that_cannot_be_is_told_in_words(course: Path, make: Callable[[Path], object]) -> None:
+    make(course / MINE)
+    with pytest.raises(InputError, match="it must be a folder"):
+        prepare(course)
+
+
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """No file can grow beyond `size` bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) -> None:
+    long = "x" * 10_000
+    write(mine.parent / LESSON, long)
+    with full_disk(5_000):  # room for the memory, none for the lesson
+        assert "not brought up to date: File too large" in prepare(mine.parent)[0]
+    assert source(mine / LESSON) == "first = 1"
+    assert files(mine) == {LESSON, "01_b.ipynb", "page.md"}
+    write(mine / LESSON, "first = 'my answer'")
+    prepare(mine.parent)
+    assert (source(mine / LESSON), source(mine / NEW)) == ("first = 'my answer'", long)
+
+
+def work(course: Path, acknowledged: int) -> None:
+    """Update the course and use it, again and again."""
+    for n in count():
+        for name in ("00_a", "01_b"):
+            write(course / "part", f"first = {n}")
+            (course / "part").replace(course / f"{name}.ipynb")
+        prepare(course)
+        progress.record("00.1", True)
+        os.write(acknowledged, b".")
+
+
+def test_a_kill_at_any_moment_loses_nothing(mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
+    write(mine / LESSON, "first = 'my answer'")
+    written, (read_end, write_end) = (mine / LESSON).read_bytes(), os.pipe()
+    for moment in np.random.default_rng(0).uniform(0.0, 0.06, KILLS):
+        process = multiprocessing.get_context("fork").Process(target=work, args=(mine.parent, write_end))
+        process.start()
+        process.join(moment)
+        process.kill()
+        process.join()
+        source(mine / "01_b.ipynb")  # is whole
+        prepare(mine.parent)
+        assert (mine / LESSON).read_bytes() == written
+        assert source(mine / "01_b.ipynb") == source(mine.parent / "01_b.ipynb")
+        assert files(mine) <= {LESSON, NEW, "01_b.ipynb", "page.md"}
+    os.close(write_end)
+    with os.fdopen(read_end, "rb") as acknowledged:
+        done = len(acknowledged.read())
+    assert done <= progress.load().get("00.1", {"tries": 0})["tries"] <= done + KILLS
+    assert source(mine / NEW) == source(mine.parent / LESSON)
+
+
+def test_two_at_once_are_both_right(mine: Path) -> None:
+    write(mine / LESSON, "first = 'my answer'")
+    for n in range(2, 12):
+        update(mine.parent, n)
+        both = [multiprocessing.get_context("fork").Process(target=prepare, args=(mine.parent,)) for _ in range(2)]
+        for process in both:
+            process.start()
+        for process in both:
+            process.join()
+        assert [process.exitcode for process in both] == [0, 0]
+        assert source(mine / "01_b.ipynb") == source(mine / NEW) == f"first = {n}"
+    assert files(mine) == {LESSON, NEW, "01_b.ipynb", "page.md"}
 
 
 def test_a_copy_is_the_notebook_as_jupyter_writes_it(course: Path, tmp_path: Path) -> None:
     """So that saving without a change changes nothing."""
     prepare(course)
-    copy, again = course / MINE / "00_a.ipynb", tmp_path / "again"
+    copy, again = course / MINE / LESSON, tmp_path / "again"
     nbformat.write(nbformat.read(copy, as_version=4), again)
     assert copy.read_text(encoding="utf-8") == again.read_text(encoding="utf-8")
 

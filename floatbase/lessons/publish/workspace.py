@@ -70,30 +70,36 @@ def without_outputs(notebook: Any) -> Any:
 
 
 class _Memory:
-    """What the course laid, name by name: a file that holds another text than one of these is the learner's.
+    """What the course laid in the learner's folder, name by name.
 
-    laid: digests of the texts that the file of this name may hold. offered: of those that the learner has got for this
-    lesson, in the copy or beside it. Where they are lost or damaged, all but the course's present text is the learner's.
-    said: a line when they cannot be stored.
+    laid: digests of all its texts that the file of this name may hold; one that holds another is the learner's. offered: the
+    newest that the learner has got for this lesson, in the copy or beside it. Where they are lost or damaged, all but the
+    course's present text is the learner's. said: a line when they cannot be stored.
     """
 
     def __init__(self, path: Path) -> None:
         self.path, self.said = path, list[str]()
         self.laid: dict[str, list[Any]] = {}
-        self.offered: dict[str, list[Any]] = {}
+        self.offered: dict[str, Any] = {}
         with suppress(OSError, *_DAMAGED):
             found = json.loads(path.read_bytes())
-            for kind, texts in (("laid", self.laid), ("offered", self.offered)):
-                texts.update((name, digests) for name, digests in found[kind].items() if isinstance(digests, list))
+            self.laid = {name: digests for name, digests in found["laid"].items() if isinstance(digests, list)}
+            self.offered = dict(found["offered"])
 
-    def remember(self, texts: dict[str, list[Any]], name: str, digest: str) -> None:
-        """Store a digest in one of the two."""
-        if digest in texts.setdefault(name, []):
-            return
-        texts[name].append(digest)
+    def remember_laid(self, name: str, digest: str) -> None:
+        if digest not in self.laid.setdefault(name, []):
+            self.laid[name].append(digest)
+            self._store()
+
+    def remember_offered(self, name: str, digest: str) -> None:
+        if self.offered.get(name) != digest:
+            self.offered[name] = digest
+            self._store()
+
+    def _store(self) -> None:
+        self.said = []
         try:
             _write(self.path, json.dumps({"laid": self.laid, "offered": self.offered}, indent=1).encode())
-            self.said = []
         except OSError as error:
             self.said = [
                 f"{self.path.name}: cannot be stored: {error.strerror}. Nothing of yours is lost, but a later update takes "
@@ -111,25 +117,25 @@ def _update(copy: Path, text: bytes, memory: _Memory) -> list[str]:
     if not is_new and not copy.is_file():
         return [f"{_FAILED.format(copy.name)}: a folder or a broken link has its name. Move {copy} away, then start again."]
     if _held(copy) == present:
-        memory.remember(memory.laid, copy.name, present)
+        memory.remember_laid(copy.name, present)
     elif memory.may_replace(copy):
         _lay(copy, text, memory)
         said = [f"{copy.name}: {'new' if is_new else 'updated'}"]
-    elif present in memory.offered.get(copy.name, []):
+    elif memory.offered.get(copy.name) == present:
         return []
     elif present not in [_held(path) for path in copy.parent.iterdir() if path.match(f"{copy.stem}.new*{copy.suffix}")]:
         names = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
         target = next(path for path in names if memory.may_replace(path))
         _lay(target, text, memory)
         said = [f"{copy.name}: yours is kept; the course's new text is in {target.name}"]
-    memory.remember(memory.offered, copy.name, present)
+    memory.remember_offered(copy.name, present)
     return said
 
 
 def _lay(target: Path, text: bytes, memory: _Memory) -> None:
     """Put a text of the course under a name that is free, or that another text of the course has."""
     # remembered first: after an interrupt in between, what was laid must not count as the learner's
-    memory.remember(memory.laid, target.name, _digest(target.name, text))
+    memory.remember_laid(target.name, _digest(target.name, text))
     _write(target, text, lambda: memory.may_replace(target))
 
 
