@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import multiprocessing
 import re
+import resource
+import threading
 import warnings
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +20,7 @@ import floatbase as fb
 from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
 
 MASS = 16.085  # kg, of go2
+TIMES = 300  # tries of each of those who record at once
 
 
 @pytest.fixture(autouse=True)
@@ -92,11 +98,78 @@ def test_progress_is_kept_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert marks == ["·", "✗", "✓"]
 
 
-def test_a_place_that_cannot_be_written_to_costs_only_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("home", ["FLOATBASE_HOME", "HOME"])
+def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str
+) -> None:
     (tmp_path / "file").write_text("")
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "file"))
+    monkeypatch.delenv("FLOATBASE_HOME")
+    monkeypatch.setenv(home, str(tmp_path / "file"))
     assert not check("00.1", 3.0).right
     assert progress.load() == {}
+
+
+def test_without_any_home_a_check_still_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setenv("FLOATBASE_HOME", "")
+    monkeypatch.setattr(Path, "home", none)
+    assert not check("00.1", 3.0).right
+    assert progress.load() == {}
+
+
+DAMAGED = (
+    "null", "5", "[1]", '"a"', "", "\0", "[" * 100_000, '{"00.1": 5}', '{"00.1": {}}', '{"00.1": {"tries": 1}}',
+    '{"00.1": {"tries": "1", "right": null}}', '{"00.1": {"tries": 1, "right": 2}}', '{"00.1": {"tries": 1e400, "right": 0}}',
+    '{"00.1": {"tries": 3, "rig',
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["progress.json", "progress.jsonl"])
+@pytest.mark.parametrize("text", DAMAGED)
+def test_damage_is_left_out_and_left_as_it_is(tmp_path: Path, name: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / name).write_text(text)
+    check("00.1", 3.0)
+    check("00.1", 9.81 * MASS)
+    assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
+    reveal("00.1")
+    show_progress()
+    assert "00.1 ✓" in capsys.readouterr().out
+    assert (tmp_path / name).read_text().startswith(text)
+
+
+def test_a_full_disk_costs_one_try(tmp_path: Path) -> None:
+    progress.record("00.1", True)
+    stored = tmp_path / "progress.jsonl"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (stored.stat().st_size + 12, before[1]))
+    try:
+        progress.record("00.1", True)  # a part of the line fits
+        progress.record("00.1", True)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    progress.record("00.1", False)
+    assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
+
+
+def record_often(name: str) -> None:
+    for _ in range(TIMES):
+        progress.record(name, True)
+
+
+@pytest.mark.parametrize("worker", [threading.Thread, multiprocessing.get_context("fork").Process])
+def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(tmp_path: Path, worker: Any) -> None:
+    older = {f"old.{i}": {"tries": 2, "right": 1} for i in range(50)}
+    (tmp_path / "progress.json").write_text(json.dumps(older, indent=1))  # as floatbase 0.2.0 wrote it
+    names = ["00.1", "00.1", "01.1"]
+    workers = [worker(target=record_often, args=(name,)) for name in names]
+    for one in workers:
+        one.start()
+    for one in workers:
+        one.join()
+    counts = {name: {"tries": n * TIMES, "right": n * TIMES} for name, n in Counter(names).items()}
+    assert progress.load() == older | counts
 
 
 def test_wrong_answers_to_00_1_get_the_hint_that_fits() -> None:
