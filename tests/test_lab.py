@@ -1,12 +1,16 @@
 """JupyterLab in a real browser: two lessons run without an error, and each of their pictures answers to its sliders.
 
+What JupyterLab saves of a lesson that was only run and looked at does not count as a learner's writing.
+
 What the lessons compute is test_notebooks' business, what all other sliders do is tests/lessons': both need no browser.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,7 +23,7 @@ import nbformat
 import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 
-from floatbase.lessons.publish import FOLDER, read, without_outputs
+from floatbase.lessons.publish import FOLDER, MINE, prepare, read
 
 LESSONS = ("00_start_here", "02_equations_of_motion")  # a robot that is simulated under the page; panels of many sliders
 IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push
@@ -58,13 +62,40 @@ SCENE = """() => {
 }"""
 
 
+# what a reader may press; none of it is writing
+LOOKS = (
+    "notebook:hide-all-cell-code", "notebook:hide-all-cell-outputs", "notebook:enable-output-scrolling",
+    "notebook:collapse-all-headings", "notebook:insert-cell-below",
+)  # fmt: skip
+SAVE = f"""async () => {{
+  for (const name of {list(LOOKS)}) await window.jupyterapp.commands.execute(name);
+  await {NOTEBOOK}.context.save();
+}}"""
+# settings of JupyterLab that make it save more than by default
+SETTINGS = {
+    "@jupyterlab/notebook-extension/tracker": {"recordTiming": True},
+    "@jupyter-widgets/jupyterlab-manager/plugin": {"saveState": True},
+}
+
+
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a JupyterLab for copies of the lessons, without outputs, so that what is seen was made here."""
-    lessons = tmp_path_factory.mktemp("lessons")
+def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A course of these lessons, prepared for a learner: without outputs, so that what is seen was made here."""
+    folder = tmp_path_factory.mktemp("course")
     for name in LESSONS:
-        nbformat.write(without_outputs(read(FOLDER / f"{name}.ipynb")), lessons / f"{name}.ipynb")
+        shutil.copy(FOLDER / f"{name}.ipynb", folder)
+    prepare(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def lab(course: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a JupyterLab for that learner."""
     home = tmp_path_factory.mktemp("home")
+    for name, setting in SETTINGS.items():
+        place = home / "lab" / "user-settings" / f"{name}.jupyterlab-settings"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(json.dumps(setting))
     environment = {**os.environ, "JUPYTER_CONFIG_DIR": str(home), "JUPYTER_DATA_DIR": str(home), "HOME": str(home)}
     log = home / "server.log"
     with log.open("w") as sink:
@@ -72,7 +103,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
             [
                 *(sys.executable, "-m", "jupyterlab", "--no-browser", "--ip=127.0.0.1", "--port=0", "--allow-root"),
                 *("--IdentityProvider.token=a-test", "--LabApp.expose_app_in_browser=True", "--LabApp.news_url=None"),
-                str(lessons),
+                str(course),
             ],
             env=environment,
             stdout=sink,
@@ -90,11 +121,13 @@ browser = browser_of_a_file
 
 
 @pytest.mark.parametrize("name", LESSONS)
-def test_a_lesson_runs_and_its_pictures_answer_to_their_sliders(lab: str, browser: Any, name: str) -> None:
+def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_counts_as_writing(
+    lab: str, course: Path, browser: Any, name: str
+) -> None:
     page = browser.new_page(viewport={"width": 1100, "height": 800})
     page.set_default_timeout(1000 * LONG)
     try:
-        page.goto(f"{lab}/lab/workspaces/{name}/tree/{name}.ipynb?token=a-test")
+        page.goto(f"{lab}/lab/workspaces/{name}/tree/{MINE}/{name}.ipynb?token=a-test")
         page.wait_for_selector(".jp-Notebook .jp-CodeCell")
         page.wait_for_function(f"() => window.jupyterapp?.shell && {NOTEBOOK}?.content")
         page.wait_for_function(KERNEL_CONNECTED)
@@ -105,6 +138,9 @@ def test_a_lesson_runs_and_its_pictures_answer_to_their_sliders(lab: str, browse
         idle = {slider for cell, sliders in panels.items() for slider in _idle_sliders(page, name, cell, sliders)}
         assert not idle, f"{name}: these sliders change nothing: {sorted(idle)}"
         assert panels
+        page.evaluate(SAVE)
+        _change(course / f"{name}.ipynb")
+        assert prepare(course) == [f"{name}.ipynb: updated"]
     finally:
         _picture(page, name, "end")
         page.evaluate("() => window.jupyterapp?.serviceManager.sessions.shutdownAll()")
@@ -158,6 +194,12 @@ def _run_all(page: Any) -> None:
             if page.evaluate(FIRST_RAN):
                 return
     raise AssertionError("the kernel ran no cell")
+
+
+def _change(lesson: Path) -> None:
+    notebook = read(lesson)
+    notebook.cells[0].source += "."
+    nbformat.write(notebook, lesson)
 
 
 def _picture(page: Any, name: str, part: str) -> None:
