@@ -1,7 +1,8 @@
 # `make lab` opens the course, `make test` checks everything, `make pages` writes the lessons as HTML. All first make .venv, from
 # the exact lock in environment.txt.
 #
-#   PYTHON=…       the Python to use, such as python3.12 or a path; without it the first of python3, python3.13, … that fits
+#   PYTHON=…       the Python to use, such as python3.12 or a path; without it that of .venv, or the first of python3, python3.13, …
+#                  that fits
 #   LAB_ARGS=…     more options for JupyterLab, such as --no-browser or --port=9000
 #   PAGES_ARGS=…   options for the pages, such as "--to DIR" or "notebooks/01_floating_base.ipynb"
 #   PYTEST_ARGS=…  more options for pytest, such as "-k friction", tests/control, "--seed 1" or "-n 4"
@@ -19,7 +20,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PROBE := import ensurepip, sys, venv, zlib; \
 	(3, 11) <= sys.version_info < (3, 14) or sys.exit(1); \
 	print("%d.%d-%x" % (*sys.version_info[:2], zlib.crc32(sys.argv[1].encode())), sys._base_executable)
-FOUND := $(shell for p in $(or $(PYTHON),python3 python3.13 python3.12 python3.11); do \
+FOUND := $(shell for p in $(or $(PYTHON),$(BIN)/python python3 python3.13 python3.12 python3.11); do \
 	"$$p" -c '$(PROBE)' "$(CURDIR)" 2>/dev/null && break; done)
 KEY := $(or $(firstword $(FOUND)),none)
 BASE := $(wordlist 2,99,$(FOUND))
@@ -36,6 +37,14 @@ WORKERS := -n 2 --dist loadfile --no-loadscope-reorder
 # how often JupyterLab saves, s; its own is every two minutes
 SAVING := {"@jupyterlab/docmanager-extension:plugin": {"autosaveInterval": 30}}
 SETTINGS := $(VENV)/share/jupyter/lab/settings
+# the course needs no language servers; looking for them ends in a long line about all that are not installed
+QUIET := --LanguageServerManager.autodetect=False
+
+# what pip says, boiled down: a line for every tenth package, and one before the long end
+PACKAGES := $(shell grep -c == environment.txt)
+PROGRESS := n=0; while read -r what which rest; do case "$$what $$which" in \
+	"Collecting "* | "Processing "*) n=$$((n + 1)); [ $$((n % 10)) != 0 ] || echo "  $$n of about $(PACKAGES) packages";; \
+	"Installing collected") echo "  unpacking them all: about a minute";; esac; done
 
 help:
 	@echo "make lab     open the course in JupyterLab"
@@ -51,7 +60,7 @@ lab: setup
 	@$(BIN)/python -m floatbase.lessons.publish workspace
 	@mkdir -p $(SETTINGS) && echo '$(SAVING)' > $(SETTINGS)/overrides.json
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
-		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
+		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(QUIET) $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
 test: setup
 	$(BIN)/ruff check .
@@ -68,13 +77,12 @@ $(VENV)/locked-$(KEY): environment.txt | python
 	@echo "Making $(VENV) with $(BASE): about 2 GB, a few minutes the first time."
 	@rm -rf $(VENV)
 	@"$(BASE)" -m venv $(VENV)
-	@$(PIP) install -q -r environment.txt
-	@$(BIN)/jupyter labextension disable $(NEWS) >/dev/null 2>&1
-	@touch $@
+	@{ PYTHONUNBUFFERED=1 $(PIP) install --progress-bar=off -r environment.txt && \
+		$(BIN)/jupyter labextension disable $(NEWS) >/dev/null 2>&1 && touch $@; } | { $(PROGRESS); }
+	@test -e $@  # the pipe above forgets whether pip failed
 
 $(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 	@$(PIP) install -q --no-deps --no-build-isolation -e .
-	@echo "Compiling the controller, once."
 	@$(BIN)/python -m floatbase compile >/dev/null
 	@touch $@
 
