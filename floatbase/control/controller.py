@@ -38,7 +38,7 @@ class WholeBodyController:
         (`floatbase.control.tick`), where tasks and contacts are the package's own. "auto" takes compiled where it can.
 
     The attribute `path` says which way runs, `path_reason` why. `problem` is what is solved. The first compiled controller ever
-    compiles for about half a minute, unless the set-up did (`python -m floatbase compile`). Later ones load what was compiled,
+    compiles for about a minute, unless the set-up did (`python -m floatbase compile`). Later ones load what was compiled,
     from the package's folder, the user's cache or NUMBA_CACHE_DIR, whichever can be written to. A state that the compiled tick
     cannot answer to the last digits, or that has no answer, is handed to the readable path, and its `Command.path` says so.
 

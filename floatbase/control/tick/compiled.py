@@ -122,7 +122,7 @@ class Compiled:
         """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it."""
         standing = self._problem.robot.standing()
         given = np.array(standing.q), np.array(standing.v), 0.0
-        with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about half a minute'}."):
+        with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."):
             try:
                 self(*given)
             except (EOFError, UnpicklingError):  # a power cut left half a file on disk: forget it, and compile again
