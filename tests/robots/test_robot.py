@@ -35,7 +35,7 @@ def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot) -> None
 
 
 def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot) -> None:
-    root = ElementTree.parse(robot.urdf).getroot()
+    root = ElementTree.fromstring(robot.urdf)
     masses = [float(mass.get("value")) for link in root.findall("link") for mass in link.findall("inertial/mass")]
     assert robot.mass == pytest.approx(sum(masses), rel=1e-9)
     assert robot.weight == pytest.approx(9.81 * sum(masses), rel=1e-9)
@@ -53,7 +53,7 @@ def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot) -> None:
 def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says_otherwise(robot) -> None:
     assert np.all(robot.torque_limits > 0)
     assert robot.torque_limits.shape == (robot.d,)
-    joints = {j.get("name"): j for j in ElementTree.parse(robot.urdf).getroot().findall("joint")}
+    joints = {j.get("name"): j for j in ElementTree.fromstring(robot.urdf).findall("joint")}
     urdf = [float(joints[name].find("limit").get("effort")) for name in robot.joint_names]
     if robot.sources["torque limits" if "torque limits" in robot.sources else "torque limit"] == "URDF":
         assert np.allclose(robot.torque_limits, urdf)

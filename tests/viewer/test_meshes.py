@@ -33,7 +33,7 @@ def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_box
     pytest.importorskip("collada", reason="the originals are read with pycollada")
     robot = load(name)
     folders = [str(folder) for folder in robot.package_dirs]
-    visuals = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.VISUAL, package_dirs=folders).geometryObjects
+    visuals = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders).geometryObjects
     pieces = urdf_visuals(robot)
     assert {(piece.joint, piece.source) for piece in pieces} == {
         (visual.parentJoint, Path(visual.meshPath).stem) for visual in visuals
