@@ -7,6 +7,7 @@ robot, splits them at creases so that edges look sharp, and merges them into one
 The file `assets/meshes/<robot>.npz` contains, for part i: `joints[i]`, its joint's name; rows
 `vertex_start[i]:vertex_start[i + 1]` of `vertices` (int16, times `steps[i]` metres, in the joint's frame) and of `colours`
 (index of `palette`, 0-255); rows `face_start[i]:face_start[i + 1]` of `faces` (indices of the part's own vertices).
+`appearance` and `moving` say which robots look like that: those for whose URDF `appearance(urdf, moving)` is the same.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 import trimesh
 
 from floatbase.robots import Robot, catalogue, load
-from floatbase.viewer import Piece, urdf_visuals
+from floatbase.viewer import Piece, appearance, urdf_visuals
 
 OUT = Path(__file__).parent / "meshes"
 FACES = 36_000  # of a robot; fewer if the file would be larger than SIZE
@@ -97,6 +98,8 @@ def write(robot: Robot, pieces: list[Piece], total: float) -> Path:
     path = OUT / f"{robot.name}.npz"
     np.savez_compressed(
         path,
+        appearance=np.array(appearance(robot.urdf, robot.joint_names)),
+        moving=np.array(robot.joint_names),
         joints=np.array([robot.model.names[joint] for joint in sorted(light)]),
         steps=np.array(steps),
         palette=np.frombuffer(b"".join(palette), np.uint8).reshape(-1, 3),

@@ -52,7 +52,7 @@ def build(description: dict) -> Contender:
 
 def _prepared(urdf: str, contacts: list[dict]) -> str:
     """The URDF without its meshes, which no torque depends on, and with a massless link at each corner of a sole."""
-    root = ET.parse(urdf).getroot()
+    root = ET.fromstring(urdf)
     for link in root.iter("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(part)

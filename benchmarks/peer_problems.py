@@ -98,7 +98,7 @@ class Problem:
         return {
             "robot": robot.name,
             "peer": self.peer,
-            "urdf": str(robot.urdf),
+            "urdf": robot.urdf,
             "joints": list(robot.joint_names),
             "armature": robot.model.armature[6:].tolist(),
             "torque_limits": robot.torque_limits.tolist(),

@@ -17,7 +17,7 @@ NO_LIMIT = 1e6  # N
 
 def build(description: dict) -> Contender:
     """The formulation and solver of a problem."""
-    model = pin.buildModelFromUrdf(description["urdf"], pin.JointModelFreeFlyer())
+    model = pin.buildModelFromXML(description["urdf"], pin.JointModelFreeFlyer())
     if list(model.names)[2:] != description["joints"]:
         raise SystemExit(f"TSID orders the joints as {list(model.names)[2:]}, the problem as {description['joints']}.")
     model.armature = np.concatenate([np.zeros(6), description["armature"]])

@@ -24,6 +24,10 @@ class UnknownNameError(FloatbaseError, KeyError):
         return str(self.args[0])
 
 
+class RobotWarning(UserWarning):
+    """A robot was loaded that cannot do what one expects of it; the message says what."""
+
+
 class InfeasibleError(FloatbaseError):
     """No point satisfies all rows of a quadratic program.
 

@@ -93,7 +93,7 @@ class AnalyticController:
         turn = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
         wrench = desired_wrench(state, a, rotational_inertia(state) @ turn)
         on_forces = wrench_objective(state, eom.contacts, *wrench) + self._bias
-        joints = -self._kp * state.difference(self._desired.q)[-eom.d :] - self._kd * state.v[-eom.d :]
+        joints = (-self._kp * state.difference(self._desired.q) - self._kd * state.v)[eom.nv - eom.d :]
         on_qdd = Quadratic.from_residual(eom.S.T, joints, self._posture)
         return on_qdd, Quadratic.from_residual(np.eye(eom.d), np.zeros(eom.d), self._torque), on_forces
 

@@ -200,10 +200,10 @@ class PostureTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
-        state, robot, zero = eom.state, eom.robot, np.zeros(eom.d)
+        state, robot, zero, joints = eom.state, eom.robot, np.zeros(eom.d), slice(eom.nv - eom.d, None)
         desired = _value("q of posture", self.q, t, (robot.nq,))
         check_unit_lengths(robot.model, "q of posture", desired, first=2 if robot.is_floating else 1)
-        return _motion_residual(self, robot.S.T, zero, zero, state.difference(desired)[-robot.d :], state.v[-robot.d :])
+        return _motion_residual(self, robot.S.T, zero, zero, state.difference(desired)[joints], state.v[joints])
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
-import xml.etree.ElementTree as ElementTree
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, positive, read_only
-from floatbase.errors import InputError, UnknownNameError, unknown_name
+from floatbase._arrays import Array, checked, positive, read_only
+from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
 from floatbase.robots.entries import CATALOGUE, Entry
-from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.robot import Foot, Robot, within_limits
+from floatbase.robots.urdf import check_urdf, model_of, read_urdf, with_locked_joints, without_bolts
 
 PLATE = (0.4, 0.03)  # width and thickness, m, of the plate on which `unbolted` lets a robot stand
 _FLIGHT_HEIGHT = 1.0  # m: where a robot without bolts and plate floats
@@ -35,6 +34,7 @@ def load(
     foot_radius: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
     posture: npt.ArrayLike | None = None,
+    locked: Sequence[str] = (),
 ) -> Robot:
     """Load a robot by name.
 
@@ -43,18 +43,25 @@ def load(
         outside the catalogue needs them.
     foot_radius: radius of the feet given as frames, m, 0 by default.
     torque_limits: one number or shape (d,), N·m; by default those of the catalogue or the URDF.
-    posture: shape (nq,), a configuration to stand in; by default the one that comes with the robot.
+    posture: shape (nq,), a configuration to stand in, of the robot before joints are locked; by default the one that comes
+        with the robot, its joints brought within their limits.
+    locked: names of joints that become fixed where the posture has them. They have no entry in q, v and τ.
 
-    Raises `UnknownNameError` with the near names, and `InputError` for feet or limits that do not fit.
+    Raises `UnknownNameError` with the near names, and `InputError` for feet, limits or a posture that do not fit, for joints
+    coupled by <mimic>, and for a robot whose inertia M is singular. Warns where the motors of a fixed-base robot are too weak
+    to hold its posture.
     """
     import example_robot_data as data
 
     loader, entry = _loader(name, data.robots_loader.ROBOTS), CATALOGUE.get(name, Entry(""))
-    urdf = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
-    root = Path(data.getModelPath(urdf)).resolve()
-    model = _model(root / urdf, loader.free_flyer)
+    path = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
+    root = Path(data.getModelPath(path)).resolve()
+    urdf = read_urdf(root / path)
+    model = model_of(urdf, loader.free_flyer)
     srdf = root / loader.path / loader.srdf_subpath / loader.srdf_filename if loader.srdf_filename else None
     start = _reference(model, loader, srdf, entry)  # also where a posture is given: it reads the inertia of rotors
+    if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
+        start = _as_loaded(name, loader, model)
     if feet is None:
         if foot_radius is not None:
             raise InputError("foot_radius goes with feet=[…]: the catalogue's feet have their own radius.")
@@ -64,17 +71,20 @@ def load(
                 f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
                 f"Its limbs end with {', '.join(_limb_ends(model))}."
             )
-    return Robot(
-        name=name,
-        model=model,
-        urdf=root / urdf,
+    robot = _robot(
+        name,
+        urdf,
+        model,
+        start if posture is None else posture,
+        locked,
+        entry.torque_limit if torque_limits is None else torque_limits,
         package_dirs=(root.parent.parent, root),
         feet=entry.feet if feet is None else _feet(feet, foot_radius),
-        torque_limits=_torque_limits(model, loader.free_flyer, entry.torque_limit if torque_limits is None else torque_limits),
-        posture=start if posture is None else posture,  # type: ignore[arg-type]  # Robot checks it
         description=entry.description,
         sources=entry.sources,
     )
+    _warn_of_weak_motors(robot)
+    return robot
 
 
 def load_urdf(
@@ -87,39 +97,35 @@ def load_urdf(
     foot_radius: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
     posture: npt.ArrayLike | None = None,
+    locked: Sequence[str] = (),
 ) -> Robot:
-    """Load a robot of your own from a URDF file.
+    """Load a robot of your own from a URDF.
 
-    path: of the URDF file.
-    name: the file's name without its ending by default.
+    path: of the URDF file, or the URDF's text itself, such as `robot.urdf`.
+    name: the file's name without its ending, or "robot" of a text, by default.
     floating: whether the root link is free to move.
     package_dirs: where meshes named package://… lie; the file's own folder is always searched.
-    feet, foot_radius, torque_limits, posture: as for `load`; the posture is that of all joints at zero by default.
+    feet, foot_radius, torque_limits, locked: as for `load`.
+    posture: as for `load`; that of all joints at zero, or at the limit that is nearest to it, by default.
 
-    Raises `InputError` for a file that is not there or cannot be read, and for planar and floating joints inside the robot.
+    Raises `InputError` for a file that is not there or cannot be read, for planar and floating joints inside the robot, and
+    as `load` does.
     """
-    urdf = Path(path).expanduser().resolve()
-    if not urdf.is_file():
-        raise InputError(f"there is no file {urdf}; give the path of a URDF file.")
+    text, folders = str(path), tuple(Path(folder) for folder in package_dirs)
+    name = name or ("robot" if text.lstrip().startswith("<") else Path(text).stem)
+    if not text.lstrip().startswith("<"):
+        file = Path(path).expanduser().resolve()
+        if not file.is_file():
+            raise InputError(f"there is no file {file}; give the path of a URDF file.")
+        text, folders = read_urdf(file), (*folders, file.parent)
     try:
-        model = _model(urdf, floating)
+        model = model_of(text, floating)
     except (RuntimeError, ValueError) as error:
-        raise InputError(f"Pinocchio cannot read {urdf.name} as a URDF: {error}") from None
-    for joint in list(model.joints)[2 if floating else 1 :]:
-        if joint.nv != 1:
-            raise InputError(
-                f"joint {model.names[joint.id]!r} of {urdf.name} moves in {joint.nv} ways; a motor drives one. Make it "
-                "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
-            )
-    return Robot(
-        name=urdf.stem if name is None else name,
-        model=model,
-        urdf=urdf,
-        package_dirs=(*(Path(folder) for folder in package_dirs), urdf.parent),
-        feet=_feet(feet, foot_radius),
-        torque_limits=_torque_limits(model, floating, torque_limits),
-        posture=pin.neutral(model) if posture is None else posture,  # type: ignore[arg-type]  # Robot checks it
-    )
+        raise InputError(f"Pinocchio cannot read {name} as a URDF: {error}") from None
+    start = within_limits(model, pin.neutral(model)) if posture is None else posture
+    robot = _robot(name, text, model, start, locked, torque_limits, package_dirs=folders, feet=_feet(feet, foot_radius))
+    _warn_of_weak_motors(robot)
+    return robot
 
 
 def unbolted(robot: Robot, plate: bool = False) -> Robot:
@@ -132,14 +138,11 @@ def unbolted(robot: Robot, plate: bool = False) -> Robot:
     """
     if robot.is_floating:
         raise InputError(f"{robot.name} has no bolts; unbolted takes a robot with a fixed base, such as ur5.")
-    tree = ElementTree.parse(robot.urdf).getroot()
-    for element in [*tree.findall("link[@name='world']"), *tree.findall("joint/parent[@link='world']/..")]:
-        tree.remove(element)
-    urdf = Path(tempfile.mkdtemp(dir=_scratch().name)) / f"{robot.name}.urdf"
-    urdf.write_text(ElementTree.tostring(tree, encoding="unicode"), encoding="utf-8")
+    loose = load_urdf(
+        without_bolts(robot.urdf), name=robot.name, package_dirs=robot.package_dirs, torque_limits=robot.torque_limits
+    )
     width, thick = PLATE
     corners = np.array([[x * width, y * width, -thick] for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))])
-    loose = load_urdf(urdf, name=robot.name, package_dirs=robot.package_dirs, torque_limits=robot.torque_limits)
     return replace(
         loose,
         feet=(Foot(loose.base, corners=corners),) if plate else (),
@@ -147,14 +150,49 @@ def unbolted(robot: Robot, plate: bool = False) -> Robot:
     )
 
 
-@cache
-def _scratch() -> tempfile.TemporaryDirectory[str]:
-    """A folder that goes when Python ends."""
-    return tempfile.TemporaryDirectory(prefix="floatbase-")
+def _robot(
+    name: str,
+    urdf: str,
+    model: pin.Model,
+    posture: npt.ArrayLike,
+    locked: Sequence[str],
+    torque_limits: npt.ArrayLike | None,
+    **others: Any,
+) -> Robot:
+    """A robot of a URDF's text and of the model read from it, after joints are locked and what cannot be held is refused."""
+    if isinstance(locked, str):
+        raise InputError(f'locked must be a list of joints, as in locked=["{locked}"].')
+    floating = model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
+    if locked:
+        q = checked("posture", posture, (model.nq,))
+        joints = list(model.names)[2 if floating else 1 :]
+        for joint in locked:
+            if joint not in joints:
+                raise unknown_name(f"joint of {name}", joint, joints, "Those that are fixed already need no lock.")
+        urdf = with_locked_joints(urdf, model, q, locked)
+        model.referenceConfigurations["to lock in"] = np.array(q)
+        model = pin.buildReducedModel(model, [model.getJointId(joint) for joint in locked], np.array(q))
+        posture = model.referenceConfigurations["to lock in"]
+    check_urdf(name, urdf, model)
+    if torque_limits is None:
+        effort = np.array(model.effortLimit)[6 if floating else 0 :]
+        torque_limits = np.where(effort > 0, effort, np.inf)  # 0 stands for unknown
+    return Robot(name, model, urdf, posture=posture, torque_limits=torque_limits, **others)  # type: ignore[arg-type]  # it checks
 
 
-def _model(urdf: Path, floating: bool) -> pin.Model:
-    return pin.buildModelFromUrdf(str(urdf), *([pin.JointModelFreeFlyer()] if floating else []))
+def _warn_of_weak_motors(robot: Robot) -> None:
+    """Warn the caller's caller where a fixed base's motors cannot hold the arm in its posture: it will sink."""
+    if robot.is_floating:
+        return
+    gravity = np.abs(pin.computeGeneralizedGravity(robot.model, robot.model.createData(), np.array(robot.posture)))
+    weak = [
+        f"{joint} needs {needed:.3g} and has {limit:.3g}"
+        for joint, needed, limit in zip(robot.joint_names, gravity, robot.torque_limits, strict=True)
+        if needed > limit
+    ]
+    if weak:
+        text = f"{robot.name} sinks: its motors are too weak to hold its posture against gravity, N·m: {', '.join(weak)}."
+        warnings.warn(text, RobotWarning, stacklevel=3)
 
 
 def _loader(name: str, known: Mapping[str, Any]) -> Any:
@@ -182,13 +220,26 @@ def _reference(model: pin.Model, loader: Any, srdf: Path | None, entry: Entry) -
         q = np.array({found.key(): found.data() for found in model.referenceConfigurations}.get(loader.ref_posture, q))
     for joint, angle in entry.joints.items():
         q[model.idx_qs[model.getJointId(joint)]] = angle
-    return read_only(pin.normalize(model, q))
+    return within_limits(model, pin.normalize(model, q))
 
 
-def _torque_limits(model: pin.Model, floating: bool, requested: npt.ArrayLike | None) -> Any:
-    """Requested limits, which Robot checks, or those of the URDF's joints, where 0 stands for unknown."""
-    effort = np.array(model.effortLimit)[6 if floating else 0 :]
-    return np.where(effort > 0, effort, np.inf) if requested is None else requested
+def _as_loaded(name: str, loader: Any, model: pin.Model) -> Array:
+    """The posture of a loader that changes the model after reading the URDF; `InputError` where that is another robot then.
+
+    A loader may turn the world under a free base (human): the posture takes that turn, since our q is the base in the world.
+    """
+    own = loader().robot
+    first = 2 if loader.free_flyer else 1
+    parts = [(m.nv, m.inertias.tolist(), m.jointPlacements.tolist()[first:]) for m in (own.model, model)]
+    if parts[0] != parts[1]:
+        raise InputError(
+            f"example-robot-data makes {name} from {loader.urdf_filename} by changing it after reading: {own.model.nv} of "
+            f"{model.nv} velocities stay. floatbase takes URDFs as they are: load the whole robot, hold joints with locked=[…]."
+        )
+    q = np.array(own.q0)
+    if loader.free_flyer:
+        q[:7] = pin.SE3ToXYZQUAT(own.model.jointPlacements[1] * pin.XYZQUATToSE3(q[:7]))
+    return within_limits(model, q)
 
 
 def _limb_ends(model: pin.Model) -> list[str]:

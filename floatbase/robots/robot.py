@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from floatbase.robots.state import State
 
 UNIT_LENGTH_TOLERANCE = 1e-6  # quaternions printed with seven digits pass; normalising what is further off could hide a fault
+_LIMIT_ERROR = 1e-6  # rad or m: angles printed with seven digits pass
+_SINGULAR = 1e-10  # least eigenvalue of M scaled to a diagonal of ones: robots have 1e-3 and more, rounding leaves 1e-15
+_SHARE = 0.05  # part in a motion without inertia from which a joint is named
 _AREA_TOLERANCE = 1e-6  # m: corners nearer to one line than this span no area; feet are measured to 0.1 mm
 
 
@@ -60,17 +63,20 @@ class Robot:
 
     name: as it was loaded.
     model: the Pinocchio model; q = (base position [m, world], base quaternion x y z w, joints), or joints alone.
-    urdf, package_dirs: the file, and where its meshes named package://… lie.
+    urdf: the text of the URDF; the physics and the pictures are made from it.
+    package_dirs: where its meshes named package://… lie.
     feet: where it can touch the ground.
     torque_limits: shape (d,), N·m (N for prismatic joints), +inf where none is known.
-    posture: shape (nq,), a configuration to stand in, before the feet are put on the ground.
+    posture: shape (nq,), a configuration to stand in, before the feet are put on the ground; joints within their limits.
     description: what it is for.
     sources: where the numbers come from that are not the URDF's.
+
+    Raises `InputError` for what does not fit, for a robot that nothing moves, and for one whose M (1) is singular.
     """
 
     name: str
     model: pin.Model
-    urdf: Path
+    urdf: str
     package_dirs: tuple[Path, ...]
     feet: tuple[Foot, ...]
     torque_limits: Array
@@ -84,6 +90,36 @@ class Robot:
         object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
         for foot in self.feet:
             self.frame_id(foot.frame)
+        self._check_limits()
+        self._check_inertia()
+
+    def _check_limits(self) -> None:
+        """Raise `InputError` for a posture that joint limits do not allow."""
+        joints, at, low, high = joint_limits(self.model)
+        for joint, x, least, most in zip(joints, self.posture[at], low, high, strict=True):
+            if not least - _LIMIT_ERROR <= x <= most + _LIMIT_ERROR:
+                limits = f"its limits are {least:.6g} and {most:.6g}"
+                raise InputError(
+                    f"the posture of {self.name} has {self.model.names[int(joint)]} at {x:.6g}; {limits} (rad, or m)."
+                )
+
+    def _check_inertia(self) -> None:
+        """Raise `InputError` for a robot that has no mass, or that (1) cannot be solved for q̈ of."""
+        if self.nv == 0:
+            raise InputError(f"nothing of {self.name} moves: its base is fixed, and so are all its joints.")
+        if not 0.0 < self.mass < np.inf:
+            raise InputError(f"{self.name} has a mass of {self.mass:g} kg; give its links <inertial> in the URDF.")
+        M = pin.crba(self.model, self.model.createData(), np.array(self.posture))
+        size = np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
+        values, vectors = np.linalg.eigh(M / np.outer(size, size))
+        part = np.abs(vectors[:, values < _SINGULAR]).max(axis=1, initial=0.0)
+        names = [*["its base"] * (self.nv - self.d), *self.joint_names]
+        light = list(dict.fromkeys(name for name, share in zip(names, part, strict=True) if share > _SHARE))
+        if light:
+            raise InputError(
+                f"{self.name} has a singular inertia M (1) in its posture: {', '.join(light)} can accelerate without moving "
+                "any mass. Give the links there mass and inertia, or hold such joints still with locked=[…]."
+            )
 
     @cached_property
     def is_floating(self) -> bool:
@@ -191,13 +227,36 @@ class Robot:
         """
         rng, standing = np.random.default_rng(seed), self.standing()
         spread = positive("spread", spread, allow_zero=True)
-        q = standing.integrate(rng.uniform(-spread, spread, self.nv))
-        q = np.clip(q, self.model.lowerPositionLimit, self.model.upperPositionLimit)
+        q = np.array(standing.integrate(rng.uniform(-spread, spread, self.nv)))
+        _, at, low, high = joint_limits(self.model)
+        q[at] = np.clip(q[at], low, high)
         return standing.replace(q, spread * rng.standard_normal(self.nv))
 
     def __repr__(self) -> str:
         base = "floating" if self.is_floating else "fixed"
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
+
+
+def joint_limits(model: pin.Model) -> tuple[Array, Array, Array, Array]:
+    """The joints that have limits: Pinocchio's numbers, places in q, lower and upper limits, rad or m, shape (n,) each.
+
+    Equal limits, such as the 0 and 0 of a URDF that does not say, are none, as for MuJoCo.
+    """
+    joints = np.array([i for i in range(1, model.njoints) if model.nqs[i] == 1], dtype=int)
+    at = np.array(model.idx_qs)[joints]
+    low, high = model.lowerPositionLimit[at], model.upperPositionLimit[at]
+    limited = low < high
+    return joints[limited], at[limited], low[limited], high[limited]
+
+
+def within_limits(model: pin.Model, q: Array) -> Array:
+    """A configuration with its joints within their limits: by whole turns where that will do, else at the nearest limit."""
+    joints, at, low, high = joint_limits(model)
+    inside, x = np.array(q), q[at]
+    turned = x + 2.0 * np.pi * np.ceil((low - x) / (2.0 * np.pi))  # the least angle above the lower limit
+    turns = np.array([model.joints[joint].shortname().startswith("JointModelR") for joint in joints.tolist()], dtype=bool)
+    inside[at] = np.where(turns & ((x < low) | (x > high)) & (turned <= high), turned, np.clip(x, low, high))
+    return read_only(inside)
 
 
 def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", first: int = 1) -> None:

@@ -8,7 +8,7 @@ import pinocchio as pin
 from floatbase._arrays import Array, checked
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
-from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.robot import Foot, Robot, joint_limits
 from floatbase.robots.state import State
 
 _TOLERANCE = 1e-11  # m and rad: a hundred roundings of a robot of 1 m
@@ -24,17 +24,29 @@ def stand(robot: Robot, height: float | None = None) -> State:
         return posture
     q = posture.q.copy()
     q[2] = height if height is not None else q[2] - min(_sole_height(posture, foot) for foot in robot.feet)
-    state = State(robot, q)
+    state, (joints, at, low, high) = State(robot, q), joint_limits(robot.model)
+    in_v = np.array(robot.model.idx_vs)[joints]
     for _ in range(_STEPS):
         error, J = _gap(state, posture, height)
         remains = np.max(np.abs(error))
         if remains < _TOLERANCE:
             return state
-        step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
-        state = State(robot, pin.integrate(robot.model, state.q, np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)))
+        held = np.zeros(len(joints), dtype=bool)  # joints at a limit that the step would take beyond it
+        while True:
+            step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
+            more = ~held & ((state.q[at] <= low) & (step[in_v] < 0.0) | (state.q[at] >= high) & (step[in_v] > 0.0))
+            if not np.any(more):
+                break
+            held |= more
+            J[:, in_v[held]] = 0.0
+        q = pin.integrate(robot.model, state.q, np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
+        q[at] = np.clip(q[at], low, high)
+        state = State(robot, q)
     where = "" if height is None else f" with its base {height:g} m above it"
+    ends = [f"{robot.model.names[joint]} at {x:.3g}" for joint, x in zip(joints[held].tolist(), state.q[at[held]], strict=True)]
+    reason = f", with joints at their limits: {', '.join(ends)}" if ends else ""
     advice = "Ask for another height, or load it with another posture."
-    raise InputError(f"{robot.name} cannot put all its feet on the ground{where}: {remains:.2g} m remain. {advice}")
+    raise InputError(f"{robot.name} cannot put all its feet on the ground{where}: {remains:.2g} m remain{reason}. {advice}")
 
 
 def _gap(state: State, posture: State, height: float | None) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-Only the ground's plane and balls at the feet touch. An inertia that MuJoCo refuses goes to the link that its link is welded to.
+Only the ground's plane and balls at the feet touch. Links that are welded together are one body, which has all their inertia.
 """
 
 from __future__ import annotations
@@ -72,10 +72,10 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     try:
         model = spec.compile()
     except ValueError as error:
-        raise SimulationError(f"MuJoCo cannot build {robot.name} from {robot.urdf.name}: {error}") from None
+        raise SimulationError(f"MuJoCo cannot build {robot.name}: {error}") from None
     if model.nv != robot.nv:
         raise SimulationError(
-            f"MuJoCo finds {model.nv} degrees of freedom in {robot.urdf.name}, the robot has {robot.nv}: "
+            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, which has {robot.nv}: "
             "its model was changed after it was read from the URDF."
         )
     return model
@@ -87,8 +87,8 @@ def body_name(link: str) -> str:
 
 
 def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
-    """The URDF as MuJoCo reads it, welded links fused into one body, every inertia one that MuJoCo accepts."""
-    root = ElementTree.parse(robot.urdf).getroot()
+    """The URDF as MuJoCo reads it, welded links fused into one body."""
+    root = ElementTree.fromstring(robot.urdf)
     if robot.is_floating:
         for link in root.findall("link"):
             link.set("name", body_name(link.get("name", "")))
@@ -100,51 +100,44 @@ def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
     try:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
     except ValueError as error:
-        raise SimulationError(f"MuJoCo cannot read {robot.urdf.name}: {error}") from None
+        raise SimulationError(f"MuJoCo cannot read {robot.name}: {error}") from None
     spec.compiler.fusestatic = True
-    for body in spec.bodies:
-        if not _has_valid_inertia(body):
-            _move_inertia_to_neighbour(body)
+    bodies = spec.bodies[1:]  # the first is the world
+    totals = {body.name: _fused(body) for body in bodies if body.joints or (robot.is_floating and body.parent.name == "world")}
+    for body in bodies:
+        total = totals.get(body.name, pin.Inertia.Zero())
+        if body.name in totals:
+            _check_inertia(robot, body.name, total)
+        tensor, body.explicitinertial = total.inertia, body.name in totals
+        body.mass, body.ipos, body.iquat = total.mass, total.lever, [1.0, 0.0, 0.0, 0.0]
+        diagonal = tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]  # MuJoCo's word for none
+        body.fullinertia = [*diagonal, tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return spec
 
 
-def _inertia(body: mujoco.MjsBody) -> pin.Inertia:
-    """A body's inertia in its own frame, as the URDF gives it."""
-    ixx, iyy, izz, ixy, ixz, iyz = body.fullinertia
-    tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
-    inertia = pin.Inertia.Zero()  # the constructor refuses tensors that are not positive definite, which are looked for here
-    inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), R @ tensor @ R.T
-    return inertia
+def _fused(body: mujoco.MjsBody) -> pin.Inertia:
+    """The inertia of a body and of all that is welded to it from below, in its own frame, as the URDF gives it."""
+    total = pin.Inertia.Zero()  # the constructor refuses tensors that are not positive definite, and a sum may mend them
+    if body.explicitinertial:  # else the URDF gives none
+        ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(body.fullinertia)  # MuJoCo notes NaN for a tensor of zeros
+        R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
+        tensor = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
+        total.mass, total.lever, total.inertia = float(body.mass), np.array(body.ipos), tensor
+    for child in body.bodies:
+        if not child.joints:
+            total = total + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(_fused(child))
+    return total
 
 
-def _has_valid_inertia(body: mujoco.MjsBody) -> bool:
-    """Whether some mass distribution has this inertia: principal values positive, none larger than the two others' sum."""
-    if not np.isfinite(body.fullinertia[0]):
-        return True  # the URDF gives none
-    smallest, middle, largest = np.linalg.eigvalsh(_inertia(body).inertia)
-    return bool(smallest > _SMALLEST_INERTIA and smallest + middle >= largest * (1.0 - _ROUNDING))
-
-
-def _move_inertia_to_neighbour(body: mujoco.MjsBody) -> None:
-    """Add a link's invalid inertia to that of the heaviest link welded to it: the robot moves by their sum alone."""
-    welded = [(child, _placement(child).inverse()) for child in body.bodies if not child.joints]
-    if not body.joints and body.parent.name != "world":
-        welded.append((body.parent, _placement(body)))
-    neighbours = [found for found in welded if np.isfinite(found[0].fullinertia[0])]
-    if not neighbours:
-        return  # MuJoCo names the body when it compiles
-    neighbour, placement = max(neighbours, key=lambda found: float(found[0].mass))
-    total = _inertia(neighbour) + placement.act(_inertia(body))
-    tensor = total.inertia
-    neighbour.mass, neighbour.ipos, neighbour.iquat = total.mass, total.lever, [1.0, 0.0, 0.0, 0.0]
-    neighbour.fullinertia = [*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-    body.mass, body.fullinertia, body.explicitinertial = 0.0, [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], False
-
-
-def _placement(body: mujoco.MjsBody) -> pin.SE3:
-    """A body's frame in its parent's."""
-    return pin.SE3(rotation_matrix(body.quat), np.array(body.pos))
+def _check_inertia(robot: Robot, link: str, total: pin.Inertia) -> None:
+    """Raise `SimulationError` for an inertia that no mass distribution has, or none at all."""
+    smallest, middle, largest = np.linalg.eigvalsh(total.inertia)
+    if not (total.mass > 0.0 and smallest > _SMALLEST_INERTIA and smallest + middle >= largest * (1.0 - _ROUNDING)):
+        raise SimulationError(
+            f"MuJoCo cannot move link {link!r} of {robot.name}: with all that is welded to it, it has {total.mass:.4g} kg and "
+            f"principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} kg m². They must be above zero, and none above "
+            "the sum of the two others. Correct the URDF, or weld the link to the next one with locked=[…] of fb.load."
+        )
 
 
 def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:

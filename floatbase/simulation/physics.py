@@ -28,6 +28,8 @@ _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the
 class Push:
     """A force on the robot for a while.
 
+    A timestep that the push covers in part gets that part of the force: its impulse is force times duration.
+
     force: (3,) N, world, at the origin of the frame.
     start, duration: s, on the simulation's clock.
     frame: name of a frame of the robot; "base" is the base link.
@@ -44,8 +46,13 @@ class Push:
         object.__setattr__(self, "duration", positive("duration of the push", self.duration, "s"))
 
     def acts_at(self, t: float) -> bool:
-        """Whether the push acts in the step that begins at t, s."""
+        """Whether the push acts at t, s."""
         return self.start - _CLOCK_ERROR <= t < self.start + self.duration - _CLOCK_ERROR
+
+    def share(self, t: float, timestep: float) -> float:
+        """The part of the step from t to t + timestep, s, in which the push acts: 0 to 1."""
+        acting = min(self.start + self.duration, t + timestep) - max(self.start, t)
+        return max(0.0, acting) / timestep
 
 
 class Simulation:
@@ -145,8 +152,9 @@ class Simulation:
         self.data.ctrl[self._motors] = tau
         self.data.xfrc_applied[:] = 0.0
         for push in pushes:
-            if push.acts_at(self.data.time):
-                self._apply(push)
+            share = push.share(self.data.time, self.timestep)
+            if share > 0.0:
+                self._apply(push, share * push.force)
         mujoco.mj_step(self.model, self.data)
 
     def torques(self) -> Array:
@@ -178,12 +186,12 @@ class Simulation:
         held = f"{self.robot.name} is bolted to the ground there"
         raise InputError(f"a push at {push.frame!r} moves nothing: {held}. Push a link that moves: {moving}.")
 
-    def _apply(self, push: Push) -> None:
-        """Add a push at its frame's origin: MuJoCo takes it at the body's centre of mass."""
+    def _apply(self, push: Push, force: Array) -> None:
+        """Add a force at the origin of a push's frame: MuJoCo takes it at the body's centre of mass."""
         frame, body = self.robot.model.frames[self.robot.frame_id(push.frame)], self.pushed_body(push)
         at = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ frame.placement.translation
-        self.data.xfrc_applied[body, :3] += push.force
-        self.data.xfrc_applied[body, 3:] += cross(at - self.data.xipos[body], push.force)
+        self.data.xfrc_applied[body, :3] += force
+        self.data.xfrc_applied[body, 3:] += cross(at - self.data.xipos[body], force)
 
     def _standing(self) -> State:
         """The robot standing on the ground; on a slope turned with it, so that every foot touches."""

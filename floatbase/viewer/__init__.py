@@ -22,7 +22,7 @@ from floatbase.viewer.colours import (
     hexadecimal,
 )
 from floatbase.viewer.figures import FIGURES
-from floatbase.viewer.meshes import robot_meshes
+from floatbase.viewer.meshes import appearance, robot_meshes
 from floatbase.viewer.painter import below
 from floatbase.viewer.recording import push_at
 from floatbase.viewer.shapes import Item, Picture
@@ -51,6 +51,7 @@ __all__ = [
     "View",
     "Viewer",
     "Window",
+    "appearance",
     "below",
     "geometry",
     "hexadecimal",

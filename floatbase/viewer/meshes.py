@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +37,44 @@ class JointMesh:
 
 def robot_meshes(robot: Robot) -> list[JointMesh]:
     """The meshes of a robot, one for each joint that moves something visible. Fixed parts belong to joint 0, the world."""
-    asset = assets_root() / "meshes" / f"{robot.name}.npz"
-    if asset.is_file():
+    asset = _asset(robot.urdf)
+    if asset is not None:
         return _by_joint([mesh for part in _parts(asset) for mesh in _placed(robot, *part)])
     try:
         meshes = _from_urdf(robot)
     except (ImportError, ValueError, OSError):  # no trimesh, or files that it or Pinocchio cannot read
         meshes = []
     return meshes or _from_tree(robot)
+
+
+def appearance(urdf: str, moving: Collection[str]) -> str:
+    """What light meshes are made from, as a digest of a URDF's text: the visuals of its links, and how these are welded.
+
+    moving: names of the joints that move in the robot of the light meshes. Where these are plays no part, nor do bolts: a robot
+    looks the same with joints locked, and without its link "world".
+    """
+    root, looks = ElementTree.fromstring(urdf), ElementTree.Element("looks")
+    looks.extend(root.findall("material"))
+    for link in root.findall("link"):
+        ElementTree.SubElement(looks, "link", name=link.get("name", "")).extend(link.findall("visual"))
+    for joint in root.findall("joint"):
+        places = [] if joint.get("name") in moving else joint.findall("origin")
+        ends = [*joint.findall("parent"), *joint.findall("child")]
+        ElementTree.SubElement(looks, "joint", name=joint.get("name", "")).extend([*ends, *places])
+    for bolt in [*looks.findall("link[@name='world']"), *looks.findall("joint/parent[@link='world']/..")]:
+        looks.remove(bolt)
+    return sha256(ElementTree.canonicalize(ElementTree.tostring(looks), strip_text=True).encode()).hexdigest()
+
+
+@lru_cache(maxsize=32)
+def _asset(urdf: str) -> Path | None:
+    """The file of light meshes that were made from such a URDF; None without one."""
+    for asset in sorted((assets_root() / "meshes").glob("*.npz")):
+        with np.load(asset) as file:
+            moving = set(file["moving"].tolist())
+            if all(name in urdf for name in moving) and appearance(urdf, moving) == file["appearance"]:
+                return asset
+    return None
 
 
 Part = tuple[str, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[np.uint8]]

@@ -49,7 +49,7 @@ def urdf_visuals(robot: Robot) -> list[Piece]:
     folders = [str(folder) for folder in robot.package_dirs]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        geometry = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.VISUAL, package_dirs=folders)
+        geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders)
     return [piece for item in geometry.geometryObjects for piece in _pieces(item)]
 
 

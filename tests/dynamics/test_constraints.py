@@ -167,7 +167,7 @@ def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls
 def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_bolts_carry_that_robots_base_wrench() -> None:
     robot = judges.load("go2")
     rng = np.random.default_rng(0)
-    model = pin.buildModelFromUrdf(str(robot.urdf))
+    model = pin.buildModelFromXML(robot.urdf)
     model.armature = np.array(robot.model.armature)[6:]
     for seed in range(3):
         state = robot.random_state(seed)

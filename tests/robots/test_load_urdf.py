@@ -1,17 +1,22 @@
-"""Robots of one's own: the models that come with the course, and what is said when a file cannot be used."""
+"""URDFs: models of one's own, joints held still, robots as example-robot-data has them, and what cannot be used."""
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
+import example_robot_data
 import judges
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.errors import InputError
+from floatbase.errors import InputError, RobotWarning
 from floatbase.robots import PLATE, unbolted
 
+LOADERS = example_robot_data.robots_loader.ROBOTS
+CHANGED = [name for name, loader in LOADERS.items() if loader.__init__ is not example_robot_data.utils.RobotLoader.__init__]
 MODELS = sorted((Path(__file__).parents[2] / "assets" / "models").glob("*.urdf"))
 
 
@@ -45,22 +50,110 @@ def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand
         unbolted(judges.load("go2"))
 
 
+@pytest.mark.parametrize("name", [*judges.ROBOTS, *CHANGED])
+def test_a_robot_is_the_one_of_example_robot_data_or_is_refused(name: str) -> None:
+    """CHANGED are those whose loaders change the model after reading it: they cut links, or turn the world under the base."""
+    theirs = example_robot_data.load(name).model
+    try:
+        ours = fb.load(name, feet=[])
+    except InputError as error:
+        assert name in CHANGED and any(word in str(error) for word in ("by changing it after reading", "are coupled"))
+        return
+    state, data = ours.random_state(0), theirs.createData()
+    q = np.array(state.q)
+    if ours.is_floating:  # where the base is in the world comes from all that lies below it
+        q[:7] = pin.SE3ToXYZQUAT(theirs.jointPlacements[1].inverse() * pin.XYZQUATToSE3(q[:7]))
+    assert judges.relative(state.M, pin.crba(theirs, data, q)) < 1e-12
+    assert judges.relative(state.h, pin.nle(theirs, data, q, np.array(state.v))) < 1e-12
+
+
+def test_a_person_stands_upright() -> None:
+    state = fb.load("human", feet=[]).standing()
+    head, pelvis = state.point("middle_head"), state.point("middle_pelvis")
+    assert head[2] - pelvis[2] > 0.9 * np.linalg.norm(head - pelvis)
+
+
+@pytest.mark.parametrize(
+    ("name", "locked"),
+    [
+        ("talos", ["torso_1_joint", "arm_left_1_joint", "arm_left_4_joint", "leg_right_4_joint"]),
+        ("kinova", ["j2s6s200_joint_1", "j2s6s200_joint_3"]),  # the first turns without limit
+        ("panda", ["panda_finger_joint1", "panda_finger_joint2"]),  # fingers that slide; the second mimics the first
+    ],
+)
+def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(name: str, locked: list[str]) -> None:
+    """M and h are those of the whole robot for the joints that move, to MuJoCo too, which reads the changed URDF itself."""
+    robot, theirs = fb.load(name, locked=locked), example_robot_data.load(name)
+    state, whole = robot.random_state(0), theirs.model
+    q, v, kept = np.array(theirs.q0), np.zeros(whole.nv), []
+    for i, joint in list(enumerate(whole.names))[1:]:
+        if joint not in locked:
+            own = robot.model.getJointId(joint)
+            q[whole.idx_qs[i] :][: whole.nqs[i]] = state.q[robot.model.idx_qs[own] :][: whole.nqs[i]]
+            v[whole.idx_vs[i] :][: whole.nvs[i]] = state.v[robot.model.idx_vs[own] :][: whole.nvs[i]]
+            kept += range(whole.idx_vs[i], whole.idx_vs[i] + whole.nvs[i])
+    data, judge = whole.createData(), judges.Mujoco(robot).move_to(state)
+    assert robot.nv == whole.nv - len(locked) == len(kept) and judge.model.neq == 0
+    for M, h in ((pin.crba(whole, data, q)[np.ix_(kept, kept)], pin.nle(whole, data, q, v)[kept]), (judge.M, judge.h)):
+        assert judges.relative(state.M, M) < 1e-9
+        assert judges.relative(state.h, h) < 1e-9
+
+
+def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(fb.load("ur5").urdf, encoding="utf-8")
+    arm = fb.load_urdf(file, floating=False)
+    file.write_text("<robot/>")
+    state = pickle.loads(pickle.dumps(unbolted(arm))).random_state(0)
+    assert judges.relative(state.M, judges.Mujoco(state.robot).move_to(state).M) < 1e-9
+
+
+LIMIT = '<limit effort="5" velocity="9" lower="0.5" upper="2"/>'
+
+
+def two_links(mass: object = 1.0, iyy: object = 1.0, joint: str = "elbow", kind: str = "revolute", extra: str = LIMIT) -> str:
+    """A URDF: a base of 1 kg, and a link that a joint moves."""
+    link = '<link name="{}"><inertial><mass value="{}"/><inertia ixx="1" iyy="{}" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    ends = '<parent link="base"/><child link="top"/><axis xyz="0 1 0"/>'
+    links = f"{link.format('base', 1, 1)}</link>{link.format('top', mass, iyy)}</link>"
+    return f'<robot name="two">{links}<joint name="{joint}" type="{kind}">{ends}{extra}</joint></robot>'
+
+
+@pytest.mark.parametrize(
+    ("urdf", "text"),
+    [
+        (two_links(mass=-0.5), r"<inertial> of link 'top' of robot has mass -0.5; it needs a mass ≥ 0, kg, and six numbers"),
+        (two_links(mass="inf"), "<inertial> of link 'top' of robot has mass inf"),
+        (two_links(mass="1,5"), "<inertial> of link 'top' of robot has mass 1,5"),
+        (two_links(iyy="nan"), "<inertial> of link 'top' of robot has iyy nan"),
+        (two_links(joint="root_joint"), "a joint of robot is called root_joint, as Pinocchio calls that of a free base"),
+        (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), r"elbow mimics wrist.*Hold these joints still, locked=\['elbow'\]"),
+        (two_links(mass=0, iyy=0), "robot has a singular inertia M .*: elbow can accelerate without moving any mass"),
+        (two_links(kind="planar"), r"joint 'elbow' of robot moves in 3 ways; a motor drives one. Make it revolute"),
+        (two_links(kind="floating"), r"joint 'elbow' of robot moves in 6 ways; a motor drives one"),
+        ('<robot name="none"><link name="base"/></robot>', "robot has a mass of 0 kg; give its links <inertial> in the URDF"),
+    ],
+)
+def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(urdf: str, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        fb.load_urdf(urdf)
+
+
+def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_that_are_told() -> None:
+    heavy = two_links(mass=20).replace("<mass", '<origin xyz="0.1 0 0"/><mass')
+    with pytest.warns(RobotWarning, match=r"robot sinks: its motors are too weak .*: elbow needs 17.2 and has 5"):
+        arm = fb.load_urdf(heavy, floating=False)
+    assert arm.standing().q == pytest.approx([0.5])
+    with pytest.raises(InputError, match=r"the posture of robot has elbow at 0.4; its limits are 0.5 and 2 \(rad, or m\)"):
+        fb.load_urdf(heavy, floating=False, posture=[0.4])
+    with pytest.raises(InputError, match="nothing of robot moves: its base is fixed, and so are all its joints"):
+        fb.load_urdf(heavy, floating=False, locked=["elbow"])
+
+
 def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"there is no file .*nothing\.urdf; give the path of a URDF file"):
         fb.load_urdf(tmp_path / "nothing.urdf")
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot>")
-    with pytest.raises(InputError, match=r"Pinocchio cannot read broken\.urdf as a URDF"):
+    with pytest.raises(InputError, match=r"Pinocchio cannot read broken as a URDF"):
         fb.load_urdf(broken)
-
-
-@pytest.mark.parametrize("kind", ["planar", "floating"])
-def test_a_joint_that_no_motor_drives_is_refused_by_name(kind: str, tmp_path: Path) -> None:
-    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    path = tmp_path / "table.urdf"
-    path.write_text(
-        f'<robot name="table"><link name="base">{link}</link><link name="top">{link}</link>'
-        f'<joint name="slide" type="{kind}"><parent link="base"/><child link="top"/><axis xyz="0 0 1"/></joint></robot>'
-    )
-    with pytest.raises(InputError, match=r"joint 'slide' of table.urdf moves in \d ways; a motor drives one"):
-        fb.load_urdf(path)

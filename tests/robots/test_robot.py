@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 
+import example_robot_data
 import judges
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import floatbase as fb
+from floatbase.control import AnalyticController
+from floatbase.errors import InputError
 
 
 @pytest.fixture(params=judges.ROBOTS)
@@ -35,7 +39,7 @@ def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot) -> None
 
 
 def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot) -> None:
-    root = ElementTree.parse(robot.urdf).getroot()
+    root = ElementTree.fromstring(robot.urdf)
     masses = [float(mass.get("value")) for link in root.findall("link") for mass in link.findall("inertial/mass")]
     assert robot.mass == pytest.approx(sum(masses), rel=1e-9)
     assert robot.weight == pytest.approx(9.81 * sum(masses), rel=1e-9)
@@ -53,7 +57,7 @@ def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot) -> None:
 def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says_otherwise(robot) -> None:
     assert np.all(robot.torque_limits > 0)
     assert robot.torque_limits.shape == (robot.d,)
-    joints = {j.get("name"): j for j in ElementTree.parse(robot.urdf).getroot().findall("joint")}
+    joints = {j.get("name"): j for j in ElementTree.fromstring(robot.urdf).findall("joint")}
     urdf = [float(joints[name].find("limit").get("effort")) for name in robot.joint_names]
     if robot.sources["torque limits" if "torque limits" in robot.sources else "torque limit"] == "URDF":
         assert np.allclose(robot.torque_limits, urdf)
@@ -88,6 +92,38 @@ def test_a_robot_stands_at_the_requested_height(floating) -> None:
     state = floating.standing(height=0.97 * usual.q[2])
     assert state.q[2] == pytest.approx(0.97 * usual.q[2], abs=1e-9)
     assert np.allclose(judges.stance(floating).positions(state)[:, 2], 0.0, atol=1e-9)
+
+
+def test_a_robot_that_stands_low_keeps_its_joint_limits_or_says_which_are_in_the_way() -> None:
+    """Without limits go2 would lie there with its hips 0.07 rad beyond theirs, and talos squat by 1.5 rad too much."""
+    go2, talos = judges.load("go2"), judges.load("talos")
+    low = go2.standing(height=0.0)
+    assert np.allclose(judges.stance(go2).positions(low)[:, 2], 0.0, atol=1e-9)
+    assert np.all(low.q[7:] >= go2.model.lowerPositionLimit[7:]) and np.all(low.q[7:] <= go2.model.upperPositionLimit[7:])
+    with pytest.raises(InputError, match=r"base 0.3 m above it: .* joints at their limits: .*leg_left_4_joint at 2.62"):
+        talos.standing(height=0.3)
+
+
+def test_a_reference_posture_beyond_a_limit_is_the_same_pose_by_a_whole_turn_where_that_will_do() -> None:
+    theirs, robot = example_robot_data.load("kinova"), fb.load("kinova")
+    data = theirs.model.createData()
+    pin.framesForwardKinematics(theirs.model, data, theirs.q0)
+    elbow = robot.model.idx_qs[robot.model.getJointId("j2s6s200_joint_3")]
+    assert theirs.q0[elbow] < robot.model.lowerPositionLimit[elbow] <= robot.posture[elbow]
+    for frame in robot.frames:
+        assert robot.standing().frame_pose(frame).isApprox(data.oMf[theirs.model.getFrameId(frame)], 1e-9)
+
+
+def test_a_robot_without_joints_falls_under_every_controller() -> None:
+    robot = fb.load("hector", feet=[])
+    state, contacts = robot.standing(), fb.Contacts.none()
+    for controller in (
+        fb.WholeBodyController(robot, contacts, fb.standing_tasks(state)),
+        AnalyticController(robot, contacts, state),
+    ):
+        command = controller(state.q, state.v)
+        assert command.tau.shape == (0,)
+        assert np.allclose(command.qdd, [0.0, 0.0, -9.81, 0.0, 0.0, 0.0])
 
 
 def test_joints_of_standing_and_random_states_keep_their_limits(robot) -> None:

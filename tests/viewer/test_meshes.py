@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from floatbase.dynamics import Contacts
-from floatbase.robots import catalogue, load, load_urdf
+from floatbase.robots import catalogue, load, load_urdf, unbolted
 from floatbase.viewer import robot_meshes, urdf_visuals
 
 MESHES = Path(__file__).parents[2] / "assets" / "meshes"
@@ -33,7 +32,7 @@ def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_box
     pytest.importorskip("collada", reason="the originals are read with pycollada")
     robot = load(name)
     folders = [str(folder) for folder in robot.package_dirs]
-    visuals = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.VISUAL, package_dirs=folders).geometryObjects
+    visuals = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders).geometryObjects
     pieces = urdf_visuals(robot)
     assert {(piece.joint, piece.source) for piece in pieces} == {
         (visual.parentJoint, Path(visual.meshPath).stem) for visual in visuals
@@ -67,7 +66,7 @@ def test_a_robot_outside_the_catalogue_shows_its_own_meshes() -> None:
 
 def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    robot = dataclasses.replace(load("go2"), name="unheard of")
+    robot = load_urdf(load("go2").urdf.replace("package://", "package://unheard/of/"), feet=["RR_foot"])
     meshes = robot_meshes(robot)
     assert [mesh.joint for mesh in meshes] == list(range(1, robot.model.njoints))
     calf = meshes[-1].vertices
@@ -75,10 +74,23 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
     assert np.linalg.norm(calf - foot, axis=1).min() < REACH
 
 
-def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut(tmp_path: Path) -> None:
+def test_light_meshes_are_those_of_a_urdf_and_not_of_a_name() -> None:
+    """The same text under another name, of other masses or with legs further apart, has them. One of the same name with
+    other feet, or another robot altogether, has not."""
+    urdf = load("go2").urdf
+    light = [mesh.vertices for mesh in robot_meshes(load("go2"))]
+    for old, new, same in (("6.921", "7.5", True), ("0 0.0955 0", "0 0.12 0", True), ("0 0 -0.213", "0 0 -0.25", False)):
+        assert old in urdf
+        drawn = [mesh.vertices for mesh in robot_meshes(load_urdf(urdf.replace(old, new), name="mine" if same else "go2"))]
+        assert same == (len(drawn) == len(light) and all(map(np.array_equal, drawn, light)))
+    other = load_urdf(MESHES.parent / "models" / "cart.urdf", name="go2")
+    assert len(robot_meshes(other)) < len(light)
+
+
+def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut() -> None:
     arm = load("ur5")
     bolted = {mesh.joint: mesh for mesh in robot_meshes(arm)}
-    loose = load_urdf(arm.urdf, name="ur5", package_dirs=arm.package_dirs, torque_limits=arm.torque_limits, feet=["base_link"])
+    loose = unbolted(arm)
     free = {mesh.joint: mesh for mesh in robot_meshes(loose)}
     assert set(free) == {joint + 1 for joint in bolted}
     for joint, mesh in bolted.items():
@@ -87,14 +99,10 @@ def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut(tmp_path: Path)
 
 def test_what_a_locked_joint_moved_hangs_on_the_joint_above() -> None:
     arm = load("ur5")
-    locked = [arm.model.getJointId(name) for name in ("wrist_1_joint", "wrist_2_joint", "wrist_3_joint")]
-    model = pin.buildReducedModel(arm.model, locked, arm.standing().q)
-    stiff = dataclasses.replace(arm, model=model, posture=arm.posture[:3], torque_limits=arm.torque_limits[:3])
+    stiff = load("ur5", locked=["wrist_1_joint", "wrist_2_joint", "wrist_3_joint"])
     meshes = robot_meshes(stiff)
     assert [mesh.joint for mesh in meshes] == [0, 1, 2, 3]
     assert sum(len(mesh.faces) for mesh in meshes) == sum(len(mesh.faces) for mesh in robot_meshes(arm))
-    data, home = model.createData(), arm.standing()
-    pin.forwardKinematics(model, data, home.q[:3])
-    tip = data.oMi[3].act(meshes[-1].vertices[-1].astype(float))
-    whole = robot_meshes(arm)[-1]
+    home, whole = arm.standing(), robot_meshes(arm)[-1]
+    tip = stiff.standing().joint_transforms[3] @ [*meshes[-1].vertices[-1], 1.0] @ np.eye(4, 3)
     np.testing.assert_allclose(tip, home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3), atol=1e-5)
