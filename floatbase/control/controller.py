@@ -72,13 +72,14 @@ class WholeBodyController:
         if path not in get_args(Path):
             raise unknown_name("path", path, get_args(Path))
         reason = "it was requested" if path == "readable" else obstacle(problem, solver)
+        compiled = None if reason else Compiled(problem)
+        if compiled is not None and warm_up:
+            reason = compiled.warm_up()
         if reason and path == "compiled":
             raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
+        self.compiled = None if reason else compiled
         self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
         self.path_reason = reason or "the tasks and contacts are the package's own" + cache_warning()
-        self.compiled = None if reason else Compiled(problem)
-        if self.compiled is not None and warm_up:
-            self.compiled.warm_up()
 
     def __getstate__(self) -> tuple[Problem, str, Path]:
         """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""

@@ -24,9 +24,11 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     """Solve a QP.
 
     solver: one of `solvers()`. "daqp" is what controllers use; "cvxpy" (Clarabel at tight tolerances) is the judge,
-    slow and independent; "active_set" is the method of `active_set.py`, written to be read. Raises `InfeasibleError` with a
-    smallest set of conflicting rows, `SolverError` when the objective has no minimum or the solver did not converge,
-    `UnknownNameError` for a solver that does not exist.
+    slow and independent; "active_set" is the method of `active_set.py`, written to be read. Where the first two find no
+    point although no rows are in conflict, or end where polishing fails, as with weights too far apart, "active_set" answers,
+    in 4 to 40 ms, and `Solution.solver` says so. Raises `InfeasibleError` with a smallest set of conflicting rows,
+    `SolverError` when the objective has no minimum or the solver did not converge, `UnknownNameError` for a solver that does
+    not exist.
     """
     check_solver(solver)
     found = _BACK_ENDS[solver](qp)
@@ -35,10 +37,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     rows = conflicting_rows(qp.reduced.G / qp.row_lengths[:, None], qp.reduced.h / qp.row_lengths)
     if rows:
         raise infeasible(qp.inequality_names[i] for i in rows)
-    raise SolverError(
-        f"the solver found no point that satisfies all rows of {qp!r}, but a linear program found one: the rows only "
-        f"just meet. Loosen them by more than {FEASIBILITY_TOLERANCE:g}."
-    )
+    return _active_set(qp)
 
 
 def solvers() -> tuple[str, ...]:
@@ -55,14 +54,14 @@ def check_solver(solver: str) -> None:
 def _daqp(qp: QP) -> Solution | None:
     """Eliminate the equalities, then DAQP's dual active set on what remains; what controllers use.
 
-    Where weights are so far apart that DAQP does not converge, or ends where polishing fails, `active_set` answers, in
-    4 to 40 ms, and `Solution.solver` says so.
+    None where weights are so far apart that DAQP does not converge or ends where polishing fails, and where it sees no point:
+    little curvature may look like that to it.
     """
     import daqp
 
     inner, size, rows = qp.reduced, qp.row_lengths, len(qp.G)
     if inner.n == 0:
-        return _active_set(qp)
+        return None
     scale = _objective_size(inner)
     y, _, flag, info = daqp.solve(
         inner.H / scale,
@@ -74,18 +73,14 @@ def _daqp(qp: QP) -> Solution | None:
         primal_tol=FEASIBILITY_TOLERANCE,
         eps_prox=-1.0,
     )
-    if flag == -1:
-        return None
     if flag == -3:
         raise unbounded(qp)
     if flag == -5:
         raise not_convex(qp, inner.H)
-    if flag not in (1, 2):  # it cycled, or took too many iterations, and its numbers may be of any size
-        return _active_set(qp)
+    if flag not in (1, 2):  # infeasible, it says, or it cycled or took too many iterations; its numbers may be of any size
+        return None
     polished = _polished(qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / size)
-    if polished is None:
-        return _active_set(qp)
-    return with_equality_multipliers(qp, *polished, "daqp", int(info["iterations"]))
+    return None if polished is None else with_equality_multipliers(qp, *polished, "daqp", int(info["iterations"]))
 
 
 def _active_set(qp: QP) -> Solution:

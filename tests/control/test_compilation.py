@@ -5,10 +5,16 @@ from __future__ import annotations
 import inspect
 import os
 import pickle
+import re
+import resource
+import select
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -22,7 +28,7 @@ from numba.core.runtime import rtsys
 
 import floatbase as fb
 from floatbase.__main__ import main
-from floatbase.control.tick import Compiled, announce_if_slow, jit, tick
+from floatbase.control.tick import Compiled, announce_if_slow, cache, jit, tick
 from floatbase.robots import Robot
 
 TICK = Path(tick.__file__).parent
@@ -38,9 +44,9 @@ def tick_of(robot: Robot) -> Compiled:
 # when it runs --------------------------------------------------------------------------------------------------------------
 
 
-WITHOUT_NUMBA = """
+READABLE = """
 import sys
-sys.modules["numba"] = None
+{obstacle}
 import floatbase as fb
 robot = fb.load("go2")
 state, contacts = robot.standing(), fb.Contacts.points(robot)
@@ -53,10 +59,20 @@ except fb.FloatbaseError as error:
 """
 
 
-def test_without_numba_the_readable_path_answers_and_says_why() -> None:
-    said = subprocess.run([sys.executable, "-c", WITHOUT_NUMBA], capture_output=True, text=True, check=True).stdout.splitlines()
-    assert said[0].startswith("readable readable numba cannot be loaded (") and "pip install numba" in said[0]
-    assert said[1].startswith('path="compiled" is not possible: numba cannot be loaded (')
+@pytest.mark.parametrize(
+    ("obstacle", "environment", "reason"),
+    [
+        ('sys.modules["numba"] = None', {}, "numba cannot be loaded (.*); pip install numba may mend it"),
+        ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, and numba compiles nothing"),
+    ],
+)
+def test_without_numba_the_readable_path_answers_and_says_why(obstacle: str, environment: dict[str, str], reason: str) -> None:
+    command = [sys.executable, "-c", READABLE.format(obstacle=obstacle)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | environment)
+    said = done.stdout.splitlines()
+    reason = reason.replace("(.*)", r"\(.*\)")
+    assert re.fullmatch(f"readable readable {reason}", said[0])
+    assert re.match(f'path="compiled" is not possible: {reason}. path="auto"', said[1])
 
 
 def test_another_layout_of_pinocchios_results_leaves_the_readable_path(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,6 +97,42 @@ def test_threads_may_share_a_controller() -> None:
             assert list(pool.map(wrong, (0, 13, 27))) == [[], [], []]
     finally:
         sys.setswitchinterval(interval)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork")  # Python 3.12 warns of just this
+def test_a_process_forked_while_threads_tick_ticks_on() -> None:
+    """The other threads, and the locks that they hold, stay behind in the middle of a tick."""
+    controller, state = judges.controller_of("go2", path="compiled"), judges.load("go2").random_state(3, 0.1)
+    expected, ended, answers = controller(state.q, state.v).tau.tobytes(), threading.Event(), []
+
+    def spin() -> None:
+        while not ended.is_set():
+            controller(state.q, 0.5 * state.v)
+
+    threads = [threading.Thread(target=spin) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for _ in range(20):
+        into, out = os.pipe()
+        child = os.fork()
+        if child == 0:
+            try:
+                os.write(out, controller(state.q, state.v).tau.tobytes())
+            finally:
+                os._exit(0)
+        answered = select.select([into], [], [], 10.0)[0]  # s: a tick takes some microseconds
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        answers.append(os.read(into, 1000) if answered else b"nothing")
+        os.close(into)
+        os.close(out)
+        if not answered:
+            break
+    ended.set()
+    for thread in threads:
+        thread.join()
+    assert answers == 20 * [expected]
 
 
 def test_a_replaced_controller_compiles_nothing() -> None:
@@ -167,43 +219,98 @@ def test_an_edited_function_is_compiled_anew_and_an_old_one_is_loaded(tmp_path: 
     assert run() == ["24.0", "0"] and run() == ["24.0", "1"]
 
 
-def test_the_tick_compiles_where_no_folder_can_be_written_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    def njit(function: object = None, *, cache: bool = False, **options: object) -> object:
-        if cache:
-            raise RuntimeError("cannot cache function: no locator available")
-        return "compiled without a cache"
+def make_small(digest: int) -> Callable[[float], float]:
+    """A function that is compiled and kept like the tick, in no time."""
 
-    monkeypatch.setattr(numba, "njit", njit)
-    monkeypatch.setattr(jit, "jit", njit)
-    monkeypatch.setattr(jit, "cache_on_disk", True)
-    assert jit.jit_cached(lambda digest: lambda: digest) == "compiled without a cache"
+    def small(x: float) -> float:
+        _ = digest
+        return 3.0 * x
+
+    return small
+
+
+@pytest.fixture
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
+    """Makes `make_small` ready in a folder of its own, checks its answer, and says whether it was loaded from disk."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(cache, "trouble", "")
+
+    def loaded() -> bool:
+        function = jit.jit_cached(make_small)
+        assert function(2.0) == 6.0
+        return bool(function.stats.cache_hits)
+
+    return loaded
+
+
+def flipped(at: float) -> Callable[[bytes], bytes]:
+    """One bit, at a part of the file."""
+    return lambda data: data[: int(at * len(data))] + bytes([data[int(at * len(data))] ^ 16]) + data[int(at * len(data)) + 1 :]
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda data: b"",
+    "half": lambda data: data[: len(data) // 2],
+    "text": lambda data: b"not what numba wrote",
+    "zeros": lambda data: bytes(len(data)),
+    "another value": lambda data: pickle.dumps(42),
+    "a module that is not there": lambda data: b"cno_such_module\nname\n.",
+    **{f"bit at {at}": flipped(at) for at in np.linspace(0.0, 0.99, 12).round(2)},
+}
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+def test_damaged_files_are_compiled_anew_and_replaced(suffix: str, small: Callable[[], bool], tmp_path: Path) -> None:
+    assert not small() and small()
+    (file,) = tmp_path.rglob("*" + suffix)
+    for name, damage in DAMAGES.items():
+        file.write_bytes(damage(file.read_bytes()))
+        assert not small() or suffix == ".nbi", name  # a bit of the index may say nothing; of code, every bit counts
+        assert small() and not cache.trouble, name
+    file.unlink()
+    assert not small() and small()
+    file.unlink()
+    (file / "inside").mkdir(parents=True)
+    assert not small() and "Is a directory" in cache.trouble
+
+
+def test_a_full_disk_leaves_a_compiled_tick_and_the_words(small: Callable[[], bool]) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))  # bytes: no file may grow
+    try:
+        assert not small()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert "File too large" in cache.trouble
     robot = judges.load("go2")
-    assert "set NUMBA_CACHE_DIR" in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
-    monkeypatch.undo()
+    reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
+    assert "cannot be kept (OSError: " in reason and "File too large): set NUMBA_CACHE_DIR" in reason
+    assert not small() and small()  # there is room again
+
+
+def test_the_tick_compiles_where_no_folder_can_be_written(small: Callable[[], bool], monkeypatch: pytest.MonkeyPatch) -> None:
+    def nowhere(function: object) -> None:
+        raise RuntimeError("cannot cache function: no locator available")
+
+    monkeypatch.setattr(jit, "Cache", nowhere)
+    assert not small() and not small()
+    robot = judges.load("go2")
+    reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
+    assert "cannot be kept (no folder can be written to): set NUMBA_CACHE_DIR" in reason
+    monkeypatch.setattr(cache, "trouble", "")
     assert "NUMBA_CACHE_DIR" not in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
 
 
-@pytest.mark.parametrize("error", [EOFError("Ran out of input"), pickle.UnpicklingError("pickle data was truncated")])
-def test_a_cache_that_a_power_cut_left_half_written_is_compiled_anew(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Half:
-        """The tick, as numba finds half a file."""
+def test_where_numba_fails_the_readable_path_is_the_last_resort(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*given: object) -> int:
+        raise NotImplementedError("no such target")
 
-        forgotten, stats = False, tick.tick.stats
-
-        def __call__(self, *given: object) -> int:
-            if not self.forgotten:
-                raise error
-            return tick_now(*given)
-
-        def recompile(self) -> None:
-            self.forgotten = True
-
-    robot, tick_now, half = judges.load("go2"), tick.tick, Half()
-    expected = judges.controller_of(robot.name)(robot.posture, np.zeros(robot.nv)).tau
-    monkeypatch.setattr(tick, "tick", half)
-    controller = judges.controller_of(robot.name)
-    assert half.forgotten
-    assert np.array_equal(controller(robot.posture, np.zeros(robot.nv)).tau, expected)
+    monkeypatch.setattr(tick, "tick", fails)
+    controller = judges.controller_of("go2")
+    assert controller.path == controller(judges.load("go2").posture, np.zeros(18)).path == "readable"
+    assert controller.path_reason == "numba could not compile the tick (NotImplementedError: no such target)"
+    with pytest.raises(fb.FloatbaseError, match="no such target"):
+        judges.controller_of("go2", path="compiled")
 
 
 # memory --------------------------------------------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from math import prod
-from pickle import UnpicklingError
 from threading import Timer
 from typing import TYPE_CHECKING, Any, cast
 
@@ -44,9 +43,10 @@ def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
 
 def cache_warning() -> str:
     """What to add to a message where compiled code cannot be kept on disk, or ""."""
-    from floatbase.control.tick import jit
+    from floatbase.control.tick import cache
 
-    return "" if jit.cache_on_disk else "; what is compiled cannot be kept here: set NUMBA_CACHE_DIR to a folder to write to"
+    remedy = "set NUMBA_CACHE_DIR to a folder that has room and can be written to"
+    return f"; what is compiled cannot be kept ({cache.trouble}): {remedy}" if cache.trouble else ""
 
 
 def obstacle(problem: Problem, solver: str) -> str:
@@ -60,9 +60,11 @@ def obstacle(problem: Problem, solver: str) -> str:
         if type(task) not in TASK_KINDS:
             return f"task {task.name!r} is a {type(task).__name__}; the compiled tick takes the tasks of the package"
     try:
-        import floatbase.control.tick.tick  # noqa: F401
+        from floatbase.control.tick import jit, tick  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
         return f"numba cannot be loaded ({error}); pip install numba may mend it"
+    if not jit.compiles:
+        return "NUMBA_DISABLE_JIT is set, and numba compiles nothing"
     return _robot_obstacle(problem.robot)
 
 
@@ -112,22 +114,29 @@ class Compiled:
         targets = self._targets_at(t) if self._moving else self.targets
         if targets is None:
             return None
-        dynamics, answer = self.dynamics, self.empty_answer()
-        with dynamics.lock:
-            dynamics.update(q, v)
-            n_active = self._tick(q, v, targets, *self.arguments, answer, self._parts)
+        answer = self.empty_answer()
+        n_active = self._run(q, v, targets, answer)
         return (answer, n_active, targets) if n_active >= 0 else None
 
-    def warm_up(self) -> None:
-        """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it."""
+    def _run(self, q: Array, v: Array, targets: Array, answer: Array) -> int:
+        """One run of `tick.tick`."""
+        dynamics = self.dynamics
+        with dynamics.lock:
+            dynamics.update(q, v)
+            return int(self._tick(q, v, targets, *self.arguments, answer, self._parts))
+
+    def warm_up(self) -> str:
+        """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it.
+
+        Returns why that is not possible, or "".
+        """
         standing = self._problem.robot.standing()
-        given = np.array(standing.q), np.array(standing.v), 0.0
         with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."):
             try:
-                self(*given)
-            except (EOFError, UnpicklingError):  # a power cut left half a file on disk: forget it, and compile again
-                self._tick.recompile()
-                self(*given)
+                self._run(np.array(standing.q), np.array(standing.v), self.targets, self.empty_answer())
+            except Exception as error:  # whatever numba raises, the readable path does without; no code of the user's runs
+                return f"numba could not compile the tick ({type(error).__name__}: {error})"
+        return ""
 
     def empty_answer(self) -> Array:
         """An array for the numbers of one tick."""

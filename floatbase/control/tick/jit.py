@@ -16,6 +16,7 @@ from typing import Any
 import numba
 
 from floatbase.control.problem import INCONSISTENT
+from floatbase.control.tick.cache import Cache, cannot_keep
 from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
 from floatbase.qp import FEASIBILITY_TOLERANCE
 from floatbase.robots import UNIT_LENGTH_TOLERANCE
@@ -29,7 +30,7 @@ jit_inline: Callable[..., Any] = partial(numba.njit, inline="always", **_OPTIONS
 jit_forced: Callable[..., Any] = partial(numba.njit, forceinline=True, **_OPTIONS)  # small and called often
 jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
 
-cache_on_disk = True  # False where numba finds no folder that it can write to
+compiles = hasattr(jit(lambda: None), "py_func")  # False where numba was told to leave functions as they are: NUMBA_DISABLE_JIT
 
 
 def digest(folder: Path = Path(__file__).parent) -> int:
@@ -41,11 +42,11 @@ def digest(folder: Path = Path(__file__).parent) -> int:
 
 
 def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
-    """Compile make(digest()), cached on disk where a folder can be written to. The function made must use its digest."""
-    function = make(digest())
-    try:
-        return numba.njit(cache=True, **_OPTIONS)(function)
-    except RuntimeError:  # numba found no folder for its cache
-        global cache_on_disk
-        cache_on_disk = False
-        return jit(function)
+    """Compile make(digest()), cached on disk where that is possible. The function made must use its digest."""
+    function = jit(make(digest()))
+    if compiles:
+        try:
+            function._cache = Cache(function.py_func)
+        except Exception as error:  # a RuntimeError where numba finds no folder for its cache
+            cannot_keep(error)
+    return function

@@ -5,10 +5,12 @@ What belongs to one robot or one contact is made once, so that a controller with
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from functools import lru_cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
+from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
@@ -41,8 +43,11 @@ class Dynamics:
     lock: held from `update` until the views have been read.
     """
 
+    _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
+
     def __init__(self, robot: Robot):
         self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
+        self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE), (8 * _POSE, 8))
         self.views: tuple[Array, ...] = (data.M, data.nle, data.J, data.Ag, poses)
@@ -62,6 +67,15 @@ class Dynamics:
             poses, M = np.array([_numbers(pose) for pose in self.data.oMi]), self.views[0]
             return np.array_equal(poses, self.views[-1]) and np.array_equal(M, M.T)
 
+    @classmethod
+    def unlock_all(cls) -> None:
+        """Give all of them new locks: in a forked process nobody is left to release one that another thread held."""
+        for dynamics in cls._all:
+            dynamics.lock = Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=Dynamics.unlock_all)
 
 dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one for each robot, shared by its controllers
 
