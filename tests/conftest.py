@@ -1,4 +1,5 @@
-"""What all tests share: a home of their own, one BLAS thread, random numbers that can be drawn anew, the slow files first."""
+"""What all tests share: a folder for all that they write, one BLAS thread, random numbers that can be drawn anew, the slow
+files first."""
 
 from __future__ import annotations
 
@@ -6,10 +7,12 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import hypothesis
 import numpy as np
+import psutil
 import pytest
 
 # started first, so that no worker is left alone with one of them at the end
@@ -31,10 +34,40 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # hypothesis reads its seed when it is configured
 def pytest_configure(config: pytest.Config) -> None:
-    home = tempfile.mkdtemp(prefix="floatbase-")
-    config.add_cleanup(lambda: shutil.rmtree(home, ignore_errors=True))
-    os.environ["FLOATBASE_HOME"] = home  # a learner's progress is not the tests' to write
+    if runs_the_others(config):
+        # to keep the files of a test, give pytest another folder for them: --basetemp=FOLDER
+        folder = tempfile.mkdtemp(prefix="floatbase-tests-")
+        config.add_cleanup(lambda: shutil.rmtree(folder))
+        os.environ["TMPDIR"] = tempfile.tempdir = folder
+    os.environ["FLOATBASE_HOME"] = tempfile.mkdtemp(prefix="home-")  # a learner's progress is not the tests' to write
     shift_seeds(config, config.getoption("--seed"))
+
+
+def runs_the_others(config: pytest.Config) -> bool:
+    """Whether this is pytest itself, not a worker of pytest-xdist."""
+    return not hasattr(config, "workerinput")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """End the processes that tests have left, browsers and kernels say, and fail when there are any."""
+    if not runs_the_others(session.config):
+        return
+    left = [process for process in psutil.process_iter() if is_left(process)]
+    for process in left:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        with suppress(psutil.Error):
+            print(f"\nthe tests left process {process.pid} running: {' '.join(process.cmdline())[:200]}")
+            process.kill()
+    psutil.wait_procs(left, timeout=10)
+
+
+def is_left(process: psutil.Process) -> bool:
+    """Whether a process, whoever is its parent now, has been started by these tests: it has their folder."""
+    try:
+        return process.environ().get("TMPDIR") == tempfile.tempdir
+    except psutil.Error:  # of another user, or gone
+        return False
 
 
 def shift_seeds(config: pytest.Config, n: int) -> None:

@@ -1,8 +1,9 @@
-"""What the comparison with other libraries rests on: problems in their words, and processes that answer for them."""
+"""What the comparison with other libraries rests on, problems in their words and processes that answer for them; and soaks."""
 
 from __future__ import annotations
 
 import json
+import socket
 import sys
 from pathlib import Path
 
@@ -18,6 +19,7 @@ import peer_environments  # noqa: E402
 import peer_problems  # noqa: E402
 import peer_wire  # noqa: E402
 import peers  # noqa: E402
+import soak  # noqa: E402
 
 import floatbase as fb  # noqa: E402
 
@@ -89,3 +91,33 @@ def test_times_are_given_for_equal_torques_alone():
     other = peers.report([row(1e-2)], [], {}, ["placo. There is no network."])
     assert "**0.25**" not in other and "Not the same, so no times: go2 with tsid, easy" in other
     assert "Not measured: placo. There is no network." in other
+
+
+@pytest.mark.parametrize("name", soak.SOAKS)
+def test_a_short_soak_holds(name, monkeypatch):
+    monkeypatch.setattr(soak, "SAMPLES", 2)
+    monkeypatch.setattr(soak, "SLOWED", 100.0)  # few pictures on a busy machine: only one that waits for a page is told
+    row = soak.run(name, 3)
+    assert (row.name, row.times, row.broken) == (name, 3, "")
+
+
+def test_a_soak_tells_what_stays_and_what_breaks(monkeypatch):
+    kept = []
+
+    def leaking():
+        yield lambda: kept.append((np.ones(250_000), socket.socket()))
+
+    def breaks():
+        def step():
+            raise AssertionError("it broke")
+
+        yield step
+
+    monkeypatch.setattr(soak, "SAMPLES", 4)
+    monkeypatch.setattr(soak, "SOAKS", {"leaking": (leaking, 20), "breaks": (breaks, 20)})
+    found = soak.run("leaking", 20)
+    kept.clear()
+    assert "memory, MB: +" in found.broken and "descriptors: +" in found.broken and "threads" not in found.broken
+    assert soak.run("breaks", 20).broken == "it broke"
+    fine = soak.Row("fine", 20, 1.0, found.values, found.growth, "")
+    assert [line.count("holds") for line in soak.table([found, fine])] == [0, 0, 0, 1]

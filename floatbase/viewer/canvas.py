@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from floatbase.viewer import wire
-from floatbase.viewer.shapes import Item, Picture
+from floatbase.viewer.shapes import Item, Picture, tidy
 from floatbase.viewer.window import Window
 
 ROOT = "/meshcat/"
@@ -23,15 +23,18 @@ class Canvas:
 
     def draw(self, picture: Picture) -> int:
         """Show this picture and nothing else. Returns how many commands that took; all go into one frame."""
+        picture = tidy(picture)
         updates = [wire.delete(ROOT)] if self._interrupted else []
         old: Picture = {} if self._interrupted else self.picture
-        updates += [wire.delete(ROOT + path) for path in old if path not in picture]
+        gone = [path for path, item in old.items() if not _stays(item, picture.get(path))]
+        updates += [wire.delete(ROOT + path) for path in gone]
+        deleted = tuple(f"{path}/" for path in gone)
         for path, item in picture.items():
-            updates += _changes(ROOT + path, old.get(path), item)
+            updates += _changes(ROOT + path, None if f"{path}/".startswith(deleted) else old.get(path), item)
         if updates:
             self._interrupted = True  # stays so when an interrupt comes before the end: the next picture is drawn anew
             self.window.put(updates)
-        self.picture = dict(picture)
+        self.picture = picture
         self._interrupted = False
         return len(updates)
 
@@ -45,6 +48,11 @@ class Canvas:
         """Send settings of the page, also those that were sent already: the reader may have changed them in the page."""
         self.window.put(updates)
         self._settings.update(updates)
+
+
+def _stays(old: Item, new: Item | None) -> bool:
+    """Whether the item at a path can become `new`. One that loses its colour is drawn anew: no command takes it back."""
+    return new is not None and (old.colour is None or new.colour is not None)
 
 
 def _changes(path: str, old: Item | None, new: Item) -> list[wire.Update]:

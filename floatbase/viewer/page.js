@@ -8,6 +8,7 @@ function startViewer() {
   viewer.gui.__folders.Scene.close();
   const player = startPlayer(viewer);
   const camera = startCamera(viewer);
+  const panel = startPanel(viewer);
   const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
@@ -16,7 +17,8 @@ function startViewer() {
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
     set_theme: (command) => { document.body.className = command.name; },
     set_animation: (command) => { meshcat(command); player.load(command); },
-    set_control: (command) => { meshcat(command); viewer.gui.open(); camera.makeRoom(); },
+    set_control: (command) => { panel.add(command); camera.makeRoom(); },
+    move_control: panel.move,
   };
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
@@ -89,6 +91,34 @@ function startCamera(viewer) {
     follow(command) {
       followed = command.node.split("/").filter((name) => name);
       last = position();
+    },
+  };
+}
+
+// The panel: sliders, check boxes and buttons that report to the window. meshcat's own would read their names as HTML.
+function startPanel(viewer) {
+  const me = String(Math.random()), reported = new Map();
+  const report = (name, value) => {
+    reported.set(name, value);
+    viewer.connection.send(JSON.stringify({type: "control", name, value, by: me}));
+  };
+  const controls = viewer.gui_controllers = Object.create(null);  // in it no name has a meaning, not even "constructor"
+  return {
+    add({name, value, min, max, step}) {
+      if (controls[name]) viewer.gui.remove(controls[name]);
+      const made = viewer.gui.add({value: value ?? (() => report(name, null))}, "value", min, max, step);
+      const label = made.domElement.parentElement.querySelector(".property-name");
+      label.textContent = name;
+      if (value === undefined) label.style.width = "100%";
+      else made.onChange((now) => report(name, now));
+      controls[name] = made;
+      viewer.gui.open();
+    },
+    move({name, value, by}) {
+      // of this page's own reports that come back only the last one is news: the reader may be moving the control
+      if (!controls[name] || (by == me && value !== reported.get(name))) return;
+      controls[name].object.value = value;
+      controls[name].updateDisplay();
     },
   };
 }

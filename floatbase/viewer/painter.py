@@ -300,7 +300,7 @@ class Painter:
 def kinds(picture: Picture) -> set[str]:
     """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a force is an "idle cone"."""
     idle = shapes.cone_colour("idle")
-    return {"idle cone" if item.colour == idle else path.split("/")[0] for path, item in picture.items()}
+    return {"idle cone" if item.colour == idle else path.strip("/").split("/")[0] for path, item in picture.items()}
 
 
 @lru_cache(maxsize=256)

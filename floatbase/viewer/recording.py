@@ -12,7 +12,7 @@ import umsgpack
 
 from floatbase._arrays import Array
 from floatbase.viewer import wire
-from floatbase.viewer.shapes import Item, Picture
+from floatbase.viewer.shapes import Item, Picture, tidy
 
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
@@ -99,7 +99,7 @@ def _courses(pictures: list[Picture]) -> dict[str, _Course]:
     """Every item in time. A path that shows several shapes in turn becomes several items."""
     seen: dict[str, dict[int, Item]] = {}
     for i, picture in enumerate(pictures):
-        for path, item in picture.items():
+        for path, item in tidy(picture).items():
             seen.setdefault(path, {})[i] = item
     courses = {}
     for path, items in seen.items():

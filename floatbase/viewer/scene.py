@@ -8,7 +8,8 @@ from typing import Any
 
 import umsgpack
 
-from floatbase.viewer.wire import ANIMATION, Key, Update, delete, no_animation
+from floatbase.errors import ViewerError
+from floatbase.viewer.wire import ANIMATION, Key, Update, delete, encode, no_animation, reported
 
 
 class Scene:
@@ -33,6 +34,21 @@ class Scene:
                 if key[1] == "delete":
                     self._forget_below(key[0], self.newest)
             return self.newest
+
+    def move_control(self, name: object, value: Any, page: str) -> Any:
+        """Store the value that a page reports for a control, for all pages to show, and return it as the control allows it.
+
+        page: a name of that page, which the command has, so that the page knows its own report.
+        Raises `ViewerError` where there is no such control, or when it cannot have such a value.
+        """
+        with self._lock:
+            entry = self._entries.get(("/", "set_control", name)) if isinstance(name, str) else None
+        if entry is None:
+            raise ViewerError(f"there is no control {name!r}.")
+        value = reported(umsgpack.unpackb(entry[1]), value)
+        if value is not None:
+            self.put([encode({"type": "move_control", "name": name, "value": value, "by": page})])
+        return value
 
     def since(self, number: int) -> tuple[int, list[bytes]]:
         """The number of the newest change, and in order the commands that came after change `number`."""

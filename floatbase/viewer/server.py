@@ -23,6 +23,7 @@ from floatbase.viewer.displays import Displays
 from floatbase.viewer.scene import Scene
 
 FRAME_TIME = 1.0 / 60.0  # s, the least time between two frames
+LONGEST = 32 << 20  # bytes of a message from a page: a picture of the largest screens, which is the longest that pages send
 PATIENCE = 30.0  # s; a page that takes longer over one frame is disconnected, and connects again by itself
 
 
@@ -162,8 +163,8 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
 
     def open(self, *_: str, **__: str) -> None:
         self.set_nodelay(True)
-        number = self.get_query_argument("display", "")
-        self._display = int(number) if number.isdecimal() else 0
+        with suppress(ValueError, tornado.web.HTTPError):
+            self._display = int(self.get_query_argument("display", ""))
         self.server.clients.append(self)
         kept = self.server.displays.kept(self._display)
         if kept is not None:
@@ -183,20 +184,35 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
             picture.set_exception(ViewerError("the browser closed before the picture was taken; open it again."))
 
     def on_message(self, message: str | bytes) -> None:
-        answer = json.loads(message)
-        if answer.get("type") == "done":
+        """Deal with what the page says. What no page of ours says is ignored: any program of this machine can connect."""
+        try:
+            answer = json.loads(message)
+        except (ValueError, RecursionError):
+            return
+        kind = answer.get("type") if isinstance(answer, dict) else None
+        if kind == "done":
             self._busy_since = None
             self.server.flush()
-        elif answer.get("type") == "live":
+        elif kind == "live":
             self._display, self.scene = 0, self.server.scene
             self.next_frame()
-        elif answer.get("type") == "image" and answer.get("id") in self._pictures:
-            self._pictures.pop(answer["id"]).set_result(answer["data"])
-        elif answer.get("type") == "control" and self.server.on_control is not None:
-            try:
-                self.server.on_control(answer["name"], answer["value"])
-            except Exception:  # an error in the user's callback is reported, and must not end the connection
-                logging.getLogger("floatbase.viewer").exception("the control %r failed", answer["name"])
+        elif kind == "image" and isinstance(answer.get("id"), int) and answer["id"] in self._pictures:
+            self._pictures.pop(answer["id"]).set_result(str(answer.get("data")))
+        elif kind == "control":
+            self._control(answer.get("name"), answer.get("value"), str(answer.get("by"))[:40])
+
+    def _control(self, name: Any, value: Any, page: str) -> None:
+        """Show the new value of a control in every page, and report it to the window."""
+        try:
+            value = self.server.scene.move_control(name, value, page)
+        except ViewerError:
+            return
+        self.server.flush()
+        try:
+            if self.server.on_control is not None:
+                self.server.on_control(name, value)
+        except Exception:  # an error in the user's callback is reported, and must not end the connection
+            logging.getLogger("floatbase.viewer").exception("the control %r failed", name)
 
     def request_picture(self, answer: Future[str]) -> None:
         """Request a picture of the scene as it is now."""
@@ -240,4 +256,5 @@ def _application(server: Server) -> tornado.web.Application:
         log_function=lambda handler: None,  # do not print refused requests into the notebook
         compress_response=True,
         websocket_ping_interval=20,
+        websocket_max_message_size=LONGEST,
     )

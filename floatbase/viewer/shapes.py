@@ -7,6 +7,7 @@ costs one matrix, and the matrix tells how long an arrow is and how wide a cone 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -41,6 +42,22 @@ _EYE = read_only(np.eye(3))
 
 # path -> item. No path may lie below another one, because a matrix moves everything below its path.
 Picture = dict[str, Item]
+
+
+def tidy(picture: Mapping[str, Item]) -> Picture:
+    """The picture with every path in one spelling: parts with a slash between them, as "com/ball" is for "/com//ball".
+
+    Raises `InputError` for a path without a name, because its matrix would move the whole picture.
+    """
+    return {_tidy_path(path): item for path, item in picture.items()}
+
+
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+def _tidy_path(path: str) -> str:
+    tidied = "/".join(part for part in path.split("/") if part) if isinstance(path, str) else ""
+    if not tidied:
+        raise InputError(f"the path {path!r} in a picture has no name; give it one, as below('a name', items) does.")
+    return tidied
 
 
 def placed(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0) -> Array:

@@ -113,7 +113,7 @@ class Window:
         """A picture of the live page, as a PIL image; of several pages, of the one that connected last.
 
         Raises `ViewerError` when no page is connected, when every page keeps an earlier picture, and when the page does not
-        answer within `timeout` s.
+        answer with a picture within `timeout` s.
         """
         from PIL import Image
 
@@ -126,7 +126,12 @@ class Window:
             data = self._server.capture().result(timeout)
         except FutureTimeout:
             raise ViewerError(f"the browser did not answer within {timeout:g} s; is its tab still open?") from None
-        return Image.open(io.BytesIO(base64.b64decode(data.split(",", 1)[1])))
+        try:
+            image = Image.open(io.BytesIO(base64.b64decode(data.partition(",")[2])))
+            image.load()
+        except (ValueError, OSError):
+            raise ViewerError(f"the browser sent no picture; look whether {self.web_url} shows one, and reload it.") from None
+        return image
 
     def close(self) -> None:
         """Stop serving: the thread ends and the port is free. To close a closed window does nothing."""

@@ -6,9 +6,9 @@ dict from key to the newest command. Drawing something again does not make it gr
 
 from __future__ import annotations
 
-import json
 import struct
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,13 +21,14 @@ from floatbase.errors import ViewerError
 Key = tuple[str, str, str]
 Update = tuple[Key, bytes]
 
-# meshcat's own commands, then those that page.js adds
+# meshcat's own commands, then those of page.js
 TYPES = (
-    "set_object", "set_transform", "set_property", "delete", "set_animation", "set_control", "delete_control",
-    "set_camera", "set_follow", "set_title", "set_legend", "set_theme", "set_kept",
+    "set_object", "set_transform", "set_property", "delete", "set_animation", "delete_control",
+    "set_control", "move_control", "set_camera", "set_follow", "set_title", "set_legend", "set_theme", "set_kept",
 )  # fmt: skip
 
 ANIMATION: Key = ("/", "set_animation", "")
+_LARGEST = 1e18  # of what a slider may report: MessagePack's whole numbers end at 1.8e19
 _FLOAT32 = np.dtype([("code", "u1"), ("value", ">f4")])  # MessagePack: the byte 0xca, then a big-endian float
 
 
@@ -45,6 +46,7 @@ def set_transform(path: str, matrix: Array) -> Update:
 
     Most commands are of this type, so it is packed by hand.
     """
+    path = normal_path(path)
     numbers = np.empty(16, _FLOAT32)
     numbers["code"] = 0xCA
     numbers["value"] = matrix.T.ravel()
@@ -59,6 +61,7 @@ def set_property(path: str, name: str, value: Any) -> Update:
 
 def set_object(path: str, packed: bytes) -> Update:
     """Put an object at `path`. packed: the object as three.js reads it, in MessagePack (see `lowering.Shape`)."""
+    path = normal_path(path)
     return (path, "set_object", ""), b"\x83\xa4type\xaaset_object\xa4path" + _text(path) + b"\xa6object" + packed
 
 
@@ -104,10 +107,22 @@ def end_animation() -> list[Update]:
 
 
 def set_control(name: str, **range_of_values: float) -> Update:
-    """A control in the page's panel that reports to the window: a slider with value, min, max and step, else a button."""
-    quoted = json.dumps(name)
-    report = f"(value) => viewer.connection.send(JSON.stringify({{type: 'control', name: {quoted}, value: value ?? null}}))"
-    return encode({"type": "set_control", "name": name, "callback": report, **range_of_values})
+    """A control in the page's panel that reports to the window: a slider with value, min, max and step, a check box with a
+    truth value, else a button. The command is ours, because meshcat's reads the name as HTML."""
+    return encode({"type": "set_control", "name": name, **range_of_values})
+
+
+def reported(command: dict[str, Any], value: Any) -> Any:
+    """The value that a page reports for a control, within the control's range: a number, a truth value, or None of a button.
+
+    command: of the control, decoded. Raises `ViewerError` for a value that no such control has: a page of ours sends none.
+    """
+    if "value" not in command:
+        return None
+    is_switch = isinstance(command["value"], bool)
+    if isinstance(value, bool) != is_switch or not isinstance(value, int | float) or not abs(value) < _LARGEST:
+        raise ViewerError(f"the control {command['name']!r} cannot be {value!r}.")
+    return value if is_switch else min(max(value, command.get("min", value)), command.get("max", value))
 
 
 def _upright(point: npt.ArrayLike) -> list[float]:
@@ -116,6 +131,7 @@ def _upright(point: npt.ArrayLike) -> list[float]:
     return [x, z, -y]
 
 
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
 def normal_path(path: str) -> str:
     """The path with one leading slash and no empty parts."""
     return "/" + "/".join(part for part in path.split("/") if part)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -135,6 +136,45 @@ def test_the_camera_moves_when_it_is_called_and_not_when_a_picture_is_drawn(page
     page.reload()
     settle(page, "left")
     np.testing.assert_allclose(page.evaluate(EYE), left, atol=1e-6)
+
+
+NAMES = ('<img src=x onerror="hit = true">', "x<y & z > w", "&amp;", "__proto__", 'it\'s \\ "so" τ')
+LABELS = "[...document.querySelectorAll('.dg .cr .property-name')].map((label) => label.textContent)"
+VALUES = "Object.values(viewer.gui_controllers).map((one) => one.getValue()).filter((value) => typeof value != 'function')"
+
+
+def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser, viewer: Viewer) -> None:
+    heard: defaultdict[str, list[object]] = defaultdict(list)
+    for name in NAMES:
+        viewer.slider(name, heard[name].append, 0.0, -1.0, 1.0)
+        viewer.checkbox(f"box {name}", heard[f"box {name}"].append, True)
+        viewer.button(f"button {name}", lambda name=name: heard[f"button {name}"].append("pressed"))
+    names = [text for name in NAMES for text in (name, f"box {name}", f"button {name}")]
+    page.goto(viewer.url)
+    page.wait_for_function(f"window.viewer && Object.keys(viewer.gui_controllers).length == {len(names)}")
+    other = browser.new_page(viewport=SMALL)
+    other.goto(viewer.url)
+    other.wait_for_function(f"window.viewer && Object.keys(viewer.gui_controllers).length == {len(names)}")
+    assert [label for label in page.evaluate(LABELS) if label in names] == names
+    for name in NAMES:
+        page.evaluate("(name) => viewer.gui_controllers[name].setValue(0.5)", name)
+        other.evaluate("(name) => viewer.gui_controllers[`box ${name}`].setValue(false)", name)
+        page.evaluate("(name) => viewer.gui_controllers[`button ${name}`].fire()", name)
+    page.evaluate("(name) => viewer.gui_controllers[name].setValue(-0.25)", NAMES[0])
+    now = f"JSON.stringify({VALUES})"
+    present = "[-0.25,false" + ",0.5,false" * (len(NAMES) - 1) + "]"
+    for one in (page, other):
+        one.wait_for_function(f"{now} == '{present}'")
+        assert one.evaluate("window.hit") is None
+    page.reload()
+    page.wait_for_function(f"window.viewer && {now} == '{present}'")
+    viewer.slider(NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0)  # made again, as a cell that is run again does
+    other.wait_for_function(f"{VALUES}[0] == 1")
+    other.close()
+    picture(page, "controls")
+    first, *rest = NAMES
+    assert heard[first] == [0.5, -0.25] and all(heard[name] == [0.5] for name in rest)
+    assert all(heard[f"box {name}"] == [False] and heard[f"button {name}"] == ["pressed"] for name in NAMES)
 
 
 def test_backgrounds(screen: Screen, go2: Robot, standing: State) -> None:

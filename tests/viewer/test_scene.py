@@ -4,16 +4,34 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from contextlib import closing
 from typing import Any
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
+from hypothesis import given
 
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Ground, Simulation
-from floatbase.viewer import ALARM, BACKGROUNDS, CALM, IDLE, MEASURED, PLANNED, PRESETS, WARNING, View, Viewer, hexadecimal
+from floatbase.viewer import (
+    ALARM,
+    BACKGROUNDS,
+    CALM,
+    IDLE,
+    MEASURED,
+    PLANNED,
+    PRESETS,
+    WARNING,
+    Item,
+    Picture,
+    View,
+    Viewer,
+    hexadecimal,
+    shapes,
+)
 
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
@@ -236,6 +254,37 @@ def test_a_change_sends_only_what_changed(viewer: Viewer, standing: State, conta
     newest = viewer.window.scene.newest
     viewer.show(standing, contacts, forces=forces + [[0, 0, 1.0]] + 0 * forces)
     assert viewer.window.scene.newest - newest == 4 + 1  # four arrows, and a cone that is no longer on its surface
+
+
+# the same few paths in many spellings, some below others
+PATHS = st.lists(st.sampled_from(["a", "b", ""]), min_size=1, max_size=4).map("/".join).filter(lambda path: path.strip("/"))
+ITEMS = st.builds(
+    Item,
+    st.sampled_from([shapes.label([0.0, 0.0, 0.0], text, 0.1).shape for text in "xy"]),
+    st.sampled_from([np.eye(4), np.diag([2.0, 2.0, 2.0, 1.0])]),
+    st.sampled_from([None, (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.5)]),
+)
+
+
+def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
+    with closing(Viewer(load("ur5"))) as viewer:
+        for picture in pictures:
+            viewer.draw(picture)
+        return viewer.window.scene.commands()
+
+
+@given(st.lists(st.dictionaries(PATHS, ITEMS, max_size=4), min_size=1, max_size=4))
+def test_a_scene_is_that_of_the_last_picture_however_paths_are_spelt(pictures: list[Picture]) -> None:
+    assert scene_after(pictures) == scene_after(pictures[-1:])
+
+
+def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> None:
+    viewer.show(standing)
+    before = viewer.window.scene.commands()
+    for path in ("", "/", "//"):
+        with pytest.raises(InputError, match="has no name; give it one, as below"):
+            viewer.show(standing, extra={path: shapes.label([0.0, 0.0, 0.0], "x", 0.1)})
+    assert viewer.window.scene.commands() == before
 
 
 def test_an_interrupted_picture_is_drawn_afresh(viewer: Viewer, standing: State, contacts: Contacts) -> None:

@@ -282,3 +282,47 @@ def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) ->
     assert interrupted == 50
     window.put([wire.set_transform("/meshcat/a", np.eye(4) * (i + 1))])
     until(lambda: seen == i + 1)
+
+
+STRANGE = [
+    "", "hello", '{"type":', "null", "3", "[]", '"x"', "{}", "[" * 200_000, "9" * 6000, b"\x00\xff", b"\xff\xfe{}",
+    *(json.dumps({"type": kind}) for kind in (3, [], {}, "nonsense", "image", "control")),
+    *(json.dumps({"type": "image", "id": number, "data": "x"}) for number in ([], {}, "7", 7, None)),
+    *(json.dumps({"type": "control", "name": name, "value": 1}) for name in (None, [], {}, 3, "unknown", "\ud800")),
+    *(json.dumps({"type": "control", "name": "slider", "value": v}) for v in (None, "1", [1], True, np.nan, np.inf, 10**400)),
+    *(json.dumps({"type": "control", "name": "box", "value": v}) for v in (None, "true", [True], 1, np.nan)),
+    '{"type": "control", "name": "slider"}',
+]  # fmt: skip
+
+
+def test_what_no_page_says_is_ignored(window: Window, caplog: pytest.LogCaptureFixture) -> None:
+    heard = []
+
+    def hear(name: str, value: Any) -> None:
+        heard.append((name, value))
+        if name == "broken":
+            raise ZeroDivisionError("of the callback")
+
+    window.put([wire.set_control("slider", value=0.0, min=-1.0, max=1.0, step=0.1), wire.set_control("box", value=True)])
+    window.put([wire.set_control("broken")])
+    window.on_control(hear)
+    ours = [("slider", 0.5), ("slider", 9), ("box", False), ("broken", None)]
+
+    async def say() -> None:
+        client = await connect(window, display="9" * 6000)
+        for message in [*STRANGE, *(json.dumps({"type": "control", "name": name, "value": value}) for name, value in ours)]:
+            await client.write_message(message, binary=isinstance(message, bytes))
+        while len(heard) < len(ours):
+            await asyncio.sleep(0.01)
+        huge = await connect(window)
+        with pytest.raises(tornado.websocket.WebSocketClosedError):  # refused, so the connection ends while it is sent
+            for _ in range(3):
+                await huge.write_message("x" * (40 << 20))
+                await asyncio.sleep(0.1)
+
+    in_a_loop(say())
+    assert heard == [("slider", 0.5), ("slider", 1.0), ("box", False), ("broken", None)]
+    told = [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")]
+    assert [record.getMessage() for record in told] == ["the control 'broken' failed"]
+    assert "of the callback" in str(told[0].exc_info)
+    assert window.is_open

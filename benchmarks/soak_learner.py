@@ -1,0 +1,127 @@
+"""A learner's files while the processes that write them are killed: a part of `python benchmarks/soak.py`."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+from unittest.mock import patch
+
+from floatbase.lessons import progress
+from floatbase.lessons.publish import MINE, prepare
+
+LESSONS = 4
+CELLS = 100  # of a lesson: so many that a kill may fall into the writing of a file
+
+
+def kills() -> Iterator[Callable[[], object]]:
+    """`prepare` and `record`, killed at a random moment; then they run to their end, and nothing is lost."""
+    dice, numbers, marks = random.Random(0), count(1), set[str]()
+    with tempfile.TemporaryDirectory(prefix="floatbase-soak-") as name, patch.dict(os.environ, FLOATBASE_HOME=name):
+        course, mine = Path(name), Path(name, MINE)
+        for lesson in range(LESSONS):
+            write(course / f"{lesson}.ipynb", ["course 0"] * CELLS)
+        start = time.perf_counter()
+        prepare(course)
+        takes = time.perf_counter() - start
+
+        def step() -> None:
+            number = next(numbers)
+            for lesson in dice.sample(range(LESSONS), LESSONS // 2):
+                write(course / f"{lesson}.ipynb", [f"course {number}"] * CELLS)
+            if number % 10 == 1:
+                marks.add(f"the learner's {number}")
+                path = dice.choice(sorted(mine.glob("*.ipynb")))
+                write(path, [*cells(path), f"the learner's {number}"])
+            killed(lambda tell: prepare(course), dice.uniform(0.0, takes))
+            judge_copies(course, mine, marks)
+            prepare(course)
+            judge_copies(course, mine, marks, is_done=True)
+            judge_tries(f"{number % 7}", dice)
+
+        yield step
+
+
+def write(path: Path, texts: list[str]) -> None:
+    """A notebook with these cells."""
+    made = [{"cell_type": "markdown", "id": f"{i}", "metadata": {}, "source": text} for i, text in enumerate(texts)]
+    path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}), encoding="utf-8")
+
+
+def cells(path: Path) -> list[str]:
+    """What `write` wrote."""
+    return ["".join(cell["source"]) for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]]
+
+
+def judge_copies(course: Path, mine: Path, marks: set[str], is_done: bool = False) -> None:
+    """All files are whole and hold what the learner wrote; after an update that has come to its end, the course's texts too.
+
+    marks: cells that the learner wrote. is_done: whether the last update has come to its end.
+    """
+    when = "after an update" if is_done else "after a kill"
+    try:
+        copies = {path.name: cells(path) for path in mine.glob("*.ipynb")}
+    except ValueError as error:
+        raise AssertionError(f"{when} a file is not whole: {error}") from None
+    faults = {"lost": marks.difference(*copies.values())}
+    if is_done:
+        lessons = {path.stem: cells(path) for path in course.glob("*.ipynb")}
+        faults["not there"] = {
+            lesson
+            for lesson, text in lessons.items()
+            if text not in [held[:CELLS] for name, held in copies.items() if name.split(".")[0] == lesson]
+        }
+        faults["left over"] = {path.name for path in mine.iterdir()} - {*copies, ".from.json"}
+    for what, names in faults.items():
+        assert not names, f"{when} {what}: {', '.join(sorted(names))}"
+
+
+def judge_tries(name: str, dice: random.Random) -> None:
+    """The tries of an exercise that a process had counted when it was killed are there, the others' too, and it goes on."""
+    others = progress.load()
+    before = others.pop(name, {"tries": 0})["tries"]
+
+    def record(tell: Callable[[], object]) -> None:
+        for number in range(1000):
+            progress.record(name, right=number % 2 == 0)
+            tell()
+
+    told = killed(record, dice.uniform(0.0, 0.01))
+    found = progress.load()
+    now = found.pop(name, {"tries": 0})["tries"]
+    assert now - before in (told, told + 1), f"{told} tries were counted before a kill, {now - before} are there after it"
+    assert found == others, "a kill changed the tries of other exercises"
+    progress.record(name, right=True)
+    assert progress.load()[name]["tries"] == now + 1, "after a kill a try is not counted"
+
+
+def killed(action: Callable[[Callable[[], object]], object], after: float) -> int:
+    """Run an action in a process that is killed after so many seconds. Returns how often it called what it was given."""
+    ear, mouth = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            os.write(mouth, b"!")
+            action(lambda: os.write(mouth, b"."))
+            os._exit(0)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(1)
+    os.close(mouth)
+    with open(ear, "rb") as heard:
+        heard.read(1)
+        time.sleep(after)
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)
+        told = len(heard.read())
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 1, "the process to be killed ended with an error"
+    return told
