@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.errors import InputError
 
 FLAT = 1e-12  # curvature below this part of the largest counts as none
@@ -19,7 +18,7 @@ _SLOPE = 1e-7  # part of 1 + the largest |g| that a slope without curvature may 
 
 
 @dataclass(frozen=True, eq=False)
-class Affine:
+class Affine(Value):
     """The map x -> A x + b.
 
     A: shape (m, n); b: shape (m,). `blocks` names slices of the output: `f["tau"]` is the `Affine` of those rows.
@@ -35,9 +34,6 @@ class Affine:
         object.__setattr__(self, "A", checked("A", self.A, (None, None)))
         object.__setattr__(self, "b", checked("b", self.b, (self.A.shape[0],)))
         object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Affine, (self.A, self.b, dict(self.blocks))  # a mapping proxy can be neither pickled nor copied
 
     @staticmethod
     def linear(A: npt.ArrayLike) -> Affine:
@@ -142,7 +138,7 @@ class Affine:
 
 
 @dataclass(frozen=True, eq=False)
-class Quadratic:
+class Quadratic(Value):
     """The cost x -> ½ xᵀ H x + gᵀ x + c.
 
     H: shape (n, n), made symmetric; g: shape (n,); c: a number. Raises `InputError` when the shapes do not fit.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.errors import InputError
 
 _LAMINAR = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
@@ -79,7 +79,7 @@ class Hydraulics:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class Pose(Value):
     """Where d cylinders stand at given joint angles.
 
     length: (d,) m, ℓ, from foot to rod end.
@@ -97,7 +97,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class Power:
+class Power(Value):
     """Where the power goes, each of shape (d,), W: pump = joint + valve + leakage + stored.
 
     pump: what the supply line gives less what the tank line takes.
@@ -113,7 +113,7 @@ class Power:
     stored: Array
 
 
-class Cylinders:
+class Cylinders(Value):
     """App. B: d double-acting cylinders, each on a crank, as equations without memory.
 
     For a joint angle q, with γ the angle at the joint between the crank b and the cylinder's foot at distance a:

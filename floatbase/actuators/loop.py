@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.actuators.hydraulics import Cylinders, Hydraulics, Pose
 from floatbase.errors import InputError
 from floatbase.robots import Robot
@@ -20,7 +20,7 @@ VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pu
 
 
 @dataclass(frozen=True, eq=False)
-class OilState:
+class OilState(Value):
     """What d cylinders and their loops remember.
 
     opening: (d,), of the valves, -1 to 1.

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.affine import Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, equations_of_motion, feasible_space
 from floatbase.errors import InputError
@@ -17,7 +17,7 @@ from floatbase.robots import Robot, State
 
 
 @dataclass(frozen=True, eq=False)
-class AnalyticCommand:
+class AnalyticCommand(Value):
     """One answer of `AnalyticController`, read-only.
 
     tau: (d,) N·m, joint torques to apply. forces: (k,) N, world, and qdd: (nv,), planned with them.
@@ -31,7 +31,7 @@ class AnalyticCommand:
         return f"AnalyticCommand(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N)"
 
 
-class AnalyticController:
+class AnalyticController(Value):
     """(22) + (23) + terms for posture and torque, minimised in closed form over β (17) at every tick.
 
     The desired wrench is f̃_c = m (a - g) with a = -kp e - kd ė, where e leads from `com` to the centre of mass; τ̃_c does the
@@ -75,7 +75,7 @@ class AnalyticController:
             raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(contacts).__name__}.")
         if not isinstance(state, State):
             raise InputError(f"the state to hold must be a State, as robot.standing(), not {type(state).__name__}.")
-        if state.robot is not robot:
+        if state.robot != robot:
             raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
         equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
         self.robot, self.contacts, self._desired = robot, contacts, state

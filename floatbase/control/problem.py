@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from floatbase._arrays import Array, positive, read_only
+from floatbase._arrays import Array, Value, positive, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError
@@ -23,7 +23,7 @@ INCONSISTENT = 1e-6  # m/s²: contact rows that disagree by less do so by roundi
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class Limits(Value):
     """The inequalities of (27).
 
     torque_limits: shape (d,), N·m, +inf where there is none.
@@ -47,7 +47,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Value):
     """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning there.
 
     Raises `InputError` for values of a wrong kind; `qp` does so for names and shapes that do not fit.

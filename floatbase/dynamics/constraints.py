@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, cross, positive, unit_vector
+from floatbase._arrays import Array, Value, checked, cross, positive, unit_vector
 from floatbase.dynamics.contact import DEFAULT_MU, UP, OnePoint, check_ground
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -17,7 +18,7 @@ _FLAT_WHEEL = 1e-6  # sine of the angle between axle and normal; below it roundi
 
 
 @dataclass(frozen=True, eq=False)
-class LinearConstraint:
+class LinearConstraint(Value):
     """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the document).
 
     Holonomic constraints φ(q, t) = 0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6). The
@@ -112,13 +113,18 @@ def fixed_frame(frame: str) -> LinearConstraint:
 
     With a floating base bolted by it, λ is what the document's Figure 1 (left) calls the reaction of the ground.
     """
-    return LinearConstraint(f"bolts of {frame}", 6, lambda state, t: (state.frame_jacobian(frame), -state.frame_drift(frame)))
+    return LinearConstraint(f"bolts of {frame}", 6, partial(_bolted, frame))
 
 
 def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
     """A frame's origin driven with a given acceleration (3,), m/s², world, as a function of t: A q̈ = b(q, q̇, t) (note 6)."""
+    return LinearConstraint(f"drive of {frame}", 3, partial(_driven, frame, acceleration))
 
-    def rows(state: State, t: float) -> tuple[Array, Array]:
-        return state.frame_jacobian(frame)[:3], checked("acceleration", acceleration(t), (3,)) - state.frame_drift(frame)[:3]
 
-    return LinearConstraint(f"drive of {frame}", 3, rows)
+# with names, so that they can be pickled
+def _bolted(frame: str, state: State, t: float) -> tuple[Array, Array]:
+    return state.frame_jacobian(frame), -state.frame_drift(frame)
+
+
+def _driven(frame: str, acceleration: Callable[[float], Array], state: State, t: float) -> tuple[Array, Array]:
+    return state.frame_jacobian(frame)[:3], checked("acceleration", acceleration(t), (3,)) - state.frame_drift(frame)[:3]

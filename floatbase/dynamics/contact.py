@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
+from floatbase._arrays import Array, Value, checked, cross, positive, read_only, unit_vector
 from floatbase.robots import State, checked_corners
 
 UP = read_only([0.0, 0.0, 1.0])
@@ -53,7 +53,7 @@ class Contact(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class OnePoint:
+class OnePoint(Value):
     """What contacts at one point of a frame's body share; `_arm` says where the point is and how it moves on the body."""
 
     frame: str
@@ -122,7 +122,7 @@ class PointContact(OnePoint):
 
 
 @dataclass(frozen=True, eq=False)
-class FlatFootContact:
+class FlatFootContact(Value):
     """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note 9 of the document).
 
     The frame's six rows hold the motion and the corners only carry forces. Twelve rows for the motion of the corners would

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, read_only
 from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, PointContact
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
@@ -20,7 +20,7 @@ Normals: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Contacts:
+class Contacts(Value):
     """Contacts stacked in order; none at all for free flight. `only`, `without` and `+` make new ones.
 
     Raises `InputError` for a name that stands twice.

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked
+from floatbase._arrays import Array, Value, checked
 from floatbase.dynamics.contacts import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -17,7 +17,7 @@ Block: TypeAlias = Literal["qdd", "tau", "forces"]  # the three unknowns of (7):
 
 
 @dataclass(frozen=True, eq=False)
-class EquationsOfMotion:
+class EquationsOfMotion(Value):
     """(1)(4)(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
 
     For point contacts A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed

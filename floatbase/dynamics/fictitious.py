@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, read_only
 from floatbase.errors import InputError
 from floatbase.robots import State
 
@@ -21,7 +21,7 @@ _STEP = 1e-5  # m and rad to each side for central differences: curvature and ro
 
 
 @dataclass(frozen=True, eq=False)
-class BiasForces:
+class BiasForces(Value):
     """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each (nv,), N and N·m as h.
 
     Which is which depends on the coordinates: v holds the base's velocity in the base frame, so ω × v of the base counts as
@@ -91,7 +91,7 @@ def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class TurningView:
+class TurningView(Value):
     """A free particle as one who rides on a turning frame sees it; a row for each time.
 
     All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: the document, Appendix A.

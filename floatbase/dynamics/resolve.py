@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, Value, read_only
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
@@ -17,7 +17,7 @@ _FIT_TOLERANCE = 1e-6  # part of J that may lie beside A's rows: rounding leaves
 
 
 @dataclass(frozen=True, eq=False)
-class ContactSpace:
+class ContactSpace(Value):
     """The contacts of (7) along the directions that they resolve: r independent motions and the forces that hold them.
 
     The rank r is decided here, once, for everything that follows (`contact_space`).

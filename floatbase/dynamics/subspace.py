@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.dynamics.resolve import contact_space
@@ -59,7 +59,7 @@ def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class FeasibleSpace:
+class FeasibleSpace(Value):
     """(13)(16)(17) All (q̈, τ, λ) that satisfy (7), as the map β -> v + V⊥ β with orthonormal V⊥.
 
     eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: the document, §2.2.2.

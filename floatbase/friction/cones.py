@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only, unit_vector
+from floatbase._arrays import Array, Value, checked, positive, read_only, unit_vector
 from floatbase.errors import InputError
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
@@ -34,7 +34,7 @@ def tangents(normal: npt.ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Decomposition:
+class Decomposition(Value):
     """Figure 3: the normal and the tangential part of a contact force, f = f_perp + f_par.
 
     f_perp: n nᵀ f, shape (3,), N, world.
@@ -61,7 +61,7 @@ def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionCone:
+class FrictionCone(Value):
     """(28) The forces that Coulomb friction can make: α_∥ ≤ μ α_⊥, a round cone about the normal.
 
     normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. The ground only pushes: α_⊥ ≥ 0.
@@ -111,7 +111,7 @@ class FrictionCone:
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionPolyhedron:
+class FrictionPolyhedron(Value):
     """(28) as linear rows: a polyhedron with n facets in place of the cone α_∥ ≤ μ α_⊥.
 
     normal: shape (3,), world, out of the ground, made unit.

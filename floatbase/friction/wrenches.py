@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.dynamics import Contacts, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction.cones import FrictionPolyhedron
@@ -25,7 +25,7 @@ TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets
 
 
 @dataclass(frozen=True, eq=False)
-class WrenchSet:
+class WrenchSet(Value):
     """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i), f_i in its friction polyhedron: the contact wrench cone (CWC).
 
     `wrench_set` makes it from a state and its contacts. The torque limits of the joints do not enter.

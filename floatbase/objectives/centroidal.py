@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, grasp_matrix, resolved_motion, torque_force_space
 from floatbase.errors import InputError
@@ -120,7 +120,7 @@ def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueForForces:
+class TorqueForForces(Value):
     """(25) The smallest torques that give desired forces, in closed form.
 
     With fewer torques than forces not every λ is reachable: `torque` then answers for the nearest reachable accelerations.

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
@@ -70,7 +70,7 @@ def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class CoMTask:
+class CoMTask(Value):
     """Bring the centre of mass to a position; residual in q̈, m/s².
 
     position: shape (3,), m, world.
@@ -100,7 +100,7 @@ class CoMTask:
 
 
 @dataclass(frozen=True, eq=False)
-class OrientationTask:
+class OrientationTask(Value):
     """Bring a frame to an orientation; residual in q̈, rad/s². The error is e = log(R R_desiredᵀ), rad, world-aligned.
 
     frame: its name; "base" is the base link.
@@ -143,7 +143,7 @@ class OrientationTask:
 
 
 @dataclass(frozen=True, eq=False)
-class FrameTask:
+class FrameTask(Value):
     """Bring a frame's origin to a position; residual in q̈, m/s². A foot that swings, a hand.
 
     The origin of a ball foot's frame is not where it touches: `Contacts.positions` has the sole, one radius lower where the
@@ -181,7 +181,7 @@ class FrameTask:
 
 
 @dataclass(frozen=True, eq=False)
-class PostureTask:
+class PostureTask(Value):
     """Bring the joints to those of a configuration; residual in q̈, rad/s².
 
     q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of length 1.
@@ -207,7 +207,7 @@ class PostureTask:
 
 
 @dataclass(frozen=True, eq=False)
-class ForceTask:
+class ForceTask(Value):
     """Keep contact forces near a target, shape (k,), N, world, zero by default; residual in λ, N.
 
     With a small weight it chooses among forces of equal wrench: the force regularisation.
@@ -227,7 +227,7 @@ class ForceTask:
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueTask:
+class TorqueTask(Value):
     """Keep joint torques near a target, shape (d,), N·m, zero by default; residual in τ, N·m."""
 
     target: Target | None = None

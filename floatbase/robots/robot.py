@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ _AREA_TOLERANCE = 1e-6  # m: corners nearer to one line than this span no area; 
 
 
 @dataclass(frozen=True, eq=False)
-class Foot:
+class Foot(Value):
     """Where a robot can touch the ground: a ball, or a flat foot with corners.
 
     frame: name of the frame that carries the foot; a flat foot's z axis points out of the ground when it stands.
@@ -55,7 +57,7 @@ class Foot:
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(Value):
     """A robot as the equations need it. Made by `load`; nothing in it changes afterwards.
 
     name: as it was loaded.
@@ -79,11 +81,28 @@ class Robot:
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,)))
+        parts = "7 for the base, then its joints" if self.is_floating else "its joints"
+        object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,), parts))
         check_unit_lengths(self.model, "posture", self.posture)
         object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
+        object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         for foot in self.feet:
             self.frame_id(foot.frame)
+
+    @cached_property
+    def _fingerprint(self) -> bytes:
+        """Of all that equations and physics take from the robot: the same in another process."""
+        feet = [(foot.frame, foot.radius, *map(np.ndarray.tobytes, (foot.centre, foot.middle))) for foot in self.feet]
+        corners = [b"" if foot.corners is None else foot.corners.tobytes() for foot in self.feet]
+        parts = self.name, self.model.saveToString(), feet, corners, self.torque_limits.tobytes(), self.posture.tobytes()
+        return sha256(repr(parts).encode()).digest()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other is the same robot: another `load` of it, or one that came out of a pickle."""
+        return self is other or (isinstance(other, Robot) and self._fingerprint == other._fingerprint)
+
+    def __hash__(self) -> int:
+        return hash(self._fingerprint)
 
     @cached_property
     def is_floating(self) -> bool:

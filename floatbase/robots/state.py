@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, read_only
 from floatbase.errors import InputError
 from floatbase.robots.robot import Robot, check_unit_lengths
 
@@ -17,7 +17,7 @@ WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class State:
+class State(Value):
     """A configuration q and a velocity v of a robot, and all that follows from them alone.
 
     A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts of frames are given in the

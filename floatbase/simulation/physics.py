@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, cross, positive
+from floatbase._arrays import Array, Value, checked, cross, positive
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -25,7 +25,7 @@ _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the
 
 
 @dataclass(frozen=True, eq=False)
-class Push:
+class Push(Value):
     """A force on the robot for a while.
 
     force: (3,) N, world, at the origin of the frame.
@@ -126,7 +126,7 @@ class Simulation:
         state = self._standing() if state is None else state
         if not isinstance(state, State):
             raise InputError(f"reset needs a State, as robot.standing(), not {state!r}.")
-        if state.robot is not self.robot:
+        if state.robot != self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)

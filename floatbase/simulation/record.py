@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, Value, read_only
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -19,7 +19,7 @@ Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
 
 @dataclass(frozen=True, eq=False)
-class Rollout:
+class Rollout(Value):
     """What happened: one row for each of n control ticks. Read-only.
 
     contacts: all that the controller had at any time; its stance at row i is `contacts_at(i)`.

@@ -110,7 +110,7 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
     if not callable(controller):
         raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
     robot = getattr(controller, "robot", sim.robot)
-    if robot is not sim.robot:
+    if robot != sim.robot:
         raise InputError(f"the controller is for {robot!r}, the simulation holds {sim.robot!r}: make both from one fb.load.")
     if not isinstance(pushes, Sequence):
         raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {pushes!r}.")

@@ -290,7 +290,7 @@ class Painter:
     def _check_state(self, state: Any) -> None:
         if not isinstance(state, State):
             raise InputError(f"show needs a State, as in robot.standing(), not {type(state).__name__}.")
-        if state.robot is not self.robot and state.robot.name != self.robot.name:
+        if state.robot.name != self.robot.name:
             raise InputError(
                 f"this viewer shows {self.robot.name}, but the state is one of {state.robot.name}; "
                 "make a Viewer for that robot."
