@@ -49,8 +49,9 @@ class Value:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        cls, given = type(self), vars(self).items()
-        kept = {name: value for name, value in given if not isinstance(getattr(cls, name, None), cached_property)}
+        computed = {name for name in vars(self) if isinstance(getattr(type(self), name, None), cached_property)}
+        computed -= set(getattr(self, "__dataclass_fields__", ()))  # given here, though a class above computes it
+        kept = {name: value for name, value in vars(self).items() if name not in computed}
         return {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in kept.items()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
