@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Self, TypeAlias, TypeVar
@@ -15,7 +16,7 @@ Array: TypeAlias = npt.NDArray[np.floating[Any]]
 Kind = TypeVar("Kind")
 LARGEST = 1e30  # in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
 _NO_LENGTH = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
-_SEVERAL = ("Contacts", "EquationsOfMotion", "Limits", "Hydraulics")  # names that take no article
+_SEVERAL = ("Contacts", "EquationsOfMotion", "Limits", "HydraulicActuators")  # names that take no article
 _SHORT = 60  # characters of a value that a message repeats
 
 # how to get one, by class: for the messages of `of_kind`
@@ -65,9 +66,8 @@ def of_kind(name: str, value: object, kind: type[Kind], example: str = "") -> Ki
     """`value`, after checking that it is a `kind`. example: how to get one, where the table above has none."""
     if isinstance(value, kind):
         return value
-    called, example = kind.__name__, example or _EXAMPLES.get(kind.__name__, "")
-    article = "" if called in _SEVERAL else "an " if called[0] in "AEIO" else "a "
-    raise InputError(f"{name} must be {article}{called}{f', as {example}' if example else ''}, not {said(value)}.")
+    example = example or _EXAMPLES.get(kind.__name__, "")
+    raise InputError(f"{name} must be {_one(kind)}{f', as {example}' if example else ''}, not {said(value)}.")
 
 
 def text(name: str, value: object) -> str:
@@ -75,6 +75,14 @@ def text(name: str, value: object) -> str:
     if isinstance(value, str):
         return value
     raise InputError(f"{name} must be a text, not {said(value)}.")
+
+
+def texts(name: str, value: Any) -> tuple[str, ...]:
+    """`value` as a tuple, after checking that it is a list of texts, and not one text."""
+    if isinstance(value, Sequence) and not isinstance(value, str) and all(isinstance(entry, str) for entry in value):
+        return tuple(value)
+    example = value if isinstance(value, str) else "…"
+    raise InputError(f'{name} must be a list of names, as in {name}=["{example}"], not {said(value)}.')
 
 
 def flag(name: str, value: object) -> bool:
@@ -96,7 +104,7 @@ def whole(name: str, value: Any, least: int, most: int, why: str = "") -> int:
     plain = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
     if plain and least <= value <= most and value == int(value):
         return int(value)
-    raise InputError(f"{name} is {said(value)}; it must be a whole number from {least} to {most}{f': {why}' if why else ''}.")
+    raise InputError(f"{name} is {said(value)}; it must be a whole number ≥ {least} and ≤ {most}{f': {why}' if why else ''}.")
 
 
 def read_only(value: Any) -> Array:
@@ -138,6 +146,12 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
     return array
 
 
+def flat_forces(forces: Any, k: int, name: str = "forces") -> Array:
+    """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked."""
+    found = plain_numbers(forces)
+    return checked(name, forces if found is None else found.ravel(), (k,), "N")
+
+
 def number(name: str, value: Any, unit: str = "", least: float = -LARGEST, most: float = LARGEST) -> float:
     """`value` as a float, after checking that it is a plain number from `least` to `most`."""
     found = float(value if isinstance(value, float) else checked(name, value, (), unit))
@@ -160,14 +174,20 @@ def said(value: object) -> str:
     """A value as a message repeats it: short, and by its kind where it is not a plain one."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
-    if isinstance(value, np.ma.MaskedArray):
-        return "a masked array"
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"{_one(type(value))} of {value.dtype} of shape {value.shape}"
     if isinstance(value, int) and abs(value) > LARGEST:
         return f"a whole number beyond {LARGEST:g}"
     if value is None or isinstance(value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray):
         plain = " ".join(repr(value).split())
         return plain if len(plain) <= _SHORT else f"{plain[:_SHORT]}…"
-    return f"a {type(value).__name__}"
+    return _one(type(value))
+
+
+def _one(kind: type) -> str:
+    """A class with its article."""
+    name = {"ndarray": "array"}.get(kind.__name__, kind.__name__)
+    return name if name in _SEVERAL else f"{'an' if name[0].lower() in 'aeio' else 'a'} {name}"
 
 
 def unit_vector(name: str, value: Any) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, of_kind, positive, read_only
 from floatbase.errors import InputError
 
 _LAMINAR = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
@@ -139,7 +139,7 @@ class Cylinders(Value):
     """
 
     def __init__(self, hydraulics: Hydraulics, size: npt.ArrayLike, centre: npt.ArrayLike):
-        self.hydraulics = hydraulics
+        self.hydraulics = of_kind("hydraulics", hydraulics, Hydraulics)
         size = checked("size", size, (None,))
         if np.any(size <= 0.0):
             raise InputError(f"size of a cylinder is {size.min():g}; it must be > 0.")

@@ -9,11 +9,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, checked, cross, positive, unit_vector
+from floatbase._arrays import Array, Value, checked, cross, function, positive, text, unit_vector, whole
 from floatbase.dynamics.contact import DEFAULT_MU, UP, OnePoint, check_ground
 from floatbase.errors import InputError
 from floatbase.robots import State
 
+_MOST_ROWS = 1000  # of one constraint
 _FLAT_WHEEL = 1e-6  # sine of the angle between axle and normal; below it rounding alone chooses the lowest point
 
 
@@ -37,8 +38,9 @@ class LinearConstraint(Value):
     point_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
-        if int(self.m) != self.m or self.m < 1:
-            raise InputError(f"constraint {self.name!r} has m = {self.m} rows; it must have at least 1.")
+        text("name of a constraint", self.name)
+        whole(f"m of {self.name}, its number of rows,", self.m, 1, _MOST_ROWS)
+        function(f"rows of {self.name}", self.rows, "rows(state, t)")
 
     @property
     def k(self) -> int:
@@ -113,12 +115,13 @@ def fixed_frame(frame: str) -> LinearConstraint:
 
     With a floating base bolted by it, λ is what the document's Figure 1 (left) calls the reaction of the ground.
     """
-    return LinearConstraint(f"bolts of {frame}", 6, partial(_bolted, frame))
+    return LinearConstraint(f"bolts of {text('frame', frame)}", 6, partial(_bolted, frame))
 
 
 def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
     """A frame's origin driven with a given acceleration (3,), m/s², world, as a function of t: A q̈ = b(q, q̇, t) (note 6)."""
-    return LinearConstraint(f"drive of {frame}", 3, partial(_driven, frame, acceleration))
+    function("acceleration", acceleration, "acceleration(t)")
+    return LinearConstraint(f"drive of {text('frame', frame)}", 3, partial(_driven, frame, acceleration))
 
 
 # with names, so that they can be pickled

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, read_only
+from floatbase._arrays import Array, Value, of_kind, read_only
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
@@ -72,6 +72,7 @@ def resolved_motion(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
     """U, s, Vt of A's singular value decomposition, without the directions that A resolves badly."""
+    of_kind("eom", eom, EquationsOfMotion)
     U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
     r = int(np.sum(s > MOTION_TOLERANCE * s.max(initial=0.0)))
     return U[:, :r], s[:r], Vt[:r]

@@ -20,12 +20,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
 from floatbase._arrays import Array, Value, checked, read_only
-from floatbase.affine import Affine
+from floatbase.affine import Affine, block_slices
 from floatbase.errors import InfeasibleError
 from floatbase.linear_algebra import ranked_svd, row_lengths
 from floatbase.qp.conflicts import conflicting_rows
@@ -65,7 +64,7 @@ class QP(Value):
         H = checked("H", self.H, (g.size, g.size))
         values: dict[str, object] = {"H": read_only(0.5 * (H + H.T)), "g": g, "A": A, "G": G}
         values["b"], values["h"] = checked("b", self.b, (len(A),)), checked("h", self.h, (len(G),))
-        values["blocks"] = MappingProxyType(dict(self.blocks))
+        values["blocks"] = block_slices(self.blocks)
         values["equality_names"] = row_labels(self.equality_names, len(A), "equality")
         values["inequality_names"] = row_labels(self.inequality_names, len(G), "inequality")
         for name, value in values.items():

@@ -87,7 +87,7 @@ class Solution(Value):
 
     def __getitem__(self, block: str) -> Array:
         """One named block of x."""
-        if block not in self.qp.blocks:
+        if not isinstance(block, str) or block not in self.qp.blocks:
             raise InputError(f"this problem has no block {block!r}; its blocks are {list(self.qp.blocks)}.")
         return self.x[self.qp.blocks[block]]
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, positive, read_only
+from floatbase._arrays import Array, flag, of_kind, positive, read_only, said
 from floatbase.errors import InputError, UnknownNameError, unknown_name
 from floatbase.robots.entries import CATALOGUE, Entry
 from floatbase.robots.robot import Foot, Robot
@@ -130,7 +130,8 @@ def unbolted(robot: Robot, plate: bool = False) -> Robot:
     robot: with a fixed base, such as ur5.
     plate: let it stand on a square plate that has no weight (`PLATE`); else it touches nothing and floats 1 m up.
     """
-    if robot.is_floating:
+    flag("plate", plate)
+    if of_kind("robot", robot, Robot, 'fb.load("ur5")').is_floating:
         raise InputError(f"{robot.name} has no bolts; unbolted takes a robot with a fixed base, such as ur5.")
     tree = ElementTree.parse(robot.urdf).getroot()
     for element in [*tree.findall("link[@name='world']"), *tree.findall("joint/parent[@link='world']/..")]:
@@ -164,7 +165,7 @@ def _loader(name: str, known: Mapping[str, Any]) -> Any:
             f"{str(name)!r} is no robot's name but a file's; fb.load_urdf({str(name)!r}, feet=[…]) loads a URDF of your own. "
             f"Names that fb.load knows: {', '.join(CATALOGUE)}, and the others of example-robot-data."
         )
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise unknown_name("robot", name, known, "fb.catalogue() says what the catalogue's robots are for.")
     if not known[name].urdf_filename:
         raise InputError(f"{name} comes as an SDF file; floatbase reads URDF. Choose one of {', '.join(CATALOGUE)}.")
@@ -201,7 +202,7 @@ def _limb_ends(model: pin.Model) -> list[str]:
 
 def _feet(requested: Sequence[str | Foot], radius: float | None) -> tuple[Foot, ...]:
     """Feet of frames and `Foot` values."""
-    if isinstance(requested, str):
-        raise InputError(f'feet must be a list of frames, as in feet=["{requested}"].')
+    if isinstance(requested, str) or not isinstance(requested, Sequence):
+        raise InputError(f'feet must be a list of frames, as in feet=["FL_foot"], not {said(requested)}.')
     r = 0.0 if radius is None else positive("foot_radius", radius, "m", allow_zero=True)
     return tuple(foot if isinstance(foot, Foot) else Foot(foot, r) for foot in requested)

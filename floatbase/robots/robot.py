@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, plain_numbers, positive, read_only, said, text, whole
 from floatbase.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ class Foot(Value):
     corners: Array | None = None
 
     def __post_init__(self) -> None:
+        text("frame of a foot", self.frame)
         object.__setattr__(self, "radius", positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
         object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
@@ -208,6 +209,8 @@ class Robot(Value):
         spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with
         that deviation in rad/s and m/s. Joints stay within their limits.
         """
+        if not isinstance(seed, np.random.Generator):
+            whole("seed", seed, 0, 2**64, "or a numpy.random.Generator")
         rng, standing = np.random.default_rng(seed), self.standing()
         spread = positive("spread", spread, allow_zero=True)
         q = standing.integrate(rng.uniform(-spread, spread, self.nv))
@@ -251,11 +254,8 @@ def checked_corners(frame: str, requested: npt.ArrayLike) -> Array:
 
 def torque_limits_of(d: int, requested: npt.ArrayLike) -> Array:
     """Requested torque limits, one number or (d,), N·m, +inf for none, as shape (d,). Raises `InputError`."""
-    try:
-        limits = np.array([requested] * d if np.ndim(requested) == 0 else requested, dtype=np.float64)
-    except (TypeError, ValueError):
-        limits = np.zeros(0)
-    if limits.shape != (d,) or not np.all(limits > 0):  # NaN is not > 0 either
-        got = f"got shape {np.shape(requested)}: {requested!r}"
-        raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); {got}.")
-    return read_only(limits)
+    limits = plain_numbers(requested)
+    if limits is None or limits.shape not in ((), (d,)) or not np.all(limits > 0):  # NaN is not > 0 either
+        got = said(requested) if limits is None else f"shape {limits.shape}: {said(requested)}"
+        raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); got {got}.")
+    return read_only(np.broadcast_to(limits, (d,)))

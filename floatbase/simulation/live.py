@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy.typing as npt
 
-from floatbase._arrays import positive
+from floatbase._arrays import function, of_kind, positive
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, rollout
@@ -47,7 +47,9 @@ class Live:
         after_reset: Callable[[], None] | None = None,
         idle: float = 120.0,
     ):
-        self.sim = sim
+        self.sim = of_kind("sim", sim, Simulation)
+        function("the controller", controller, "controller(q, v, t)")
+        function("show", show, "show(record)")
         self.error: Exception | None = None
         self._controller, self._show, self._actuators, self._after_reset = controller, show, actuators, after_reset
         self._period = positive("control_period", control_period, "s")
@@ -95,13 +97,15 @@ class Live:
 
     def use(self, controller: Controller) -> None:
         """Go on under another controller from the next slice."""
+        function("the controller", controller, "controller(q, v, t)")
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
 
     def slow_motion(self, speed: float) -> None:
         """Simulated time per real time, 1 by default."""
+        speed = positive("speed", speed)
         with self._lock:
-            self._last_call, self._speed = time.monotonic(), positive("speed", speed)
+            self._last_call, self._speed = time.monotonic(), speed
 
     def close(self) -> None:
         """Pause, and wait until the thread has ended."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, checked, of_kind, positive, whole
 from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture
 
@@ -59,7 +59,8 @@ def animate(
     speed: 1 for real time.
     paused: whether the reader must press play first.
     """
-    t = np.asarray(times, dtype=np.float64) - np.asarray(times, dtype=np.float64)[0]
+    t = checked("times", times, (None,), "s")
+    t = t - t[0]
     courses = _courses(list(pictures))
     clips = []
     for path, course in courses.items():
@@ -73,9 +74,16 @@ def animate(
 
 def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
     """The rows of a record to draw: the first, the last, and `rate` rows a second between. times: (n,), s, of all rows."""
-    t = np.asarray(times, dtype=np.float64)
+    t = checked("times", times, (None,), "s")
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
     return np.unique(np.clip(np.searchsorted(t, ticks - 1e-9), 0, len(t) - 1))
+
+
+def checked_rollout(rollout: Rollout) -> Rollout:
+    """The record, after checking that it is one."""
+    from floatbase.simulation import Rollout  # loads the physics, which pictures do without
+
+    return of_kind("rollout", rollout, Rollout)
 
 
 def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] | None:
@@ -83,7 +91,8 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
 
     seen: s that a push is still shown after its end.
     """
-    now = float(rollout.time[row])
+    now = float(checked_rollout(rollout).time[whole("row", row, -len(rollout), len(rollout) - 1)])
+    seen = positive("seen", seen, "s", allow_zero=True)
     for push in sorted(rollout.pushes, key=lambda push: push.start, reverse=True):
         if push.acts_at(now) or 0.0 <= now - push.start < push.duration + seen - 1e-9:
             return push.frame, push.force
