@@ -82,6 +82,7 @@ class Affine(Value):
         x = checked("x", x, (self.n_in,)) if found is None else found
         if x.ndim not in (1, 2) or x.shape[0] != self.n_in:
             raise InputError(f"x has shape {x.shape}; this map takes shape ({self.n_in},) or ({self.n_in}, N).")
+        x = checked("x", x, x.shape)
         return self.A @ x + (self.b if x.ndim == 1 else self.b[:, None])
 
     def __getitem__(self, block: str) -> Affine:

@@ -85,6 +85,8 @@ class AnalyticController(Value):
     def objective(self, eom: EquationsOfMotion) -> tuple[Quadratic, Quadratic, Quadratic]:
         """The costs on q̈, τ and λ whose sum is minimised."""
         state = of_kind("eom", eom, EquationsOfMotion).state
+        if state.robot != self.robot:
+            raise InputError(f"the equations are of {state.robot.name}, the controller of another robot, {self.robot.name}.")
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
         R, R_desired = state.frame_pose("base").rotation, self._desired.frame_pose("base").rotation
         turn = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, of_kind, positive, read_only, said
+from floatbase._arrays import Array, Value, of_kind, plain_numbers, positive, read_only, said
 from floatbase.affine import Affine
 from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError
@@ -40,7 +40,8 @@ class Limits(Value):
     min_normal_force: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "torque_limits", torque_limits_of(np.size(self.torque_limits), self.torque_limits))
+        limits = plain_numbers(self.torque_limits)
+        object.__setattr__(self, "torque_limits", torque_limits_of(1 if limits is None else limits.size, self.torque_limits))
         object.__setattr__(self, "min_normal_force", positive("min_normal_force", self.min_normal_force, "N", allow_zero=True))
         polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets, self.inside)
         for name in ("facets", "inside"):
@@ -87,6 +88,8 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     """
     of_kind("eom", eom, EquationsOfMotion)
     of_kind("limits", limits, Limits)
+    if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
+        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
     n = nv + d + k

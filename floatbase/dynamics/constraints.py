@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, checked, cross, function, positive, text, unit_vector, whole
+from floatbase._arrays import Array, Value, checked, cross, function, positive, said, text, unit_vector, whole
 from floatbase.dynamics.contact import DEFAULT_MU, UP, OnePoint, check_ground
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -62,7 +62,10 @@ class LinearConstraint(Value):
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), checked."""
-        A, b = self.rows(state, t)
+        answer = self.rows(state, t)
+        if not isinstance(answer, tuple | list) or len(answer) != 2:
+            raise InputError(f"rows of {self.name} must give A and b of A q̈ = b, not {said(answer)}.")
+        A, b = answer
         return checked(f"A of {self.name}", A, (self.m, state.robot.nv)), checked(f"b of {self.name}", b, (self.m,))
 
 

@@ -229,6 +229,6 @@ def wrench_set(
         raise InputError(f"{', '.join(coneless)} has forces without a cone; leave it out: contacts.without(…).")
     cones = tuple(FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True))
     limits: Any = np.inf if max_normal_force is None else max_normal_force
-    number: Any = plain_numbers(limits)  # None has no dimension either, and is refused below
-    limits = [limits] * len(cones) if np.ndim(number) == 0 else limits
+    number = plain_numbers(limits)
+    limits = np.repeat(number, len(cones)) if number is not None and number.ndim == 0 else limits
     return WrenchSet(contacts.positions(state), cones, state.com, state.robot.weight, limits)

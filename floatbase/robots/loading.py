@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, flag, of_kind, positive, read_only, said
+from floatbase._arrays import Array, flag, of_kind, positive, read_only, said, text, texts
 from floatbase.errors import InputError, UnknownNameError, unknown_name
 from floatbase.robots.entries import CATALOGUE, Entry
 from floatbase.robots.robot import Foot, Robot
@@ -98,7 +98,11 @@ def load_urdf(
 
     Raises `InputError` for a file that is not there or cannot be read, and for planar and floating joints inside the robot.
     """
-    urdf = Path(path).expanduser().resolve()
+    urdf = Path(text("path", str(path) if isinstance(path, Path) else path)).expanduser().resolve()
+    listed = isinstance(package_dirs, list | tuple)
+    plain = [str(folder) if isinstance(folder, Path) else folder for folder in package_dirs] if listed else package_dirs
+    folders = texts("package_dirs", plain)
+    flag("floating", floating)
     if not urdf.is_file():
         raise InputError(f"there is no file {urdf}; give the path of a URDF file.")
     try:
@@ -112,10 +116,10 @@ def load_urdf(
                 "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
             )
     return Robot(
-        name=urdf.stem if name is None else name,
+        name=urdf.stem if name is None else text("name", name),
         model=model,
         urdf=urdf,
-        package_dirs=(*(Path(folder) for folder in package_dirs), urdf.parent),
+        package_dirs=(*map(Path, folders), urdf.parent),
         feet=_feet(feet, foot_radius),
         torque_limits=_torque_limits(model, floating, torque_limits),
         posture=pin.neutral(model) if posture is None else posture,  # type: ignore[arg-type]  # Robot checks it

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, cross, of_kind, positive, said, text
+from floatbase._arrays import Array, Value, checked, cross, number, of_kind, positive, said, text
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -48,6 +48,7 @@ class Push(Value):
 
     def acts_at(self, t: float) -> bool:
         """Whether the push acts in the step that begins at t, s."""
+        t = number("t", t, "s")
         return self.start - _CLOCK_ERROR <= t < self.start + self.duration - _CLOCK_ERROR
 
 

@@ -110,8 +110,7 @@ def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], ac
     """Raise `InputError` for what is of another kind or of another robot."""
     of_kind("sim", sim, Simulation)
     function("the controller", controller, "controller(q, v, t)")
-    if actuators is not None and (isinstance(actuators, type) or not callable(getattr(actuators, "step", None))):
-        raise InputError(f"actuators must have a method step, as HydraulicActuators have, not be {said(actuators)}.")
+    check_actuators(actuators)
     for name, part in (("controller is", controller), ("actuators are", actuators)):
         robot = getattr(part, "robot", sim.robot)
         if robot != sim.robot:
@@ -132,6 +131,12 @@ def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], ac
             f"rollout calls controller(q, v, t) with the time t, s; {name} takes {signature} ({error}). Let it take all "
             f"three, as in lambda q, v, t: …"
         ) from None
+
+
+def check_actuators(actuators: Actuators | None) -> None:
+    """Raise `InputError` for what has no method `step`."""
+    if actuators is not None and (isinstance(actuators, type) or not callable(getattr(actuators, "step", None))):
+        raise InputError(f"actuators must have a method step, as HydraulicActuators have; {said(actuators)} has none.")
 
 
 class _NotFinite(InputError):

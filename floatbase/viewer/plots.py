@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, of_kind, plain_numbers, said
+from floatbase.errors import InputError
 from floatbase.viewer.colours import ALARM, COM, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.recording import checked_rollout
 
@@ -89,7 +90,10 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
     forces: (n, k), N, world, for n times and k/3 points.
     """
     checked_rollout(rollout)
-    f = np.reshape(forces, (len(rollout.time), -1, 3))
+    found = plain_numbers(forces)  # NaN stands for none planned
+    if found is None or found.shape != rollout.measured.shape:
+        raise InputError(f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got {said(forces)}.")
+    f = np.reshape(found, (len(rollout.time), -1, 3))
     normals, mus = rollout.contacts.normals, rollout.contacts.mus
     push = np.einsum("nij,ij->ni", f, normals)
     slide = np.linalg.norm(f - push[:, :, None] * normals, axis=2)
@@ -106,7 +110,7 @@ def _normal(rollout: Rollout, forces: Array) -> Array:
 
 
 def _axis(axis: Axes | None) -> Axes:
-    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else axis
+    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else of_kind("axis", axis, Axes, "plt.gca()")
 
 
 def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:
