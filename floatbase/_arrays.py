@@ -1,8 +1,11 @@
-"""Checked, read-only arrays: what every value of the package is made of."""
+"""Checked arguments, read-only arrays, and `Value`: what every value of the package is made of."""
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from collections.abc import Sequence
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Self, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +13,98 @@ import numpy.typing as npt
 from floatbase.errors import InputError
 
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
+Kind = TypeVar("Kind")
+LARGEST = 1e30  # in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
 _NO_LENGTH = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
+_SEVERAL = ("Contacts", "EquationsOfMotion", "Limits", "HydraulicActuators")  # names that take no article
+_SHORT = 60  # characters of a value that a message repeats
+
+# how to get one, by class: for the messages of `of_kind`
+_EXAMPLES = {
+    "Robot": 'fb.load("go2")',
+    "State": "robot.standing()",
+    "Contacts": "fb.Contacts.points(robot)",
+    "EquationsOfMotion": "fb.equations_of_motion(state, contacts)",
+    "FeasibleSpace": "fb.feasible_space(eom)",
+    "Affine": "fb.Affine(A, b)",
+    "Quadratic": "fb.Quadratic(H, g)",
+    "QP": "controller.qp(state)",
+    "Limits": "controller.limits",
+    "Simulation": "fb.Simulation(robot)",
+    "Rollout": "fb.rollout(sim, controller, duration=1.0)",
+    "Hydraulics": "Hydraulics(loop_bandwidth=20.0)",
+    "FrictionPolyhedron": "FrictionPolyhedron(normal, mu)",
+}
+
+
+class Value:
+    """Base of values: they do not change, so a copy is the value itself, and out of a pickle their arrays come read-only.
+
+    What a value has computed for itself (`cached_property`) stays behind and is computed anew.
+    """
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        computed = {name for name in vars(self) if isinstance(getattr(type(self), name, None), cached_property)}
+        computed -= set(getattr(self, "__dataclass_fields__", ()))  # given here, though a class above computes it
+        kept = {name: value for name, value in vars(self).items() if name not in computed}
+        return {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in kept.items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, MappingProxyType(value) if type(value) is dict else value)
+
+
+def of_kind(name: str, value: object, kind: type[Kind], example: str = "") -> Kind:
+    """`value`, after checking that it is a `kind`. example: how to get one, where the table above has none."""
+    if isinstance(value, kind):
+        return value
+    example = example or _EXAMPLES.get(kind.__name__, "")
+    raise InputError(f"{name} must be {_one(kind)}{f', as {example}' if example else ''}, not {said(value)}.")
+
+
+def text(name: str, value: object) -> str:
+    """`value`, after checking that it is a text."""
+    if isinstance(value, str):
+        return value
+    raise InputError(f"{name} must be a text, not {said(value)}.")
+
+
+def texts(name: str, value: Any) -> tuple[str, ...]:
+    """`value` as a tuple, after checking that it is a list of texts, and not one text."""
+    if isinstance(value, Sequence) and not isinstance(value, str) and all(isinstance(entry, str) for entry in value):
+        return tuple(value)
+    example = value if isinstance(value, str) else "…"
+    raise InputError(f'{name} must be a list of names, as in {name}=["{example}"], not {said(value)}.')
+
+
+def flag(name: str, value: object) -> bool:
+    """`value` as a bool, after checking that it is one: "no" would count as true."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise InputError(f"{name} must be True or False, not {said(value)}.")
+
+
+def function(name: str, value: Any, call: str) -> Any:
+    """`value`, after checking that it can be called. call: how it is called, for the message."""
+    if callable(value) and not isinstance(value, type):
+        return value
+    raise InputError(f"{name} must be a function, called as {call}, not {said(value)}.")
+
+
+def whole(name: str, value: Any, least: int, most: int, why: str = "") -> int:
+    """`value` as an int, after checking that it is a whole number from `least` to `most`. why: the reason for the bounds."""
+    plain = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if plain and least <= value <= most and value == int(value):
+        return int(value)
+    raise InputError(f"{name} is {said(value)}; it must be a whole number ≥ {least} and ≤ {most}{f': {why}' if why else ''}.")
 
 
 def read_only(value: Any) -> Array:
@@ -20,35 +114,80 @@ def read_only(value: Any) -> Array:
     return array
 
 
+def plain_numbers(value: Any) -> Array | None:
+    """A float64 copy of numbers; None for anything else: complex or masked numbers, texts, truth values, dates, objects."""
+    try:
+        array = np.array(value)
+    except Exception:  # of another shape in each row, or of a class with an opinion of its own
+        return None
+    if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
+        return None
+    return array.astype(np.float64, copy=False)
+
+
 def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
-    """A read-only copy of `value`, after checking that it has `shape` (None = any length) and is finite.
+    """A read-only copy of `value`, after checking that it holds plain numbers of `shape` (None = any length), finite ones.
 
     Raises `InputError` with the name, the shape found and the shape required.
     """
-    try:
-        array = read_only(value)
-    except (TypeError, ValueError):
+    array = plain_numbers(value)
+    if array is None:
         required = f"numbers of shape {_text(shape)}" if shape else "a number"
-        raise InputError(f"{name} must be {required}, not {value!r}.") from None
+        raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {said(value)}.")
     fits = array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
     if not fits:
         raise InputError(f"{name} has shape {array.shape}; it must have shape {_text(shape)}{f' ({unit})' if unit else ''}.")
-    if not np.all(np.isfinite(array)):
-        where = np.argwhere(~np.isfinite(array))[0].tolist()
-        raise InputError(f"{name} holds {array[tuple(where)]} at index {where}; every entry must be a finite number.")
+    usual = np.abs(array) <= LARGEST  # False for NaN too
+    if not usual.all():
+        at = tuple(np.argwhere(~usual)[0].tolist())
+        place = f"holds {array[at]:g} at index {list(at)}; every entry must be" if shape else f"is {array[at]:g}; it must be"
+        raise InputError(f"{name} {place} a finite number{f' of at most {LARGEST:g}' if np.isfinite(array[at]) else ''}.")
+    array.flags.writeable = False
     return array
 
 
-def positive(name: str, value: Any, unit: str = "", allow_zero: bool = False) -> float:
-    """`value` as a float, after checking that it is a finite number above zero (or not below, with `allow_zero`)."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a number, not {value!r}.") from None
-    if not np.isfinite(number) or number < 0 or (number == 0 and not allow_zero):
-        bound = "≥ 0" if allow_zero else "> 0"
-        raise InputError(f"{name} is {number:g}; it must be {bound}{' ' + unit if unit else ''}.")
-    return number
+def flat_forces(forces: Any, k: int, name: str = "forces") -> Array:
+    """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked."""
+    found = plain_numbers(forces)
+    return checked(name, forces if found is None else found.ravel(), (k,), "N")
+
+
+def number(name: str, value: Any, unit: str = "", least: float = -LARGEST, most: float = LARGEST) -> float:
+    """`value` as a float, after checking that it is a plain number from `least` to `most`."""
+    found = float(value if isinstance(value, float) else checked(name, value, (), unit))
+    if least <= found <= most:
+        return found
+    bounds = "a finite number" if least == -LARGEST and most == LARGEST else f"from {least:g} to {most:g}"
+    raise InputError(f"{name} is {found:g}; it must be {bounds}{f' {unit}' if unit else ''}.")
+
+
+def positive(name: str, value: Any, unit: str = "", allow_zero: bool = False, most: float = LARGEST) -> float:
+    """`value` as a float, after checking that it is above zero (or not below, with `allow_zero`) and at most `most`."""
+    found = float(value if isinstance(value, float) else checked(name, value, (), unit))
+    if 0.0 < found <= most or (found == 0.0 and allow_zero):
+        return found
+    bound = f"at most {most:g}" if found > 0.0 else "≥ 0" if allow_zero else "> 0"
+    raise InputError(f"{name} is {found:g}; it must be {bound}{f' {unit}' if unit else ''}.")
+
+
+def said(value: object) -> str:
+    """A value as a message repeats it: short, and by its kind where it is not a plain one."""
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"{_one(type(value))} of {value.dtype} of shape {value.shape}"
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return f"a whole number beyond {LARGEST:g}"
+    if value is None or isinstance(value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray):
+        plain = " ".join(repr(value).split())
+        return plain if len(plain) <= _SHORT else f"{plain[:_SHORT]}…"
+    return _one(type(value))
+
+
+def _one(kind: type) -> str:
+    """A class with its article."""
+    name = {"ndarray": "array"}.get(kind.__name__, kind.__name__)
+    return name if name in _SEVERAL else f"{'an' if name[0].lower() in 'aeio' else 'a'} {name}"
 
 
 def unit_vector(name: str, value: Any) -> Array:

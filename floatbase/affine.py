@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import LARGEST, Array, Value, checked, number, of_kind, plain_numbers, positive, read_only, said, whole
 from floatbase.errors import InputError
 
+MOST_VARIABLES = 10_000  # a matrix with as many rows and columns takes 0.8 GB
 FLAT = 1e-12  # curvature below this part of the largest counts as none
 _CONCAVE = 1e-9  # part of the largest curvature that one may be negative by: rounding of pullbacks
 _SLOPE = 1e-7  # part of 1 + the largest |g| that a slope without curvature may have: rounding of pullbacks
 
 
 @dataclass(frozen=True, eq=False)
-class Affine:
+class Affine(Value):
     """The map x -> A x + b.
 
     A: shape (m, n); b: shape (m,). `blocks` names slices of the output: `f["tau"]` is the `Affine` of those rows.
@@ -34,34 +34,31 @@ class Affine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "A", checked("A", self.A, (None, None)))
         object.__setattr__(self, "b", checked("b", self.b, (self.A.shape[0],)))
-        object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Affine, (self.A, self.b, dict(self.blocks))  # a mapping proxy can be neither pickled nor copied
+        object.__setattr__(self, "blocks", block_slices(self.blocks))
 
     @staticmethod
     def linear(A: npt.ArrayLike) -> Affine:
         """The map x -> A x."""
-        A = np.asarray(A, dtype=np.float64)
+        A = checked("A", A, (None, None))
         return Affine(A, np.zeros(A.shape[0]))
 
     @staticmethod
     def identity(n: int) -> Affine:
         """The map x -> x on R^n."""
-        return Affine(np.eye(n), np.zeros(n))
+        return Affine(np.eye(size("n", n)), np.zeros(size("n", n)))
 
     @staticmethod
     def constant(b: npt.ArrayLike, n: int) -> Affine:
         """The map x -> b for every x in R^n."""
-        b = np.asarray(b, dtype=np.float64)
-        return Affine(np.zeros((b.size, n)), b)
+        b = checked("b", b, (None,))
+        return Affine(np.zeros((b.size, size("n", n))), b)
 
     @staticmethod
     def stack(**parts: Affine) -> Affine:
         """One map whose output is the outputs of `parts` one after the other, as blocks of those names."""
         if not parts:
             raise InputError("stack needs at least one map.")
-        widths = {name: f.n_in for name, f in parts.items()}
+        widths = {name: of_kind(name, f, Affine).n_in for name, f in parts.items()}
         if len(set(widths.values())) > 1:
             raise InputError(f"maps that are stacked must start from the same space; input sizes: {widths}.")
         ends = np.cumsum([f.n_out for f in parts.values()])
@@ -81,14 +78,16 @@ class Affine:
 
     def __call__(self, x: npt.ArrayLike) -> Array:
         """The value A x + b; x of shape (n,), or (n, N) for N points side by side."""
-        x = np.asarray(x, dtype=np.float64)
+        found = plain_numbers(x)
+        x = checked("x", x, (self.n_in,)) if found is None else found
         if x.ndim not in (1, 2) or x.shape[0] != self.n_in:
             raise InputError(f"x has shape {x.shape}; this map takes shape ({self.n_in},) or ({self.n_in}, N).")
+        x = checked("x", x, x.shape)
         return self.A @ x + (self.b if x.ndim == 1 else self.b[:, None])
 
     def __getitem__(self, block: str) -> Affine:
         """The rows of one named block."""
-        if block not in self.blocks:
+        if not isinstance(block, str) or block not in self.blocks:
             raise InputError(f"this map has no block {block!r}; its blocks are {list(self.blocks)}.")
         rows = self.blocks[block]
         return Affine(self.A[rows], self.b[rows])
@@ -110,7 +109,7 @@ class Affine:
         return Affine(self.A, self.b + checked("the constant", other, (self.n_out,)), self.blocks)
 
     def __sub__(self, other: Affine | npt.ArrayLike) -> Affine:
-        return self + (-1.0 * other if isinstance(other, Affine) else -np.asarray(other, dtype=np.float64))
+        return self + (-1.0 * other if isinstance(other, Affine) else -checked("the constant", other, (self.n_out,)))
 
     def __radd__(self, other: npt.ArrayLike) -> Affine:
         """constant + map, the same as map + constant."""
@@ -142,7 +141,7 @@ class Affine:
 
 
 @dataclass(frozen=True, eq=False)
-class Quadratic:
+class Quadratic(Value):
     """The cost x -> ½ xᵀ H x + gᵀ x + c.
 
     H: shape (n, n), made symmetric; g: shape (n,); c: a number. Raises `InputError` when the shapes do not fit.
@@ -158,7 +157,7 @@ class Quadratic:
         H = checked("H", self.H, (g.size, g.size))
         object.__setattr__(self, "g", g)
         object.__setattr__(self, "H", read_only(0.5 * (H + H.T)))
-        object.__setattr__(self, "c", float(self.c))
+        object.__setattr__(self, "c", number("c", self.c))
 
     @staticmethod
     def from_residual(A: npt.ArrayLike, r: npt.ArrayLike, weight: float = 1.0) -> Quadratic:
@@ -171,12 +170,12 @@ class Quadratic:
     @staticmethod
     def of(residual: Affine, weight: float = 1.0) -> Quadratic:
         """The cost (weight / 2) ‖residual(x)‖²."""
-        return Quadratic.from_residual(residual.A, -residual.b, weight)
+        return Quadratic.from_residual(of_kind("residual", residual, Affine).A, -residual.b, weight)
 
     @staticmethod
     def zero(n: int) -> Quadratic:
         """The cost that is zero everywhere on R^n."""
-        return Quadratic(np.zeros((n, n)), np.zeros(n))
+        return Quadratic(np.zeros((size("n", n), n)), np.zeros(n))
 
     @property
     def n(self) -> int:
@@ -194,7 +193,7 @@ class Quadratic:
 
     def pullback(self, f: Affine) -> Quadratic:
         """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)). Source: the document, §3."""
-        if f.n_out != self.n:
+        if of_kind("f", f, Affine).n_out != self.n:
             raise InputError(f"cannot pull back: the map gives {f.n_out} numbers, the cost takes {self.n}.")
         return Quadratic(f.A.T @ self.H @ f.A, f.A.T @ (self.H @ f.b + self.g), self(f.b))
 
@@ -241,7 +240,20 @@ class Quadratic:
 
 def _scale(kind: str, scale: object) -> float:
     """The number that a map or cost is multiplied by; `InputError` with advice for anything else."""
-    if isinstance(scale, (int, float, np.number)) and np.isfinite(scale):
-        return float(scale)
-    what = f"an array of shape {scale.shape}" if isinstance(scale, np.ndarray) else repr(scale)
+    found = plain_numbers(scale)
+    if found is not None and found.ndim == 0 and abs(found) <= LARGEST:
+        return float(found)
+    what = f"an array of shape {scale.shape}" if isinstance(scale, np.ndarray) else said(scale)
     raise InputError(f"a {kind} can be multiplied by a finite number, not by {what}; to compose maps write f @ g.")
+
+
+def size(name: str, n: int) -> int:
+    """The number of variables of a map or a cost."""
+    return whole(name, n, 0, MOST_VARIABLES, "more make matrices that no memory holds")
+
+
+def block_slices(blocks: Mapping[str, slice]) -> Mapping[str, slice]:
+    """A read-only copy of names of slices, checked."""
+    if isinstance(blocks, Mapping) and all(isinstance(k, str) and isinstance(v, slice) for k, v in blocks.items()):
+        return MappingProxyType(dict(blocks))
+    raise InputError(f'blocks must be names of slices, as {{"tau": slice(0, 12)}}, not {said(blocks)}.')

@@ -169,7 +169,7 @@ def test_constants_and_numbers_may_stand_on_either_side_of_a_map(seed: int, m: i
     [
         (lambda f: f * np.ones(2), r"a map can be multiplied by a finite number, not by an array of shape \(2,\); .* f @ g"),
         (lambda f: np.ones(2) * f, "a map can be multiplied by a finite number"),
-        (lambda f: f * f, "a map can be multiplied by a finite number, not by Affine"),
+        (lambda f: f * f, "a map can be multiplied by a finite number, not by an Affine"),
         (lambda f: np.nan * f, "a map can be multiplied by a finite number, not by nan"),
         (lambda f: np.ones(3) + f, r"the constant has shape \(3,\); it must have shape \(2,\)"),
         (lambda f: f @ np.ones(2), r"the value of f at x is f\(x\)"),

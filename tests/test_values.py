@@ -1,43 +1,75 @@
-"""Values cannot be written to: neither their arrays nor their attributes."""
+"""Values cannot be written to, neither their arrays nor their attributes, and copies and pickles of them are as good."""
 
 from __future__ import annotations
+
+import copy
+import inspect
+import multiprocessing
+import pickle
+from concurrent.futures import ProcessPoolExecutor
+from importlib import import_module
+from typing import Any
 
 import judges
 import numpy as np
 import pytest
+from values import COMMAND, CONTACTS, CONTROLLER, RECORD, ROBOT, STATE, UP, VALUES
 
 import floatbase as fb
+from floatbase.actuators import HydraulicActuators
 from floatbase.control import AnalyticController
-from floatbase.dynamics import RollingWheel
-from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 
-UP = np.array([0.0, 0.0, 1.0])
-ROBOT = judges.load("go2")
-STATE = ROBOT.random_state(1, 0.1)
-CONTACTS = judges.stance(ROBOT)
-EOM = fb.equations_of_motion(STATE, CONTACTS)
-CONTROLLER = judges.controller_of("go2")
-COMMAND = CONTROLLER(STATE.q, STATE.v)
-RECORD = fb.rollout(fb.Simulation(ROBOT), CONTROLLER, 0.005)
-VALUES = {
-    "Robot": ROBOT, "Foot": judges.load("talos").feet[0], "State": STATE, "Contacts": CONTACTS,
-    "PointContact": CONTACTS["FL_foot"],
-    "FlatFootContact": next(iter(judges.stance(judges.load("talos")))), "RollingWheel": RollingWheel("base", [0, 1, 0], 0.2),
-    "EquationsOfMotion": EOM, "Affine": fb.Affine(np.eye(2), np.ones(2)),
-    "Quadratic": fb.Quadratic(np.eye(2), np.ones(2)), "QP": CONTROLLER.qp(STATE), "Solution": COMMAND.solution,
-    "Limits": CONTROLLER.limits, "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),
-    "Decomposition": decompose([5.0, 0.0, 1.0], UP),
-    "WrenchSet": wrench_set(STATE, CONTACTS),
-    "Command": COMMAND, "AnalyticCommand": AnalyticController(ROBOT, CONTACTS, STATE)(STATE.q, STATE.v), "Rollout": RECORD,
-    "Push": fb.Push([1.0, 0.0, 0.0]),
-}  # fmt: skip
+WITHOUT_ARRAYS = ("ActiveSetRun", "FeasibleSpace", "Problem", "Residuals")
+NO_VALUES = {
+    "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators Simulation WholeBodyController",
+    "a text": "RowLabel",
+    "memory of a thread or a window": "Live SliderPanel Viewer Window",
+    "an answer that rollout copies": "Torques",
+    "views of a MuJoCo model": "Conversion",
+    "shapes of a picture": "Item Piece View",
+    "made of functions of a lesson": "ConstantTorques Exercise LeastCost Numeric Shaped Verdict",
+}
+
+
+def rooms() -> list[Any]:
+    names = ("actuators", "control", "dynamics", "friction", "lessons", "lessons.lesson04", "objectives", "qp", "robots")
+    return [fb, *(import_module(f"floatbase.{name}") for name in (*names, "simulation", "viewer"))]
+
+
+def arrays_of(value: Any) -> dict[str, np.ndarray]:
+    names = [name for name in dir(value) if not name.startswith("_")]
+    return {name: array for name in names if isinstance(array := getattr(value, name), np.ndarray)}
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two values hold the same numbers and texts, at whatever depth."""
+    if isinstance(a, np.ndarray):
+        return np.array_equal(a, b, equal_nan=True)
+    if isinstance(a, (tuple, list)):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, fb.Robot) or not type(a).__module__.startswith("floatbase") or not hasattr(a, "__dict__"):
+        return callable(a) or a == b
+    names = [name for name in dir(a) if not name.startswith("_") and not callable(getattr(a, name))]
+    return type(a) is type(b) and all(same(getattr(a, name), getattr(b, name)) for name in names if name != "reduced")
+
+
+def test_every_class_of_the_rooms_is_tested_here_or_no_value() -> None:
+    classes = {
+        name: found
+        for room in rooms()
+        for name in room.__all__
+        if inspect.isclass(found := getattr(room, name)) and not issubclass(found, Exception)
+    }
+    protocols = {name for name, found in classes.items() if getattr(found, "_is_protocol", False)}
+    excused = " ".join(NO_VALUES.values()).split()
+    assert sorted(set(classes) - protocols) == sorted({*excused, *(name for name in VALUES if name in classes)})
+    assert [name for name, found in classes.items() if name in VALUES and type(VALUES[name]) is not found] == []
 
 
 def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
     for kind, value in VALUES.items():
-        names = [name for name in dir(value) if not name.startswith("_")]
-        arrays = {name: array for name in names if isinstance(array := getattr(value, name), np.ndarray)}
-        assert arrays, kind
+        arrays = arrays_of(value)
+        assert bool(arrays) != (kind in WITHOUT_ARRAYS), kind
         for name, array in arrays.items():
             with pytest.raises(ValueError, match="read-only"):
                 array[...] = 0.0
@@ -47,6 +79,45 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
             with pytest.raises((AttributeError, fb.FloatbaseError)):
                 setattr(value, name, array)
                 pytest.fail(f"{kind}.{name} was set")
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> None:
+    for kind, value in VALUES.items():
+        other = copied(value)
+        assert same(value, other), kind
+        assert [name for name, array in arrays_of(other).items() if array.flags.writeable] == [], kind
+    mapped = copied(VALUES["Affine"])
+    with pytest.raises(TypeError):
+        mapped.blocks["top"] = slice(0, 2)
+    assert copied(ROBOT) == ROBOT != judges.load("solo12") and judges.load("go2") in {copied(ROBOT)}
+    assert judges.load("go2") != fb.load("go2", torque_limits=10.0)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
+    push = fb.Push([0.0, 60.0, 0.0], start=0.005)
+    sim, oil = fb.Simulation(ROBOT), HydraulicActuators(ROBOT)
+    fb.rollout(sim, CONTROLLER, 0.01, [push], actuators=oil)
+    others, alone = copied((sim, CONTROLLER, oil)), copied(CONTROLLER)
+    runs = [fb.rollout(s, c, 0.02, [push], actuators=a) for s, c, a in ((sim, CONTROLLER, oil), others)]
+    np.testing.assert_array_equal(runs[0].q, runs[1].q)
+    assert np.ptp(runs[0].q, axis=0).max() > 1e-4
+    assert not others[2].state.pressures.flags.writeable and not others[2].cylinders.areas.flags.writeable
+    fb.rollout(sim, alone, 0.001)  # the controller of a robot that was copied, and not the robot
+    analytic = AnalyticController(ROBOT, CONTACTS, STATE)
+    np.testing.assert_array_equal(copied(analytic)(STATE.q, STATE.v).tau, analytic(STATE.q, STATE.v).tau)
+    assert not copied(analytic).com.flags.writeable
+
+
+def test_values_come_back_from_another_process() -> None:
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        values = dict(zip(VALUES, pool.map(copy.copy, VALUES.values()), strict=True))
+        record = pool.submit(fb.rollout, fb.Simulation(ROBOT), CONTROLLER, 0.005).result()
+    assert [kind for kind, value in values.items() if not same(value, VALUES[kind])] == []
+    np.testing.assert_array_equal(record.q, RECORD.q)
+    assert isinstance(values["State"], fb.State) and not values["State"].q.flags.writeable
+    fb.Simulation(ROBOT).reset(record.final)  # a state of the same robot
 
 
 def test_what_a_value_returns_cannot_be_written_to() -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, of_kind, positive, read_only
 from floatbase.errors import InputError
 
 _LAMINAR = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
@@ -79,7 +79,7 @@ class Hydraulics:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class Pose(Value):
     """Where d cylinders stand at given joint angles.
 
     length: (d,) m, ℓ, from foot to rod end.
@@ -97,7 +97,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class Power:
+class Power(Value):
     """Where the power goes, each of shape (d,), W: pump = joint + valve + leakage + stored.
 
     pump: what the supply line gives less what the tank line takes.
@@ -113,7 +113,7 @@ class Power:
     stored: Array
 
 
-class Cylinders:
+class Cylinders(Value):
     """App. B: d double-acting cylinders, each on a crank, as equations without memory.
 
     For a joint angle q, with γ the angle at the joint between the crank b and the cylinder's foot at distance a:
@@ -139,7 +139,7 @@ class Cylinders:
     """
 
     def __init__(self, hydraulics: Hydraulics, size: npt.ArrayLike, centre: npt.ArrayLike):
-        self.hydraulics = hydraulics
+        self.hydraulics = of_kind("hydraulics", hydraulics, Hydraulics)
         size = checked("size", size, (None,))
         if np.any(size <= 0.0):
             raise InputError(f"size of a cylinder is {size.min():g}; it must be > 0.")

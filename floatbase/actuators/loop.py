@@ -7,12 +7,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, of_kind, positive, read_only
 from floatbase.actuators.hydraulics import Cylinders, Hydraulics, Pose
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
 _LONGEST_STEP = 2e-4  # s, of the oil's integration: torques come out within 1 % of the limit at 0.2 ms
+_LONGEST_CALL = 10.0  # s in one call: torques and velocities that stay the same for longer are a slip of units
 _STEP_ROUNDING = 1e-9  # of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
 _INTEGRAL_PART = 0.05  # of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
 _DEAD_LEVER = 1e-9  # of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
@@ -20,7 +21,7 @@ VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pu
 
 
 @dataclass(frozen=True, eq=False)
-class OilState:
+class OilState(Value):
     """What d cylinders and their loops remember.
 
     opening: (d,), of the valves, -1 to 1.
@@ -48,16 +49,16 @@ class HydraulicActuators:
     and in the weaker direction, rod going in. Friction of the pistons is left out. A load that pulls the rod out fast starves
     chamber A: its oil boils, and torque is missing until the chamber is full again.
 
-    hydraulics: the cylinder that is scaled, HyQ's by default; centre: (d,) rad, the angles at which the levers are longest,
-    those of `robot.standing()` by default. `state` is the present `OilState`, `cylinders` the equations.
+    robot: as from `fb.load`; hydraulics: the cylinder that is scaled, HyQ's by default; centre: (d,) rad, the angles at which
+    the levers are longest, those of `robot.standing()` by default. `state` is the present `OilState`, `cylinders` the
+    equations.
     Source of the loop: Boaventura et al., Model-based hydraulic impedance control for dynamic robots, IEEE T-RO 31, 2015.
     Raises `InputError` for a joint without a torque limit and for joints that slide.
     """
 
     def __init__(self, robot: Robot, hydraulics: Hydraulics | None = None, centre: npt.ArrayLike | None = None):
-        hydraulics = Hydraulics() if hydraulics is None else hydraulics
-        if not isinstance(hydraulics, Hydraulics):
-            raise InputError(f"hydraulics must be a Hydraulics, as Hydraulics(loop_bandwidth=20.0), not {hydraulics!r}.")
+        self.robot = of_kind("robot", robot, Robot)
+        hydraulics = Hydraulics() if hydraulics is None else of_kind("hydraulics", hydraulics, Hydraulics)
         for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
             kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
             if not kind.startswith("JointModelR"):
@@ -101,7 +102,7 @@ class HydraulicActuators:
         pose = cylinders.pose(q_joints)
         force = self._force_for(checked("tau_desired", tau_desired, (cylinders.d,), "N·m"), pose)
         v = checked("v_joints", v_joints, (cylinders.d,), "rad/s")
-        steps = max(1, int(np.ceil(positive("dt", dt, "s") / _LONGEST_STEP - _STEP_ROUNDING)))
+        steps = max(1, int(np.ceil(positive("dt", dt, "s", most=_LONGEST_CALL) / _LONGEST_STEP - _STEP_ROUNDING)))
         for _ in range(steps):
             self.state = self._advance(force, pose, v, dt / steps)
         return pose.lever * cylinders.force(self.state.pressures)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, of_kind, positive, read_only
 from floatbase.affine import Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, equations_of_motion, feasible_space
 from floatbase.errors import InputError
@@ -17,7 +17,7 @@ from floatbase.robots import Robot, State
 
 
 @dataclass(frozen=True, eq=False)
-class AnalyticCommand:
+class AnalyticCommand(Value):
     """One answer of `AnalyticController`, read-only.
 
     tau: (d,) N·m, joint torques to apply. forces: (k,) N, world, and qdd: (nv,), planned with them.
@@ -31,7 +31,7 @@ class AnalyticCommand:
         return f"AnalyticCommand(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N)"
 
 
-class AnalyticController:
+class AnalyticController(Value):
     """(22) + (23) + terms for posture and torque, minimised in closed form over β (17) at every tick.
 
     The desired wrench is f̃_c = m (a - g) with a = -kp e - kd ė, where e leads from `com` to the centre of mass; τ̃_c does the
@@ -69,13 +69,10 @@ class AnalyticController:
         posture: float = 1e-3,
         torque: float = 1e-6,
     ):
-        if not isinstance(robot, Robot):
-            raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
-        if not isinstance(contacts, Contacts):
-            raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(contacts).__name__}.")
-        if not isinstance(state, State):
-            raise InputError(f"the state to hold must be a State, as robot.standing(), not {type(state).__name__}.")
-        if state.robot is not robot:
+        of_kind("robot", robot, Robot)
+        of_kind("contacts", contacts, Contacts)
+        of_kind("the state to hold", state, State)
+        if state.robot != robot:
             raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
         equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
         self.robot, self.contacts, self._desired = robot, contacts, state
@@ -87,7 +84,9 @@ class AnalyticController:
 
     def objective(self, eom: EquationsOfMotion) -> tuple[Quadratic, Quadratic, Quadratic]:
         """The costs on q̈, τ and λ whose sum is minimised."""
-        state = eom.state
+        state = of_kind("eom", eom, EquationsOfMotion).state
+        if state.robot != self.robot:
+            raise InputError(f"the equations are of {state.robot.name}, the controller of another robot, {self.robot.name}.")
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
         R, R_desired = state.frame_pose("base").rotation, self._desired.frame_pose("base").rotation
         turn = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
@@ -99,6 +98,7 @@ class AnalyticController:
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> AnalyticCommand:
         """The tick: the minimum over β, mapped back to (q̈, τ, λ)."""
+        v = checked("v", v, (self.robot.nv,))  # State takes None for rest; here it is a slip
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         space = feasible_space(eom)
         qdd, tau, forces = space(cost_on_space(space, *self.objective(eom)).minimiser())

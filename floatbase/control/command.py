@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, Value
 from floatbase.dynamics import Contacts
 from floatbase.qp import Solution
 
 
-class Command:
+class Command(Value):
     """One answer of `WholeBodyController`.
 
     tau: (d,) N·m, joint torques to apply.
@@ -34,6 +35,9 @@ class Command:
     def solution(self) -> Solution:
         """The QP of this tick with its optimum, multipliers and residuals."""
         return self._solution if isinstance(self._solution, Solution) else self._solution()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"_solution": self.solution}  # the function that makes it holds the compiled tick
 
     def force(self, name: str) -> Array:
         """The planned force of one contact, shape (3,), N, world: for a flat foot the sum over its corners."""

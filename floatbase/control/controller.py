@@ -7,10 +7,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Literal, TypeAlias, get_args
 
-import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import LARGEST, Array, checked, number, of_kind, plain_numbers, read_only
 from floatbase.control.command import Command
 from floatbase.control.problem import Limits, Problem, build_qp
 from floatbase.control.tick import Compiled, cache_warning, obstacle
@@ -58,8 +57,7 @@ class WholeBodyController:
         solver: str = "daqp",
         path: Path = "auto",
     ):
-        if not isinstance(robot, Robot):
-            raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(robot).__name__}.")
+        of_kind("robot", robot, Robot)
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
         problem = Problem(robot, contacts, tasks, Limits(limits, facets, inside, min_normal_force))
         problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
@@ -69,7 +67,7 @@ class WholeBodyController:
         """Keep a checked problem, and prepare the compiled tick where it can be had. warm_up: run it once, outside the loop."""
         self.problem, self.solver, self.requested_path = problem, solver, path
         check_solver(solver)
-        if path not in get_args(Path):
+        if not isinstance(path, str) or path not in get_args(Path):
             raise unknown_name("path", path, get_args(Path))
         reason = "it was requested" if path == "readable" else obstacle(problem, solver)
         compiled = None if reason else Compiled(problem)
@@ -114,6 +112,10 @@ class WholeBodyController:
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
+        if type(t) is not float or not -LARGEST <= t <= LARGEST:
+            t = number("t", t, "s")
+        if v is None:  # State takes it for rest; here it is a slip
+            checked("v", v, (self.robot.nv,))
         command = None if self.compiled is None else self._compiled_command(self.compiled, q, v, t)
         if command is not None:
             return command
@@ -123,16 +125,15 @@ class WholeBodyController:
 
     def _compiled_command(self, tick: Compiled, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
         """The compiled tick's answer, or None where the readable path must answer, or say what is wrong."""
-        try:
-            q, v = np.array(q, dtype=np.float64), np.array(v, dtype=np.float64)
-        except (TypeError, ValueError):
+        at, moving = plain_numbers(q), plain_numbers(v)
+        if at is None or moving is None:
             return None
-        answer = tick(q, v, t)
+        answer = tick(at, moving, t)
         if answer is None:
             return None
         numbers = answer[0]
         numbers.setflags(write=False)
-        solution = partial(self._solution_of, q, v, t, *answer)
+        solution = partial(self._solution_of, at, moving, t, *answer)
         return Command(numbers[tick.tau], numbers[tick.qdd], numbers[tick.forces], self.contacts, "compiled", solution)
 
     def _solution_of(self, q: Array, v: Array, t: float, numbers: Array, n_active: int, targets: Array) -> Solution:

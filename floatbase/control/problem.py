@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from floatbase._arrays import Array, positive, read_only
+from floatbase._arrays import Array, Value, of_kind, plain_numbers, positive, read_only, said
 from floatbase.affine import Affine
 from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError
@@ -23,7 +23,7 @@ INCONSISTENT = 1e-6  # m/s²: contact rows that disagree by less do so by roundi
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class Limits(Value):
     """The inequalities of (27).
 
     torque_limits: shape (d,), N·m, +inf where there is none.
@@ -40,14 +40,16 @@ class Limits:
     min_normal_force: float = 0.0
 
     def __post_init__(self) -> None:
-        limits = np.ravel(self.torque_limits)
-        object.__setattr__(self, "torque_limits", torque_limits_of(limits.size, limits))
+        limits = plain_numbers(self.torque_limits)
+        object.__setattr__(self, "torque_limits", torque_limits_of(1 if limits is None else limits.size, self.torque_limits))
         object.__setattr__(self, "min_normal_force", positive("min_normal_force", self.min_normal_force, "N", allow_zero=True))
-        object.__setattr__(self, "facets", FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets).facets)
+        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets, self.inside)
+        for name in ("facets", "inside"):
+            object.__setattr__(self, name, getattr(polyhedron, name))
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Value):
     """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning there.
 
     Raises `InputError` for values of a wrong kind; `qp` does so for names and shapes that do not fit.
@@ -59,12 +61,8 @@ class Problem:
     limits: Limits
 
     def __post_init__(self) -> None:
-        if not isinstance(self.robot, Robot):
-            raise InputError(f"the controller needs a Robot first, as from fb.load, not {type(self.robot).__name__}.")
-        if not isinstance(self.contacts, Contacts):
-            raise InputError(f"contacts must be Contacts, as fb.Contacts.points(robot), not {type(self.contacts).__name__}.")
-        if not isinstance(self.limits, Limits):
-            raise InputError(f"limits must be Limits, not {type(self.limits).__name__}.")
+        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits)):
+            of_kind(name, getattr(self, name), kind)
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         torque_limits_of(self.robot.d, self.limits.torque_limits)
 
@@ -88,6 +86,10 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     contacts do not quite allow makes them inconsistent. The rows therefore count along the directions that A resolves well
     (`floatbase.dynamics.resolved_motion`). Raises `InfeasibleError` where they are inconsistent beyond that.
     """
+    of_kind("eom", eom, EquationsOfMotion)
+    of_kind("limits", limits, Limits)
+    if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
+        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
     n = nv + d + k
@@ -110,11 +112,11 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
     """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or torques."""
     if isinstance(tasks, Task) or not isinstance(tasks, Sequence):
-        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {type(tasks).__name__}.")
+        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
     tasks = tuple(tasks)
     for task in tasks:
         if isinstance(task, type) or not isinstance(task, Task):
-            raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {task!r} is none.")
+            raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {said(task)} is none.")
         if task.block not in BLOCKS:
             raise InputError(f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".')
         positive(f"weight of {task.name}", task.weight, allow_zero=True)

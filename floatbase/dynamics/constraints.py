@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, cross, positive, unit_vector
+from floatbase._arrays import Array, Value, checked, cross, function, positive, said, text, unit_vector, whole
 from floatbase.dynamics.contact import DEFAULT_MU, UP, OnePoint, check_ground
 from floatbase.errors import InputError
 from floatbase.robots import State
 
+_MOST_ROWS = 1000  # of one constraint
 _FLAT_WHEEL = 1e-6  # sine of the angle between axle and normal; below it rounding alone chooses the lowest point
 
 
 @dataclass(frozen=True, eq=False)
-class LinearConstraint:
+class LinearConstraint(Value):
     """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the document).
 
     Holonomic constraints φ(q, t) = 0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6). The
@@ -36,8 +38,9 @@ class LinearConstraint:
     point_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
-        if int(self.m) != self.m or self.m < 1:
-            raise InputError(f"constraint {self.name!r} has m = {self.m} rows; it must have at least 1.")
+        text("name of a constraint", self.name)
+        whole(f"m of {self.name}, its number of rows,", self.m, 1, _MOST_ROWS)
+        function(f"rows of {self.name}", self.rows, "rows(state, t)")
 
     @property
     def k(self) -> int:
@@ -59,7 +62,10 @@ class LinearConstraint:
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), checked."""
-        A, b = self.rows(state, t)
+        answer = self.rows(state, t)
+        if not isinstance(answer, tuple | list) or len(answer) != 2:
+            raise InputError(f"rows of {self.name} must give A and b of A q̈ = b, not {said(answer)}.")
+        A, b = answer
         return checked(f"A of {self.name}", A, (self.m, state.robot.nv)), checked(f"b of {self.name}", b, (self.m,))
 
 
@@ -112,13 +118,19 @@ def fixed_frame(frame: str) -> LinearConstraint:
 
     With a floating base bolted by it, λ is what the document's Figure 1 (left) calls the reaction of the ground.
     """
-    return LinearConstraint(f"bolts of {frame}", 6, lambda state, t: (state.frame_jacobian(frame), -state.frame_drift(frame)))
+    return LinearConstraint(f"bolts of {text('frame', frame)}", 6, partial(_bolted, frame))
 
 
 def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
     """A frame's origin driven with a given acceleration (3,), m/s², world, as a function of t: A q̈ = b(q, q̇, t) (note 6)."""
+    function("acceleration", acceleration, "acceleration(t)")
+    return LinearConstraint(f"drive of {text('frame', frame)}", 3, partial(_driven, frame, acceleration))
 
-    def rows(state: State, t: float) -> tuple[Array, Array]:
-        return state.frame_jacobian(frame)[:3], checked("acceleration", acceleration(t), (3,)) - state.frame_drift(frame)[:3]
 
-    return LinearConstraint(f"drive of {frame}", 3, rows)
+# with names, so that they can be pickled
+def _bolted(frame: str, state: State, t: float) -> tuple[Array, Array]:
+    return state.frame_jacobian(frame), -state.frame_drift(frame)
+
+
+def _driven(frame: str, acceleration: Callable[[float], Array], state: State, t: float) -> tuple[Array, Array]:
+    return state.frame_jacobian(frame)[:3], checked("acceleration", acceleration(t), (3,)) - state.frame_drift(frame)[:3]

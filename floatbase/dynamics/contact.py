@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, cross, positive, read_only, unit_vector
+from floatbase._arrays import Array, Value, checked, cross, positive, read_only, text, unit_vector
 from floatbase.robots import State, checked_corners
 
 UP = read_only([0.0, 0.0, 1.0])
@@ -53,7 +53,7 @@ class Contact(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class OnePoint:
+class OnePoint(Value):
     """What contacts at one point of a frame's body share; `_arm` says where the point is and how it moves on the body."""
 
     frame: str
@@ -122,7 +122,7 @@ class PointContact(OnePoint):
 
 
 @dataclass(frozen=True, eq=False)
-class FlatFootContact:
+class FlatFootContact(Value):
     """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note 9 of the document).
 
     The frame's six rows hold the motion and the corners only carry forces. Twelve rows for the motion of the corners would
@@ -181,11 +181,13 @@ def grasp_matrix(points: Array, about: Array) -> Array:
 
     Known as the grasp matrix in manipulation. N and N·m, world.
     """
+    points, about = checked("points", points, (None, 3), "m"), checked("about", about, (3,), "m")
     blocks = [np.vstack([np.eye(3), pin.skew(point - about)]) for point in points]
     return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
 
 
 def check_ground(contact: Contact) -> None:
     """Check a new contact's friction coefficient and normal, and scale the normal to unit length."""
+    text("frame of a contact", contact.name)
     object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))
     object.__setattr__(contact, "mu", positive(f"friction coefficient mu of {contact.name}", contact.mu))

@@ -10,17 +10,18 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, number, of_kind, plain_numbers, read_only, said, texts
 from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, PointContact
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 
 PerFoot: TypeAlias = float | Sequence[float] | Array | Mapping[str, float]
+_FROM_NAMES = "fb.Contacts.points(robot, frames=[…]) makes them from names"
 Normals: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Contacts:
+class Contacts(Value):
     """Contacts stacked in order; none at all for free flight. `only`, `without` and `+` make new ones.
 
     Raises `InputError` for a name that stands twice.
@@ -29,10 +30,12 @@ class Contacts:
     items: Sequence[Contact]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.items, Sequence) or isinstance(self.items, str):
+            raise InputError(f"Contacts takes a list of contacts, not {said(self.items)}; {_FROM_NAMES}.")
         object.__setattr__(self, "items", tuple(self.items))
         for contact in self.items:
-            if not isinstance(contact, Contact):
-                raise InputError(f"{contact!r} is no contact; fb.Contacts.points(robot, frames=[…]) makes them from names.")
+            if isinstance(contact, type) or not isinstance(contact, Contact):
+                raise InputError(f"{said(contact)} is no contact; {_FROM_NAMES}.")
         twice = sorted({name for name in self.names if self.names.count(name) > 1})
         if twice:
             raise InputError(f"contact {twice[0]!r} stands twice in the list; each name may stand once.")
@@ -75,7 +78,9 @@ class Contacts:
 
         mu: as for `points`.
         """
-        return Contacts([_contact(*each) for each in _feet(robot, None, mu, None)] if robot.feet else [])
+        return Contacts(
+            [_contact(*each) for each in _feet(robot, None, mu, None)] if of_kind("robot", robot, Robot).feet else []
+        )
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -116,14 +121,19 @@ class Contacts:
 
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one radius below its centre."""
+        of_kind("state", state, State)
         return read_only(np.vstack([np.zeros((0, 3)), *(contact.positions(state) for contact in self.items)]))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """J of (4), shape (k, nv), at time t, s."""
+        of_kind("state", state, State)
+        t = number("t", t, "s")
         return self._stacked(state, [contact.jacobian(state, t) for contact in self.items])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
+        of_kind("state", state, State)
+        t = number("t", t, "s")
         parts = [contact.constraint(state, t) for contact in self.items]
         b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
@@ -146,9 +156,10 @@ class Contacts:
         part, contact = self.force_slice(name), self[name]
         if contact.k != 3 * len(contact.point_names):
             raise InputError(f"the forces of {name} do not act at points, so they add up to no force; see force_slice.")
-        stacked = np.asarray(forces, dtype=np.float64)
-        if stacked.ndim not in (1, 2) or stacked.shape[-1] != self.k:
-            raise InputError(f"forces has shape {stacked.shape}; {self!r} takes ({self.k},) or (n, {self.k}) (N).")
+        stacked = plain_numbers(forces)
+        if stacked is None or stacked.ndim not in (1, 2) or stacked.shape[-1] != self.k:
+            got = f"is {said(forces)}" if stacked is None else f"has shape {stacked.shape}"
+            raise InputError(f"forces {got}; {self!r} takes ({self.k},) or (n, {self.k}) (N).")
         return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
 
     def only(self, *names: str) -> Contacts:
@@ -162,14 +173,12 @@ class Contacts:
         return Contacts([contact for contact in self.items if contact.name not in dropped])
 
     def __getitem__(self, name: str) -> Contact:
-        if name not in self.names:
+        if not isinstance(name, str) or name not in self.names:
             raise unknown_name("contact", name, self.names)
         return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
-        if not isinstance(other, Contacts):
-            raise InputError(f"only Contacts can be added to Contacts, not {type(other).__name__}.")
-        return Contacts([*self.items, *other.items])
+        return Contacts([*self.items, *of_kind("what is added to Contacts", other, Contacts).items])
 
     def __iter__(self) -> Iterator[Contact]:
         return iter(self.items)
@@ -189,11 +198,8 @@ def _contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact
 
 def _feet(robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals) -> list[tuple[Foot, float, Array]]:
     """The feet that touch, each with its coefficient of friction and its normal."""
-    if not isinstance(robot, Robot):
-        raise InputError(f"contacts are made for a Robot, as from fb.load, not for {robot!r}.")
-    if isinstance(frames, str):
-        raise InputError(f'frames must be a list of names, as in frames=["{frames}"].')
-    feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in frames)
+    of_kind("robot", robot, Robot)
+    feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in texts("frames", frames))
     if not feet:
         raise InputError(f'{robot.name} has no feet; name the frames that touch: frames=["…"] (robot.frames lists them).')
     names = [foot.frame for foot in feet]
@@ -207,6 +213,9 @@ def _each(argument: str, value: Any, names: Sequence[str], default: Any, shape: 
         for name in set(value) - set(names):
             raise unknown_name(f"contact frame in {argument}", name, names)
         return [value.get(name, default) for name in names]
-    if np.ndim(value) == len(shape):
+    if isinstance(value, Sequence) and value and all(isinstance(entry, str) for entry in value):
+        raise InputError(f"{argument} must be numbers, not {said(value)}; names of frames go to frames=[…].")
+    found = plain_numbers(value)
+    if not isinstance(value, Sequence | np.ndarray) if found is None else found.ndim == len(shape):
         return [value] * len(names)
     return list(checked(argument, value, (len(names), *shape)))

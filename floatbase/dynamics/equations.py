@@ -8,16 +8,15 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked
+from floatbase._arrays import Array, Value, checked, flat_forces, of_kind
 from floatbase.dynamics.contacts import Contacts
-from floatbase.errors import InputError
 from floatbase.robots import Robot, State
 
 Block: TypeAlias = Literal["qdd", "tau", "forces"]  # the three unknowns of (7): q̈, τ, λ
 
 
 @dataclass(frozen=True, eq=False)
-class EquationsOfMotion:
+class EquationsOfMotion(Value):
     """(1)(4)(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
 
     For point contacts A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed
@@ -62,14 +61,14 @@ class EquationsOfMotion:
     def acceleration(self, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
         """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,), for torques (d,), N·m, and forces (k,), N, whatever A q̈ = b asks for."""
         tau = checked("tau", tau, (self.d,), "N·m")
-        forces = checked("forces", np.ravel(forces), (self.k,), "N")
+        forces = flat_forces(forces, self.k)
         return np.linalg.solve(self.M, self.S @ tau + self.J.T @ forces - self.h)
 
     def residual(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> tuple[Array, Array]:
         """How far (q̈, τ, λ) is from satisfying (7): M q̈ + h - S τ - Jᵀ λ, shape (nv,), and A q̈ - b, shape (m,)."""
         qdd = checked("qdd", qdd, (self.nv,))
         tau = checked("tau", tau, (self.d,), "N·m")
-        forces = checked("forces", np.ravel(forces), (self.k,), "N")
+        forces = flat_forces(forces, self.k)
         return self.M @ qdd + self.h - self.S @ tau - self.J.T @ forces, self.A @ qdd - self.b
 
 
@@ -78,9 +77,7 @@ def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> Equ
 
     Raises `InputError` for values of another kind and `UnknownNameError` for a contact on a frame the robot lacks.
     """
-    if not isinstance(state, State):
-        raise InputError(f"equations_of_motion needs a State first, not {type(state).__name__}.")
-    if not isinstance(contacts, Contacts):
-        raise InputError(f"equations_of_motion needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
+    of_kind("state", state, State)
+    of_kind("contacts", contacts, Contacts)
     J, (A, b) = contacts.jacobian(state, t), contacts.constraint(state, t)
     return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)

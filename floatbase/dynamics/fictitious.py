@@ -11,17 +11,18 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, function, of_kind, read_only
 from floatbase.errors import InputError
 from floatbase.robots import State
 
 Turning: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 _LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up: 1e-10 rad off after a turn
+_MOST_STEPS = 100_000  # between two times: 160 turns, and some seconds of computing
 _STEP = 1e-5  # m and rad to each side for central differences: curvature and rounding both leave about 1e-10 of M
 
 
 @dataclass(frozen=True, eq=False)
-class BiasForces:
+class BiasForces(Value):
     """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each (nv,), N and N·m as h.
 
     Which is which depends on the coordinates: v holds the base's velocity in the base frame, so ω × v of the base counts as
@@ -45,6 +46,7 @@ class BiasForces:
 
 def bias_forces(state: State) -> BiasForces:
     """App. A: h(q, v) taken apart. The velocity part is Σ_ij Γ_ij v_i v_j; moving one coordinate alone gives Γ_ii."""
+    of_kind("state", state, State)
     model = state.robot.model
     data = model.createData()
     g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
@@ -58,6 +60,7 @@ def coriolis_matrix(state: State) -> Array:
 
     Many matrices satisfy the first; this one, Pinocchio's, satisfies both.
     """
+    of_kind("state", state, State)
     model = state.robot.model
     return read_only(pin.computeCoriolisMatrix(model, model.createData(), state.q, state.v))
 
@@ -75,6 +78,7 @@ def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
     comes from central differences of M along the motion, which know nothing of C; their error is about 1e-10 of the two terms.
     C: shape (nv, nv), `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
     """
+    of_kind("state", state, State)
     C = coriolis_matrix(state) if C is None else checked("C", C, (state.robot.nv, state.robot.nv))
     dt = _STEP / max(1.0, float(np.max(np.abs(state.v), initial=0.0)))
     after, before = (state.replace(q=state.integrate(t * state.v)).M for t in (dt, -dt))
@@ -91,7 +95,7 @@ def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class TurningView:
+class TurningView(Value):
     """A free particle as one who rides on a turning frame sees it; a row for each time.
 
     All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: the document, Appendix A.
@@ -157,6 +161,7 @@ def seen_from_turning_frame(
 def _as_function(name: str, value: Turning) -> Callable[[float], Array]:
     """The value as a checked function of time."""
     if callable(value):
+        function(name, value, f"{name}(t)")
         return lambda t: checked(f"{name} at {t:g} s", value(t), (3,))
     constant = checked(name, value, (3,))
     return lambda t: constant
@@ -172,6 +177,10 @@ def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
     for i, (begin, end) in enumerate(pairwise(time)):
         fastest = max(float(np.linalg.norm(omega(t))) for t in np.linspace(begin, end, 3))
         steps = int(np.ceil(fastest * (end - begin) / _LARGEST_TURN)) + 1
+        if steps > _MOST_STEPS:
+            raise InputError(
+                f"from {begin:g} s to {end:g} s the frame turns by {steps * _LARGEST_TURN:g} rad; use a shorter time."
+            )
         dt = (end - begin) / steps
         R[i + 1] = R[i]
         for t in begin + dt * np.arange(steps):

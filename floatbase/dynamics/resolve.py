@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, Value, of_kind, read_only
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
@@ -17,7 +17,7 @@ _FIT_TOLERANCE = 1e-6  # part of J that may lie beside A's rows: rounding leaves
 
 
 @dataclass(frozen=True, eq=False)
-class ContactSpace:
+class ContactSpace(Value):
     """The contacts of (7) along the directions that they resolve: r independent motions and the forces that hold them.
 
     The rank r is decided here, once, for everything that follows (`contact_space`).
@@ -72,6 +72,7 @@ def resolved_motion(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
     """U, s, Vt of A's singular value decomposition, without the directions that A resolves badly."""
+    of_kind("eom", eom, EquationsOfMotion)
     U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
     r = int(np.sum(s > MOTION_TOLERANCE * s.max(initial=0.0)))
     return U[:, :r], s[:r], Vt[:r]

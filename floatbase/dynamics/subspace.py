@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, flat_forces, of_kind, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.dynamics.resolve import contact_space
@@ -20,6 +20,7 @@ def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
 
     For points J M⁻¹ Jᵀ, known as the Delassus matrix; its inverse, where there is one, is the inertia that contacts feel.
     """
+    of_kind("eom", eom, EquationsOfMotion)
     return read_only(eom.A @ np.linalg.solve(eom.M, eom.J.T))
 
 
@@ -38,28 +39,32 @@ def forces_from_torques(eom: EquationsOfMotion) -> Affine:
 
 def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
     """(14) η: τ -> q̈ = M⁻¹ (S τ + Jᵀ ζ(τ) - h), shape (d,) to (nv,). Right whether or not λ is unique. Source: §3."""
+    of_kind("eom", eom, EquationsOfMotion)
     return _motion_of(eom, Affine.identity(eom.d), forces_from_torques(eom))
 
 
 def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """(10) C, shape (m, d + k), and its right-hand side b + A M⁻¹ h, shape (m,): C (τ, λ) = b + A M⁻¹ h."""
+    of_kind("eom", eom, EquationsOfMotion)
     C = np.hstack([eom.A @ np.linalg.solve(eom.M, eom.S), contact_inertia_inverse(eom)])
     return read_only(C), read_only(eom.b + eom.A @ np.linalg.solve(eom.M, eom.h))
 
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
     """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
+    of_kind("eom", eom, EquationsOfMotion)
     return _orthonormal(_pairs(eom))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """(12) B, shape (nv + m, nv + d + k), and its right-hand side (-h, b): B (q̈, τ, λ) = (-h, b)."""
+    of_kind("eom", eom, EquationsOfMotion)
     B = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.d + eom.k))]])
     return read_only(B), read_only(np.concatenate([-eom.h, eom.b]))
 
 
 @dataclass(frozen=True, eq=False)
-class FeasibleSpace:
+class FeasibleSpace(Value):
     """(13)(16)(17) All (q̈, τ, λ) that satisfy (7), as the map β -> v + V⊥ β with orthonormal V⊥.
 
     eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: the document, §2.2.2.
@@ -90,8 +95,9 @@ class FeasibleSpace:
 
     def coordinates(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
         """The β of a feasible (q̈, τ, λ), or of the feasible point nearest to one that is not; shape (dimension,)."""
-        point = np.concatenate([np.ravel(qdd), np.ravel(tau), np.ravel(forces)])
-        return self.map.A.T @ (checked("the point", point, (self.map.n_out,)) - self.map.b)
+        eom = self.eom
+        parts = [checked("qdd", qdd, (eom.nv,)), checked("tau", tau, (eom.d,)), flat_forces(forces, eom.k)]
+        return self.map.A.T @ (np.concatenate(parts) - self.map.b)
 
     def __call__(self, beta: npt.ArrayLike) -> tuple[Array, Array, Array]:
         """(q̈, τ, λ) at β, shape (dimension,)."""
@@ -105,6 +111,7 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the resolved part
     of the contacts (`contact_space`): the same space as by the SVD of B, and one of bounded numbers where J nearly loses rank.
     """
+    of_kind("eom", eom, EquationsOfMotion)
     pairs = _pairs(eom)
     qdd = _motion_of(eom, pairs["tau"], pairs["forces"])
     return FeasibleSpace(eom, _orthonormal(Affine.stack(qdd=qdd, tau=pairs["tau"], forces=pairs["forces"])))
@@ -118,6 +125,7 @@ def internal_forces(eom: EquationsOfMotion) -> Array:
     all of them about without moving anything: ζ answers -J_jᵀ λ with λ. Where J loses rank (solo8 on four feet) the k - r
     directions of null(Jᵀ) are among them; no torques can bring those about, which leaves rank J - rank J_b to torques.
     """
+    of_kind("eom", eom, EquationsOfMotion)
     return null_space(eom.J[:, : eom.nv - eom.d].T)
 
 
@@ -156,6 +164,7 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     `contact_space` decides the rank of J. B and C are counted by their own singular values, with the resolved rows and their
     forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
+    of_kind("eom", eom, EquationsOfMotion)
     space = contact_space(eom)
     reactions = np.linalg.qr(eom.J.T @ space.lift)[0]
     B = np.block([[eom.M, -eom.S, -reactions], [space.rows, np.zeros((space.r, eom.d + space.r))]])

@@ -7,13 +7,15 @@ description for multi-contact stability of humanoids, RSS 2015.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, of_kind, plain_numbers, positive, read_only
 from floatbase.dynamics import Contacts, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction.cones import FrictionPolyhedron
@@ -25,7 +27,7 @@ TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets
 
 
 @dataclass(frozen=True, eq=False)
-class WrenchSet:
+class WrenchSet(Value):
     """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i), f_i in its friction polyhedron: the contact wrench cone (CWC).
 
     `wrench_set` makes it from a state and its contacts. The torque limits of the joints do not enter.
@@ -46,7 +48,7 @@ class WrenchSet:
 
     def __post_init__(self) -> None:
         points = checked("points", self.points, (None, 3), "m")
-        cones = tuple(self.cones)
+        cones = tuple(self.cones) if isinstance(self.cones, Sequence) else ()
         if not len(points):
             raise InputError("a wrench set needs at least one contact point; a robot in the air can produce no wrench.")
         if len(cones) != len(points) or not all(isinstance(cone, FrictionPolyhedron) for cone in cones):
@@ -55,8 +57,8 @@ class WrenchSet:
         object.__setattr__(self, "cones", cones)
         object.__setattr__(self, "about", checked("about", self.about, (3,), "m"))
         object.__setattr__(self, "weight", positive("weight", self.weight, "N"))
-        limits = np.asarray(self.max_normal_force)  # +inf is allowed
-        if limits.shape != (len(points),) or limits.dtype.kind not in "fi" or not np.all(limits > 0):
+        limits = plain_numbers(self.max_normal_force)  # +inf is allowed
+        if limits is None or limits.shape != (len(points),) or not np.all(limits > 0):
             count = f"one number > 0 or {len(points)} of them, one for each contact point (N)"
             raise InputError(f"max_normal_force must be {count}.")
         object.__setattr__(self, "max_normal_force", read_only(limits))
@@ -220,14 +222,13 @@ def wrench_set(
 
     Raises `InputError` where there is no contact, or one whose forces have no cone. Source: the document, §3.1, §4.2.
     """
-    if not isinstance(state, State):
-        raise InputError(f"wrench_set needs a State first, not {type(state).__name__}.")
-    if not isinstance(contacts, Contacts):
-        raise InputError(f"wrench_set needs Contacts second, as fb.Contacts.points(robot), not {contacts!r}.")
+    of_kind("state", state, State)
+    of_kind("contacts", contacts, Contacts)
     coneless = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
     if coneless:
         raise InputError(f"{', '.join(coneless)} has forces without a cone; leave it out: contacts.without(…).")
     cones = tuple(FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True))
-    limits = np.asarray(np.inf if max_normal_force is None else max_normal_force)
-    limits = np.repeat(limits, len(cones)) if limits.ndim == 0 else limits
+    limits: Any = np.inf if max_normal_force is None else max_normal_force
+    number = plain_numbers(limits)
+    limits = np.repeat(number, len(cones)) if number is not None and number.ndim == 0 else limits
     return WrenchSet(contacts.positions(state), cones, state.com, state.robot.weight, limits)

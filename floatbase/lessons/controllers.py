@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, checked, function, of_kind, positive
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
 
@@ -42,8 +42,9 @@ class ConstantTorques:
         contacts: Contacts | None = None,
         predict: Callable[[Array, Array], Array] | None = None,
     ):
-        self.tau, self.contacts = np.array(tau, dtype=np.float64), contacts
-        self._predict = predict
+        self.tau = checked("tau", tau, (None,), "N·m")
+        self.contacts = None if contacts is None else of_kind("contacts", contacts, Contacts)
+        self._predict = None if predict is None else function("predict", predict, "predict(q, v)")
 
     def __call__(self, q: Array, v: Array, t: float) -> Torques:
         """The torques, and the prediction for configuration q and velocity v."""
@@ -65,9 +66,10 @@ def joint_servo(
     stiffness: N·m/rad.
     damping: N·m·s/rad.
     """
-    d = state.robot.d
-    steady = np.zeros(d) if tau is None else np.array(tau)
-    offset = path if path is not None else lambda t: np.zeros(d)
+    d = of_kind("state", state, State).robot.d
+    steady = np.zeros(d) if tau is None else checked("tau", tau, (d,), "N·m")
+    stiffness, damping = positive("stiffness", stiffness, allow_zero=True), positive("damping", damping, allow_zero=True)
+    offset = function("path", path, "path(t)") if path is not None else lambda t: np.zeros(d)
 
     def controller(q: Array, v: Array, t: float) -> Torques:
         rate = (offset(t + _STEP) - offset(t - _STEP)) / (2.0 * _STEP)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, flat_forces, of_kind, plain_numbers, positive, read_only
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, grasp_matrix, resolved_motion, torque_force_space
 from floatbase.errors import InputError
@@ -21,6 +21,7 @@ def momentum(state: State) -> Array:
 
     Linear m ẋ_c, angular Σ (x_i - x_c) × m_i ẋ_i over all particles: what (20)(21) say that outside forces change.
     """
+    of_kind("state", state, State)
     model = state.robot.model
     return read_only(pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v).vector)
 
@@ -31,6 +32,7 @@ def momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
     Newton and Euler: (f_c + m g, τ_c), with the wrench (f_c, τ_c) of (20)(21) that the contact forces have about the centre of
     mass. Torques of the joints are internal and do not show up.
     """
+    of_kind("state", state, State)
     model = state.robot.model
     qdd = checked("qdd", qdd, (state.robot.nv,))
     return read_only(pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, qdd).vector)
@@ -38,6 +40,7 @@ def momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
 
 def force_sum(contacts: Contacts) -> Array:
     """(20) G_f, shape (3, 3n): f_c = G_f λ, one identity block for each point (four for four feet). N, world."""
+    of_kind("contacts", contacts, Contacts)
     return grasp_matrix(np.zeros((contacts.n_points, 3)), np.zeros(3))[:3]
 
 
@@ -46,6 +49,8 @@ def moment_sum(state: State, contacts: Contacts) -> Array:
 
     The order matters: footnote 10 of the document prints x_c - x_i, which would give the opposite moment.
     """
+    of_kind("state", state, State)
+    of_kind("contacts", contacts, Contacts)
     return grasp_matrix(contacts.positions(state), state.com)[3:]
 
 
@@ -54,6 +59,7 @@ def com_wrench(state: State, contacts: Contacts) -> Affine:
 
     Only contacts whose forces act at points count. Raises `InputError` for others (`LinearConstraint`).
     """
+    of_kind("state", state, State)
     _only_points(contacts)
     return Affine.stack(force=Affine.linear(force_sum(contacts)), moment=Affine.linear(moment_sum(state, contacts)))
 
@@ -77,12 +83,14 @@ def desired_wrench(
 
     com_acceleration: a, shape (3,), m/s². angular_momentum_rate: L̇ about the centre of mass, shape (3,), N·m.
     """
+    of_kind("state", state, State)
     free = checked("com_acceleration", com_acceleration, (3,), "m/s²") - state.robot.model.gravity.linear
     return read_only(state.robot.mass * free), checked("angular_momentum_rate", angular_momentum_rate, (3,))
 
 
 def rotational_inertia(state: State) -> Array:
     """Inertia of the whole robot about its centre of mass, joints locked, shape (3, 3), kg·m², world."""
+    of_kind("state", state, State)
     data = state.robot.model.createData()
     pin.ccrba(state.robot.model, data, state.q, state.v)
     return read_only(data.Ig.inertia)
@@ -103,7 +111,9 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
     a: one number for all points or shape (n,).
     """
     N = _normals(contacts)
-    each = checked("the nominal normal force a", [a] * N.shape[1] if np.ndim(a) == 0 else a, (N.shape[1],), "N")
+    found = plain_numbers(a)
+    each = [a] * N.shape[1] if found is not None and found.ndim == 0 else a
+    each = checked("the nominal normal force a", each, (N.shape[1],), "N")
     return Quadratic.from_residual(N @ N.T, N @ each)
 
 
@@ -120,7 +130,7 @@ def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueForForces:
+class TorqueForForces(Value):
     """(25) The smallest torques that give desired forces, in closed form.
 
     With fewer torques than forces not every λ is reachable: `torque` then answers for the nearest reachable accelerations.
@@ -136,11 +146,11 @@ class TorqueForForces:
 
     def gap(self, forces: npt.ArrayLike) -> float:
         """Distance, N, of desired forces (k,) from those that torques can give; 0 when reachable."""
-        return float(np.linalg.norm(np.ravel(forces) - self.nearest(forces)))
+        return float(np.linalg.norm(flat_forces(forces, self.reachable.n_out) - self.nearest(forces)))
 
     def nearest(self, forces: npt.ArrayLike) -> Array:
         """The reachable forces nearest to desired ones, shape (k,), N."""
-        forces = checked("forces", np.ravel(forces), (self.reachable.n_out,), "N")
+        forces = flat_forces(forces, self.reachable.n_out)
         return self.reachable(self.reachable.A.T @ (forces - self.reachable.b))
 
 
@@ -150,6 +160,7 @@ def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
     f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k: forces out of reach,
     one τ for each λ, and a choice among many. Source: the document, §3.1.2.
     """
+    of_kind("eom", eom, EquationsOfMotion)
     A, b = resolved_motion(eom)
     C_tau, C_forces = A @ np.linalg.solve(eom.M, eom.S), A @ np.linalg.solve(eom.M, eom.J.T)
     inverse, a = np.linalg.pinv(C_tau, rcond=RANK_TOLERANCE), b + A @ np.linalg.solve(eom.M, eom.h)
@@ -169,6 +180,7 @@ def _normals(contacts: Contacts) -> Array:
 
 
 def _only_points(contacts: Contacts) -> None:
+    of_kind("contacts", contacts, Contacts)
     names = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
     if names:
         raise InputError(f"{', '.join(names)} has forces that do not act at points; leave it out: contacts.without(…).")

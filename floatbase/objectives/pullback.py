@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from floatbase._arrays import of_kind
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics import Block, EquationsOfMotion, FeasibleSpace, accelerations_from_torques
 from floatbase.linear_algebra import null_space, ranked_svd
@@ -9,6 +10,7 @@ from floatbase.linear_algebra import null_space, ranked_svd
 
 def cost_on_torques(cost_on_qdd: Quadratic, eom: EquationsOfMotion) -> Quadratic:
     """(15) A cost on q̈ seen from the torques: Q̃(τ) = Q(η(τ)), with η of (14)."""
+    of_kind("cost_on_qdd", cost_on_qdd, Quadratic)
     return cost_on_qdd.pullback(accelerations_from_torques(eom))
 
 
@@ -20,12 +22,15 @@ def cost_on_space(
     space: β -> (q̈, τ, λ), as from `feasible_space`.
     qdd, tau, forces: costs on vectors of shape (nv,), (d,) and (k,).
     """
-    parts = ((qdd, space.qdd), (tau, space.tau), (forces, space.forces))
-    return sum((cost.pullback(part) for cost, part in parts if cost is not None), Quadratic.zero(space.dimension))
+    of_kind("space", space, FeasibleSpace)
+    parts = (("qdd", qdd), ("tau", tau), ("forces", forces))
+    costs = [of_kind(name, cost, Quadratic).pullback(space.map[name]) for name, cost in parts if cost is not None]
+    return sum(costs, Quadratic.zero(space.dimension))
 
 
 def smallest_coordinates(space: FeasibleSpace, block: Block) -> Affine:
     """The β that (19) takes: the smallest β that gives a value of the block, β = V† (x - v)."""
+    of_kind("space", space, FeasibleSpace)
     f = space.map[block]
     U, s, Vt, r = ranked_svd(f.A, absolute=True)  # rows of orthonormal columns: what is below the tolerance is rounding
     V_pinv = (Vt[:r].T / s[:r]) @ U[:, :r].T
@@ -38,6 +43,7 @@ def seen_from_smallest(cost: Quadratic, space: FeasibleSpace, block: Block) -> Q
     Answers "what does this motion cost, if everything it leaves open is set to zero in β?". That choice depends on the
     origin v of β and has no physical meaning where V of the block loses rank (four point feet: 12 columns, rank 6).
     """
+    of_kind("cost", cost, Quadratic)
     return cost.pullback(smallest_coordinates(space, block))
 
 
@@ -46,6 +52,7 @@ def best_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> Aff
 
     Raises `InputError` where the cost has no minimum over what is left open.
     """
+    of_kind("cost", cost, Quadratic)
     start = smallest_coordinates(space, block)
     return cost.minimised_over(null_space(space.map[block].A, absolute=True)) @ start
 
@@ -56,4 +63,5 @@ def seen_from_best(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadr
     Answers "what does this motion cost at least?". Never above `seen_from_smallest`, and equal to it where V of the
     block has full column rank.
     """
+    of_kind("cost", cost, Quadratic)
     return cost.pullback(best_coordinates(cost, space, block))

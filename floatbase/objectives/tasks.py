@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, number, of_kind, plain_numbers, positive, read_only, text
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
@@ -44,6 +44,12 @@ class Task(Protocol):
         """The residual as an `Affine` of the task's block at time t."""
 
 
+def _at(eom: EquationsOfMotion, t: float) -> None:
+    """Check what a residual is asked for."""
+    of_kind("eom", eom, EquationsOfMotion)
+    number("t", t, "s")
+
+
 def _value(name: str, target: Target | None, t: float, shape: tuple[int, ...]) -> Array:
     """A target at time t. One that does not move was checked when its task was made, but for the shape of a robot's own."""
     if isinstance(target, np.ndarray) and target.shape == shape:
@@ -55,6 +61,9 @@ def _value(name: str, target: Target | None, t: float, shape: tuple[int, ...]) -
 
 def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
     """Check gains and weight, and copy the targets that do not move; kd is critically damped, 2 √kp, by default."""
+    text("name of a task", task.name)
+    if isinstance(task, OrientationTask | FrameTask):
+        text("frame of a task", task.frame)
     kept: dict[str, object] = {"weight": positive(f"weight of {task.name}", task.weight, allow_zero=True)}
     if isinstance(task, CoMTask | OrientationTask | FrameTask | PostureTask):
         kp = kept["kp"] = positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
@@ -62,15 +71,16 @@ def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
         kept["kd"] = positive(f"kd of {task.name}", kd, "1/s", allow_zero=True)
     for name in targets:
         target = getattr(task, name)
-        if target is not None and not callable(target):
-            flat = target if task.block == "qdd" else np.ravel(target)  # forces may come as (n, 3)
+        if isinstance(target, type) or not (callable(target) or (target is None and task.block != "qdd")):
+            found = plain_numbers(target)  # forces may come as (n, 3)
+            flat = target if task.block == "qdd" or found is None else found.ravel()
             kept[name] = checked(f"{name} of {task.name}", flat, shape)
     for name, value in kept.items():
         object.__setattr__(task, name, value)
 
 
 @dataclass(frozen=True, eq=False)
-class CoMTask:
+class CoMTask(Value):
     """Bring the centre of mass to a position; residual in q̈, m/s².
 
     position: shape (3,), m, world.
@@ -94,13 +104,14 @@ class CoMTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_com q̈ + J̇_com q̇ - a, shape (3,), m/s²."""
+        _at(eom, t)
         state = eom.state
         x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
         return _motion_residual(self, state.com_jacobian, state.com_drift, a, state.com - x, state.com_velocity - v)
 
 
 @dataclass(frozen=True, eq=False)
-class OrientationTask:
+class OrientationTask(Value):
     """Bring a frame to an orientation; residual in q̈, rad/s². The error is e = log(R R_desiredᵀ), rad, world-aligned.
 
     frame: its name; "base" is the base link.
@@ -120,7 +131,7 @@ class OrientationTask:
 
     def __post_init__(self) -> None:
         _keep(self, (3,), "angular_velocity", "angular_acceleration")
-        if not callable(self.rotation):
+        if isinstance(self.rotation, type) or not callable(self.rotation):
             rotation = nearest_rotation(self.name, checked(f"rotation of {self.name}", self.rotation, (3, 3)))
             object.__setattr__(self, "rotation", rotation)
 
@@ -131,6 +142,7 @@ class OrientationTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_ω q̈ + J̇_ω q̇ - α, shape (3,), rad/s², world-aligned."""
+        _at(eom, t)
         state = eom.state
         desired = _value("rotation", self.rotation, t, (3, 3))
         if callable(self.rotation):
@@ -143,7 +155,7 @@ class OrientationTask:
 
 
 @dataclass(frozen=True, eq=False)
-class FrameTask:
+class FrameTask(Value):
     """Bring a frame's origin to a position; residual in q̈, m/s². A foot that swings, a hand.
 
     The origin of a ball foot's frame is not where it touches: `Contacts.positions` has the sole, one radius lower where the
@@ -174,6 +186,7 @@ class FrameTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J q̈ + J̇ q̇ - a, shape (3,), m/s², world-aligned."""
+        _at(eom, t)
         state = eom.state
         x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
         J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
@@ -181,7 +194,7 @@ class FrameTask:
 
 
 @dataclass(frozen=True, eq=False)
-class PostureTask:
+class PostureTask(Value):
     """Bring the joints to those of a configuration; residual in q̈, rad/s².
 
     q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of length 1.
@@ -200,6 +213,7 @@ class PostureTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
+        _at(eom, t)
         state, robot, zero, joints = eom.state, eom.robot, np.zeros(eom.d), slice(eom.nv - eom.d, None)
         desired = _value("q of posture", self.q, t, (robot.nq,))
         check_unit_lengths(robot.model, "q of posture", desired, first=2 if robot.is_floating else 1)
@@ -207,7 +221,7 @@ class PostureTask:
 
 
 @dataclass(frozen=True, eq=False)
-class ForceTask:
+class ForceTask(Value):
     """Keep contact forces near a target, shape (k,), N, world, zero by default; residual in λ, N.
 
     With a small weight it chooses among forces of equal wrench: the force regularisation.
@@ -223,11 +237,12 @@ class ForceTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """λ - target, shape (k,), N."""
+        _at(eom, t)
         return Affine.identity(eom.k) - _value("target forces", self.target, t, (eom.k,))
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueTask:
+class TorqueTask(Value):
     """Keep joint torques near a target, shape (d,), N·m, zero by default; residual in τ, N·m."""
 
     target: Target | None = None
@@ -240,6 +255,7 @@ class TorqueTask:
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """τ - target, shape (d,), N·m."""
+        _at(eom, t)
         return Affine.identity(eom.d) - _value("target torques", self.target, t, (eom.d,))
 
 
@@ -249,8 +265,7 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
     To go elsewhere, replace the centre of mass's target, and mind the posture: its weight, 0.1, holds the joints back. go2
     with a target 30 mm to the left ends 12 mm short; with a posture task of weight 1e-3 it ends within 1 mm.
     """
-    if not isinstance(state, State):
-        raise InputError(f"standing_tasks needs a State, as robot.standing(), not {type(state).__name__}.")
+    of_kind("state", state, State)
     return CoMTask(state.com), OrientationTask("base", state.frame_pose("base").rotation), PostureTask(state.q)
 
 
@@ -267,6 +282,7 @@ def nearest_rotation(name: str, R: Array) -> Array:
 
     Raises `InputError` where R Rᵀ is off by more than 1e-6 of the identity, or R mirrors.
     """
+    R = checked(f"rotation of {name}", R, (3, 3))
     error = np.max(np.abs(R @ R.T - np.eye(3))) if np.all(np.isfinite(R)) else np.inf
     if not error <= _ROTATION_TOLERANCE or np.linalg.det(R) < 0:
         raise InputError(f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, determinant +1.")

@@ -37,7 +37,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, read_only
+from floatbase._arrays import Array, Value, checked, of_kind, read_only, texts
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
@@ -52,7 +52,7 @@ _VIOLATION = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 
 
 @dataclass(frozen=True, eq=False)
-class Iteration:
+class Iteration(Value):
     """One round of the method, for a lesson to draw: from x along direction, as far as length.
 
     working: names of the rows in W.
@@ -77,11 +77,11 @@ class Iteration:
     @property
     def arrival(self) -> Array:
         """The point that the step leads to, shape (n,)."""
-        return self.x + self.length * self.direction
+        return read_only(self.x + self.length * self.direction)
 
 
 @dataclass(frozen=True, eq=False)
-class ActiveSetRun:
+class ActiveSetRun(Value):
     """The answer of `active_set` and the way to it.
 
     solution: the optimum, with its multipliers.
@@ -108,8 +108,8 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
     Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum or is
     not convex, `UnknownNameError` for a row that does not exist, `InputError` for a start of another shape.
     """
-    space, problem = qp.equality_space, qp.reduced
-    rows = _independent_rows(problem, [_index(qp, name) for name in working])
+    space, problem = of_kind("qp", qp, QP).equality_space, qp.reduced
+    rows = _independent_rows(problem, [_index(qp, name) for name in texts("working", working)])
     y = None if start is None else space.A.T @ (checked("start", start, (qp.n,)) - space.b)
     search = _feasible_start(problem, _starting_point(problem, y, rows), rows)
     walk = _walk(problem, search.x, search.rows)

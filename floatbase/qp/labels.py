@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from floatbase._arrays import texts
 from floatbase.errors import InputError
 
 
@@ -37,7 +38,7 @@ def row_labels(names: Iterable[str], rows: int, kind: str) -> tuple[RowLabel, ..
 
     kind: "equality" or "inequality". Raises `InputError` for another number of names, or one that stands twice.
     """
-    labels = tuple(name if isinstance(name, RowLabel) else RowLabel(name) for name in names)
+    labels = tuple(name if isinstance(name, RowLabel) else RowLabel(name) for name in texts(f"{kind}_names", names))
     labels = labels or tuple(RowLabel(f"{kind} {i}") for i in range(rows))
     if len(labels) != rows:
         raise InputError(f"{len(labels)} {kind} names for {rows} rows; give one for each row, or none at all.")

@@ -18,15 +18,13 @@ Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimization (20
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from functools import cached_property, partial
-from types import MappingProxyType
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, read_only
-from floatbase.affine import Affine
+from floatbase._arrays import Array, Value, checked, read_only
+from floatbase.affine import Affine, block_slices
 from floatbase.errors import InfeasibleError
 from floatbase.linear_algebra import ranked_svd, row_lengths
 from floatbase.qp.conflicts import conflicting_rows
@@ -37,7 +35,7 @@ _ROUNDING = 1e-14  # part of a sum's terms that may be rounding: some 50 units i
 
 
 @dataclass(frozen=True, eq=False)
-class QP:
+class QP(Value):
     """App. C: min ½ xᵀ H x + gᵀ x  subject to  A x = b,  G x ≤ h, with the ≤ that the document means.
 
     H: (n, n), symmetric, positive semidefinite where A x = b.
@@ -66,15 +64,11 @@ class QP:
         H = checked("H", self.H, (g.size, g.size))
         values: dict[str, object] = {"H": read_only(0.5 * (H + H.T)), "g": g, "A": A, "G": G}
         values["b"], values["h"] = checked("b", self.b, (len(A),)), checked("h", self.h, (len(G),))
-        values["blocks"] = MappingProxyType(dict(self.blocks))
+        values["blocks"] = block_slices(self.blocks)
         values["equality_names"] = row_labels(self.equality_names, len(A), "equality")
         values["inequality_names"] = row_labels(self.inequality_names, len(G), "inequality")
         for name, value in values.items():
             object.__setattr__(self, name, value)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        values = {part.name: getattr(self, part.name) for part in fields(self)}
-        return partial(type(self), **values | {"blocks": dict(self.blocks)}), ()  # a mapping proxy cannot be pickled
 
     @property
     def n(self) -> int:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, Value, read_only
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, row_lengths
 from floatbase.qp.problem import QP
@@ -34,7 +34,7 @@ class Residuals:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Value):
     """The minimiser of a QP and the multipliers that prove it: H x + g + Aᵀ ν + Gᵀ μ = 0.
 
     qp: the problem.
@@ -87,7 +87,7 @@ class Solution:
 
     def __getitem__(self, block: str) -> Array:
         """One named block of x."""
-        if block not in self.qp.blocks:
+        if not isinstance(block, str) or block not in self.qp.blocks:
             raise InputError(f"this problem has no block {block!r}; its blocks are {list(self.qp.blocks)}.")
         return self.x[self.qp.blocks[block]]
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, of_kind
 from floatbase.errors import SolverError, unknown_name
 from floatbase.qp.active_set import active_set
 from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_rows, infeasible, not_convex, unbounded
@@ -31,6 +31,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     not exist.
     """
     check_solver(solver)
+    of_kind("qp", qp, QP)
     found = _BACK_ENDS[solver](qp)
     if found is not None:
         return found
@@ -47,7 +48,7 @@ def solvers() -> tuple[str, ...]:
 
 def check_solver(solver: str) -> None:
     """Raises `UnknownNameError` for a solver that `solve` does not take."""
-    if solver not in _BACK_ENDS:
+    if not isinstance(solver, str) or solver not in _BACK_ENDS:
         raise unknown_name("solver", solver, _BACK_ENDS)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, checked, flag, of_kind, positive, read_only, said, text, texts
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
 from floatbase.robots.entries import CATALOGUE, Entry
 from floatbase.robots.robot import Foot, Robot, within_limits
@@ -111,21 +111,29 @@ def load_urdf(
     Raises `InputError` for a file that is not there or cannot be read, for planar and floating joints inside the robot, and
     as `load` does.
     """
-    text, folders = str(path), tuple(Path(folder) for folder in package_dirs)
-    name = name or ("robot" if text.lstrip().startswith("<") else Path(text).stem)
-    if not text.lstrip().startswith("<"):
-        file = Path(path).expanduser().resolve()
+    urdf, folders = text("path", str(path) if isinstance(path, Path) else path), _folders(package_dirs)
+    flag("floating", floating)
+    is_text = urdf.lstrip().startswith("<")
+    name = text("name", name) if name is not None else "robot" if is_text else Path(urdf).stem
+    if not is_text:
+        file = Path(urdf).expanduser().resolve()
         if not file.is_file():
             raise InputError(f"there is no file {file}; give the path of a URDF file.")
-        text, folders = read_urdf(file), (*folders, file.parent)
+        urdf, folders = read_urdf(file), (*folders, file.parent)
     try:
-        model = model_of(text, floating)
+        model = model_of(urdf, floating)
     except (RuntimeError, ValueError) as error:
         raise InputError(f"Pinocchio cannot read {name} as a URDF: {error}") from None
     start = within_limits(model, pin.neutral(model)) if posture is None else posture
-    robot = _robot(name, text, model, start, locked, torque_limits, package_dirs=folders, feet=_feet(feet, foot_radius))
+    robot = _robot(name, urdf, model, start, locked, torque_limits, package_dirs=folders, feet=_feet(feet, foot_radius))
     _warn_of_weak_motors(robot)
     return robot
+
+
+def _folders(paths: Sequence[str | Path]) -> tuple[Path, ...]:
+    """Folders given as texts or paths."""
+    plain = [str(path) if isinstance(path, Path) else path for path in paths] if isinstance(paths, list | tuple) else paths
+    return tuple(map(Path, texts("package_dirs", plain)))
 
 
 def unbolted(robot: Robot, plate: bool = False) -> Robot:
@@ -136,7 +144,8 @@ def unbolted(robot: Robot, plate: bool = False) -> Robot:
     robot: with a fixed base, such as ur5.
     plate: let it stand on a square plate that has no weight (`PLATE`); else it touches nothing and floats 1 m up.
     """
-    if robot.is_floating:
+    flag("plate", plate)
+    if of_kind("robot", robot, Robot, 'fb.load("ur5")').is_floating:
         raise InputError(f"{robot.name} has no bolts; unbolted takes a robot with a fixed base, such as ur5.")
     loose = load_urdf(
         without_bolts(robot.urdf), name=robot.name, package_dirs=robot.package_dirs, torque_limits=robot.torque_limits
@@ -202,7 +211,7 @@ def _loader(name: str, known: Mapping[str, Any]) -> Any:
             f"{str(name)!r} is no robot's name but a file's; fb.load_urdf({str(name)!r}, feet=[…]) loads a URDF of your own. "
             f"Names that fb.load knows: {', '.join(CATALOGUE)}, and the others of example-robot-data."
         )
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise unknown_name("robot", name, known, "fb.catalogue() says what the catalogue's robots are for.")
     if not known[name].urdf_filename:
         raise InputError(f"{name} comes as an SDF file; floatbase reads URDF. Choose one of {', '.join(CATALOGUE)}.")
@@ -252,7 +261,7 @@ def _limb_ends(model: pin.Model) -> list[str]:
 
 def _feet(requested: Sequence[str | Foot], radius: float | None) -> tuple[Foot, ...]:
     """Feet of frames and `Foot` values."""
-    if isinstance(requested, str):
-        raise InputError(f'feet must be a list of frames, as in feet=["{requested}"].')
+    if isinstance(requested, str) or not isinstance(requested, Sequence):
+        raise InputError(f'feet must be a list of frames, as in feet=["FL_foot"], not {said(requested)}.')
     r = 0.0 if radius is None else positive("foot_radius", radius, "m", allow_zero=True)
     return tuple(foot if isinstance(foot, Foot) else Foot(foot, r) for foot in requested)

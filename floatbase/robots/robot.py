@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._arrays import Array, Value, checked, plain_numbers, positive, read_only, said, text, whole
 from floatbase.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ _AREA_TOLERANCE = 1e-6  # m: corners nearer to one line than this span no area; 
 
 
 @dataclass(frozen=True, eq=False)
-class Foot:
+class Foot(Value):
     """Where a robot can touch the ground: a ball, or a flat foot with corners.
 
     frame: name of the frame that carries the foot; a flat foot's z axis points out of the ground when it stands.
@@ -41,6 +43,7 @@ class Foot:
     corners: Array | None = None
 
     def __post_init__(self) -> None:
+        text("frame of a foot", self.frame)
         object.__setattr__(self, "radius", positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
         object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
@@ -58,7 +61,7 @@ class Foot:
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(Value):
     """A robot as the equations need it. Made by `load`; nothing in it changes afterwards.
 
     name: as it was loaded.
@@ -85,9 +88,11 @@ class Robot:
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,)))
+        parts = "7 for the base, then its joints" if self.is_floating else "its joints"
+        object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,), parts))
         check_unit_lengths(self.model, "posture", self.posture)
         object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
+        object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         for foot in self.feet:
             self.frame_id(foot.frame)
         self._check_limits()
@@ -120,6 +125,21 @@ class Robot:
                 f"{self.name} has a singular inertia M (1) in its posture: {', '.join(light)} can accelerate without moving "
                 "any mass. Give the links there mass and inertia, or hold such joints still with locked=[…]."
             )
+
+    @cached_property
+    def _fingerprint(self) -> bytes:
+        """Of all that equations and physics take from the robot: the same in another process."""
+        feet = [(foot.frame, foot.radius, *map(np.ndarray.tobytes, (foot.centre, foot.middle))) for foot in self.feet]
+        corners = [b"" if foot.corners is None else foot.corners.tobytes() for foot in self.feet]
+        parts = self.name, self.model.saveToString(), feet, corners, self.torque_limits.tobytes(), self.posture.tobytes()
+        return sha256(repr(parts).encode()).digest()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other is the same robot: another `load` of it, or one that came out of a pickle."""
+        return self is other or (isinstance(other, Robot) and self._fingerprint == other._fingerprint)
+
+    def __hash__(self) -> int:
+        return hash(self._fingerprint)
 
     @cached_property
     def is_floating(self) -> bool:
@@ -225,6 +245,8 @@ class Robot:
         spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray; velocities are normal with
         that deviation in rad/s and m/s. Joints stay within their limits.
         """
+        if not isinstance(seed, np.random.Generator):
+            whole("seed", seed, 0, 2**64, "or a numpy.random.Generator")
         rng, standing = np.random.default_rng(seed), self.standing()
         spread = positive("spread", spread, allow_zero=True)
         q = np.array(standing.integrate(rng.uniform(-spread, spread, self.nv)))
@@ -291,11 +313,8 @@ def checked_corners(frame: str, requested: npt.ArrayLike) -> Array:
 
 def torque_limits_of(d: int, requested: npt.ArrayLike) -> Array:
     """Requested torque limits, one number or (d,), N·m, +inf for none, as shape (d,). Raises `InputError`."""
-    try:
-        limits = np.array([requested] * d if np.ndim(requested) == 0 else requested, dtype=np.float64)
-    except (TypeError, ValueError):
-        limits = np.zeros(0)
-    if limits.shape != (d,) or not np.all(limits > 0):  # NaN is not > 0 either
-        got = f"got shape {np.shape(requested)}: {requested!r}"
-        raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); {got}.")
-    return read_only(limits)
+    limits = plain_numbers(requested)
+    if limits is None or limits.shape not in ((), (d,)) or not np.all(limits > 0):  # NaN is not > 0 either
+        got = said(requested) if limits is None else f"shape {limits.shape}: {said(requested)}"
+        raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); got {got}.")
+    return read_only(np.broadcast_to(limits, (d,)))

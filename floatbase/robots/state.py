@@ -9,15 +9,14 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, read_only
-from floatbase.errors import InputError
+from floatbase._arrays import Array, Value, checked, of_kind, read_only
 from floatbase.robots.robot import Robot, check_unit_lengths
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class State:
+class State(Value):
     """A configuration q and a velocity v of a robot, and all that follows from them alone.
 
     A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts of frames are given in the
@@ -36,9 +35,7 @@ class State:
     v: Array
 
     def __init__(self, robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike | None = None):
-        if not isinstance(robot, Robot):
-            raise InputError(f"State needs a Robot first, as in State(robot, q, v), not {type(robot).__name__}.")
-        object.__setattr__(self, "robot", robot)
+        object.__setattr__(self, "robot", of_kind("robot", robot, Robot))
         object.__setattr__(self, "q", checked("q", q, (robot.nq,)))
         object.__setattr__(self, "v", checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,)))
         check_unit_lengths(robot.model, "q", self.q, ", or use robot.standing()")

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, positive, unit_vector
+from floatbase._arrays import Array, Value, positive, unit_vector
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
@@ -28,8 +28,8 @@ _SMALLEST_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it fo
 _ROUNDING = 1e-9  # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for rounding
 
 
-@dataclass(frozen=True)
-class Ground:
+@dataclass(frozen=True, eq=False)
+class Ground(Value):
     """The ground: a plane through the origin. normal: (3,), world, made unit. mu: coefficient of friction with the feet."""
 
     mu: float = 1.0

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy.typing as npt
 
-from floatbase._arrays import positive
+from floatbase._arrays import function, of_kind, positive, text
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.record import Rollout
-from floatbase.simulation.rollout import Actuators, Controller, rollout
+from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
 
 _SLICE = 1.0 / 30.0  # s of simulated time in a slice, about: as often as a picture is drawn
 _LONGEST_JOIN = 5.0  # s that `close` waits for a slice: far longer than one takes
@@ -21,7 +21,7 @@ SEEN = 0.4  # s for which a slice still lists a push that is over: the eye misse
 
 def advice(status: str) -> str:
     """A status of `Live` as a line for who watches: what stopped the run, and what to do about it."""
-    return status if status in ("running", "paused") else f"{status}: press reset, or push again"
+    return status if text("status", status) in ("running", "paused") else f"{status}: press reset, or push again"
 
 
 class Live:
@@ -47,7 +47,12 @@ class Live:
         after_reset: Callable[[], None] | None = None,
         idle: float = 120.0,
     ):
-        self.sim = sim
+        self.sim = of_kind("sim", sim, Simulation)
+        function("the controller", controller, "controller(q, v, t)")
+        function("show", show, "show(record)")
+        check_actuators(actuators)
+        if after_reset is not None:
+            function("after_reset", after_reset, "after_reset()")
         self.error: Exception | None = None
         self._controller, self._show, self._actuators, self._after_reset = controller, show, actuators, after_reset
         self._period = positive("control_period", control_period, "s")
@@ -72,7 +77,7 @@ class Live:
 
     def on_status(self, listener: Callable[[str], None] | None) -> None:
         """Call `listener(status)` whenever the status changes, in the thread that changed it."""
-        self._listener = listener
+        self._listener = None if listener is None else function("listener", listener, "listener(status)")
 
     def start(self) -> None:
         """Run, or go on after a pause. A fallen robot is put back on its feet."""
@@ -95,13 +100,15 @@ class Live:
 
     def use(self, controller: Controller) -> None:
         """Go on under another controller from the next slice."""
+        function("the controller", controller, "controller(q, v, t)")
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
 
     def slow_motion(self, speed: float) -> None:
         """Simulated time per real time, 1 by default."""
+        speed = positive("speed", speed)
         with self._lock:
-            self._last_call, self._speed = time.monotonic(), positive("speed", speed)
+            self._last_call, self._speed = time.monotonic(), speed
 
     def close(self) -> None:
         """Pause, and wait until the thread has ended."""

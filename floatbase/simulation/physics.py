@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -10,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, cross, positive
+from floatbase._arrays import Array, Value, checked, cross, number, of_kind, positive, said, text
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -20,12 +21,13 @@ from floatbase.simulation.conversion import Conversion
 _FALLEN_HEIGHT = 0.4  # part of the base's height at the last reset: a crouch keeps more, lying down does not
 _FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))  # of the base's tilt since the last reset: no leg brings it back from there
 _LEAST_STATURE = 1e-3  # m: a base that begins lower than this lies on the ground, and its height measures no fall
+_LONGEST_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms is followed
 _CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
 _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
 
 
 @dataclass(frozen=True, eq=False)
-class Push:
+class Push(Value):
     """A force on the robot for a while.
 
     A timestep that the push covers in part gets that part of the force: its impulse is force times duration.
@@ -44,15 +46,24 @@ class Push:
         object.__setattr__(self, "force", checked("force of the push", self.force, (3,), "N"))
         object.__setattr__(self, "start", positive("start of the push", self.start, "s", allow_zero=True))
         object.__setattr__(self, "duration", positive("duration of the push", self.duration, "s"))
+        text("frame of the push", self.frame)
 
     def acts_at(self, t: float) -> bool:
         """Whether the push acts at t, s."""
+        t = number("t", t, "s")
         return self.start - _CLOCK_ERROR <= t < self.start + self.duration - _CLOCK_ERROR
 
-    def share(self, t: float, timestep: float) -> float:
+    def _share(self, t: float, timestep: float) -> float:
         """The part of the step from t to t + timestep, s, in which the push acts: 0 to 1."""
         acting = min(self.start + self.duration, t + timestep) - max(self.start, t)
         return max(0.0, acting) / timestep
+
+
+def pushes_of(pushes: Sequence[Push]) -> tuple[Push, ...]:
+    """A list of pushes as a tuple, checked."""
+    if not isinstance(pushes, Sequence):
+        raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {said(pushes)}.")
+    return tuple(of_kind("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])") for push in pushes)
 
 
 class Simulation:
@@ -67,11 +78,9 @@ class Simulation:
     """
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
-        if not isinstance(robot, Robot):
-            raise InputError(f"Simulation needs a Robot, as from fb.load, not {robot!r}.")
-        self.robot = robot
+        self.robot = of_kind("robot", robot, Robot)
         self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
-        self.timestep = positive("timestep", timestep, "s")
+        self.timestep = positive("timestep", timestep, "s", most=_LONGEST_TIMESTEP)
         self.feet = Contacts.feet(robot)
         self.model = build_model(robot, self.ground, self.timestep)
         self.data = mujoco.MjData(self.model)
@@ -130,10 +139,8 @@ class Simulation:
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing upright on the ground's plane by default, at time 0."""
-        state = self._standing() if state is None else state
-        if not isinstance(state, State):
-            raise InputError(f"reset needs a State, as robot.standing(), not {state!r}.")
-        if state.robot is not self.robot:
+        state = self._standing() if state is None else of_kind("state", state, State)
+        if state.robot != self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
@@ -145,14 +152,14 @@ class Simulation:
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
-        self.advance(checked("torques", tau, (self.robot.d,), "N·m"), pushes)
+        self.advance(checked("torques", tau, (self.robot.d,), "N·m"), pushes_of(pushes))
 
     def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
         """`step` without its check, for loops that have checked the torques already: float64, finite, shape (d,)."""
         self.data.ctrl[self._motors] = tau
         self.data.xfrc_applied[:] = 0.0
         for push in pushes:
-            share = push.share(self.data.time, self.timestep)
+            share = push._share(self.data.time, self.timestep)
             if share > 0.0:
                 self._apply(push, share * push.force)
         mujoco.mj_step(self.model, self.data)
@@ -176,7 +183,7 @@ class Simulation:
 
     def pushed_body(self, push: Push) -> int:
         """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted to the ground."""
-        frame = self.robot.model.frames[self.robot.frame_id(push.frame)]
+        frame = self.robot.model.frames[self.robot.frame_id(of_kind("push", push, Push).frame)]
         joint = self.robot.model.names[frame.parentJoint]
         if joint in self.robot.joint_names:
             return int(self.model.joint(joint).bodyid[0])

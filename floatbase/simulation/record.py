@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, Value, read_only, whole
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -19,7 +19,7 @@ Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
 
 @dataclass(frozen=True, eq=False)
-class Rollout:
+class Rollout(Value):
     """What happened: one row for each of n control ticks. Read-only.
 
     contacts: all that the controller had at any time; its stance at row i is `contacts_at(i)`.
@@ -63,15 +63,17 @@ class Rollout:
 
     def state(self, i: int) -> State:
         """The state at row i."""
+        i = whole("row", i, -len(self), len(self) - 1)
         return State(self.robot, self.q[i], self.v[i])
 
     def contacts_at(self, i: int) -> Contacts:
         """The controller's stance at row i."""
+        i = whole("row", i, -len(self), len(self) - 1)
         return self.stances[i] if self.stances else self.contacts
 
     def force(self, contact: str, kind: Literal["measured", "planned"] = "measured") -> Array:
         """The force of a contact, such as "FL_foot", through time, shape (n, 3), N, world: of a flat foot the resultant."""
-        if kind not in ("measured", "planned"):
+        if not isinstance(kind, str) or kind not in ("measured", "planned"):
             raise unknown_name("kind of force", kind, ("measured", "planned"))
         return self.contacts.force_of(self.measured if kind == "measured" else self.planned, contact)
 

@@ -8,12 +8,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, positive
+from floatbase._arrays import Array, checked, function, of_kind, plain_numbers, positive, said
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.physics import Push, Simulation, pushes_of
 from floatbase.simulation.record import Recorder, Rollout
 
+_MOST_TICKS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
 _PERIOD_ERROR = 1e-6  # part of a period by which a time may miss a whole number of them: how people round
 _TIME_ERROR = 1e-9  # part of the time by which it may: the rounding of many periods
 
@@ -65,11 +66,13 @@ def rollout(
     Raises `InputError` for a control period or a duration that is no whole number of periods, for a push that moves nothing,
     for a controller that cannot be called as controller(q, v, t), and for an answer without `.tau`.
     """
-    _check(sim, controller, pushes)
-    pushes = tuple(pushes)
+    pushes = pushes_of(pushes)
+    _check(sim, controller, pushes, actuators)
     period = sim.timestep if control_period is None else control_period
     substeps = _multiple("control_period", period, "the simulation's timestep", sim.timestep)
     ticks = _multiple("duration", duration, "the control period", substeps * sim.timestep)
+    if ticks > _MOST_TICKS:
+        raise InputError(f"duration {duration:g} s has {ticks} control periods; at most {_MOST_TICKS} fit in one record.")
     record = Recorder(sim, _stance(sim, controller), ticks)
     for _ in range(ticks):
         q, v = sim.q, sim.v
@@ -103,20 +106,18 @@ def _multiple(name: str, time: float, unit: str, period: float) -> int:
     return count
 
 
-def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> None:
+def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None) -> None:
     """Raise `InputError` for what is of another kind or of another robot."""
-    if not isinstance(sim, Simulation):
-        raise InputError(f"rollout needs a Simulation first, as fb.Simulation(robot), not {sim!r}.")
-    if not callable(controller):
-        raise InputError(f"the controller must be callable as controller(q, v, t), not {controller!r}.")
-    robot = getattr(controller, "robot", sim.robot)
-    if robot is not sim.robot:
-        raise InputError(f"the controller is for {robot!r}, the simulation holds {sim.robot!r}: make both from one fb.load.")
-    if not isinstance(pushes, Sequence):
-        raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {pushes!r}.")
+    of_kind("sim", sim, Simulation)
+    function("the controller", controller, "controller(q, v, t)")
+    check_actuators(actuators)
+    for name, part in (("controller is", controller), ("actuators are", actuators)):
+        robot = getattr(part, "robot", sim.robot)
+        if robot != sim.robot:
+            raise InputError(
+                f"the {name} for {robot!r}, the simulation holds {sim.robot!r}: load both with the same arguments."
+            )
     for push in pushes:
-        if not isinstance(push, Push):
-            raise InputError(f"pushes must hold fb.Push values; {push!r} is none.")
         sim.pushed_body(push)
     try:
         signature = inspect.signature(controller)
@@ -130,6 +131,12 @@ def _check(sim: Simulation, controller: Controller, pushes: Sequence[Push]) -> N
             f"rollout calls controller(q, v, t) with the time t, s; {name} takes {signature} ({error}). Let it take all "
             f"three, as in lambda q, v, t: …"
         ) from None
+
+
+def check_actuators(actuators: Actuators | None) -> None:
+    """Raise `InputError` for what has no method `step`."""
+    if actuators is not None and (isinstance(actuators, type) or not callable(getattr(actuators, "step", None))):
+        raise InputError(f"actuators must have a method step, as HydraulicActuators have; {said(actuators)} has none.")
 
 
 class _NotFinite(InputError):
@@ -174,7 +181,7 @@ def _torques(sim: Simulation, name: str, tau: Any) -> Array:
         entries = np.array(tau, dtype=object)
         if entries.shape != (sim.robot.d,):
             raise
-        i = [isinstance(x, float | int | np.floating | np.integer) and np.isfinite(x) for x in entries].index(False)
+        i = [plain_numbers(x) is not None and np.isfinite(float(x)) for x in entries].index(False)
         raise _NotFinite(f"{name} hold {entries[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
 
 
@@ -183,7 +190,9 @@ def _planned(command: Any, stance: Contacts) -> Array | None:
     forces = getattr(command, "forces", None)
     if forces is None:
         return None
-    planned = np.array(forces, dtype=np.float64)
+    planned = plain_numbers(forces)
+    if planned is None:
+        raise InputError(f"the controller planned forces that are no numbers: {said(forces)}.")
     if planned.shape != (stance.k,):
         raise InputError(
             f"the controller planned forces of shape {planned.shape}; its contacts ({', '.join(stance.names)}) have "

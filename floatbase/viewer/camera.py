@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, positive
+from floatbase._arrays import Array, checked, flag, number, positive
 from floatbase.errors import InputError
 
 
@@ -37,18 +35,14 @@ class View:
     def __post_init__(self) -> None:
         positive("distance of a View", self.distance)
         for name in ("azimuth", "elevation"):
-            _check_degrees(name, getattr(self, name))
+            number(f"{name} of a View", getattr(self, name), "degrees")
+        flag("feet of a View", self.feet)
         if abs(self.elevation) > 90.0:
             raise InputError(f"elevation of a View is {self.elevation:g}; it must be from -90 (below) to 90 (above) degrees.")
         if positive("angle of a View", self.angle, "degrees") >= 180.0:
             raise InputError(f"angle of a View is {self.angle:g}; it must be below 180 degrees; 32 is usual.")
         if self.around is not None:
             _check_around(self.around)
-
-
-def _check_degrees(name: str, value: Any) -> None:
-    if not isinstance(value, Real) or not math.isfinite(value):
-        raise InputError(f"{name} of a View is {value!r}; it must be a finite number, in degrees.")
 
 
 def _check_around(around: Any) -> None:

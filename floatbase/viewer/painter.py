@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
-from floatbase._arrays import Array, checked
+from floatbase._arrays import Array, checked, of_kind, plain_numbers, said, texts
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
@@ -90,6 +90,8 @@ class Painter:
         The other arguments are those of `Viewer.show`.
         """
         self._check_state(state)
+        if contacts is not None:
+            of_kind("contacts", contacts, Contacts)
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
@@ -106,15 +108,19 @@ class Painter:
         if wrench is not None:
             picture |= self._wrench(state, wrench)
         if push is not None:
+            if not isinstance(push, Sequence) or isinstance(push, str) or len(push) != 2:
+                raise InputError(f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not {said(push)}.')
             picture |= self._push(state, *push)
         if ghost is not None:
             self._check_state(ghost)
             picture |= self._robot(ghost, "ghost", self._ghosts)
-        for frame in frames:
+        for frame in texts("frames", frames):
             pose = state.frame_pose(frame).homogeneous
             picture |= below(f"frame/{plain(frame)}", marks.frame_axes(pose, 0.25 * self.size, frame))
         if any(path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench") for path in picture):
             picture |= self._scale_bar(ground)
+        if not isinstance(extra, Mapping | None) or not all(isinstance(item, Item) for item in (extra or {}).values()):
+            raise InputError(f"extra must be a picture, path -> item, as shapes and marks make them, not {said(extra)}.")
         return picture | dict(extra or {})
 
     def replace(self, facets: int | None) -> Painter:
@@ -288,9 +294,7 @@ class Painter:
         return plane_under(contacts.normals, positions)
 
     def _check_state(self, state: Any) -> None:
-        if not isinstance(state, State):
-            raise InputError(f"show needs a State, as in robot.standing(), not {type(state).__name__}.")
-        if state.robot is not self.robot and state.robot.name != self.robot.name:
+        if of_kind("state", state, State).robot.name != self.robot.name:
             raise InputError(
                 f"this viewer shows {self.robot.name}, but the state is one of {state.robot.name}; "
                 "make a Viewer for that robot."
@@ -337,8 +341,10 @@ def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -
         return None
     if contacts is None:
         raise InputError(f"{name} were given without contacts, so it is not known where they act; pass contacts=… too.")
-    array = np.asarray(value, dtype=np.float64)
+    array = plain_numbers(value)
     n = contacts.n_points
+    if array is None:
+        raise InputError(f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {said(value)}.")
     if array.shape not in ((3 * n,), (n, 3)):
         raise InputError(
             f"{name} has shape {array.shape}; {n} contact points ({', '.join(contacts.point_names)}) need shape "

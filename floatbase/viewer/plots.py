@@ -9,8 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, of_kind, plain_numbers, said
+from floatbase.errors import InputError
 from floatbase.viewer.colours import ALARM, COM, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
+from floatbase.viewer.recording import checked_rollout
 
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
@@ -20,6 +22,7 @@ CARRIES = 0.01  # of the weight: the direction of a smaller force says nothing a
 
 def plot(rollout: Rollout) -> Figure:
     """A figure of three plots: centre of mass, friction and torques."""
+    checked_rollout(rollout)
     figure, axes = plt.subplots(3, 1, figsize=(8, 8), sharex=True, layout="constrained")
     plot_com(rollout, axes[0])
     plot_friction(rollout, axes[1])
@@ -32,6 +35,7 @@ def plot(rollout: Rollout) -> Figure:
 
 def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """How far the centre of mass has moved since the start in x, y and z, mm. axis: to plot on; None for a new figure."""
+    checked_rollout(rollout)
     axis = _axis(axis)
     moved = 1000.0 * (rollout.com - rollout.com[0])
     for column, name, colour in zip(moved.T, "xyz", (X_AXIS, Y_AXIS, Z_AXIS), strict=True):
@@ -41,6 +45,7 @@ def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """Measured normal force at every contact point, N; behind it, as a wider line, the planned one. axis: as for `plot_com`."""
+    checked_rollout(rollout)
     axis = _axis(axis)
     for i, (planned, measured) in enumerate(
         zip(_normal(rollout, rollout.planned), _normal(rollout, rollout.measured), strict=True)
@@ -55,6 +60,7 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
     The curve of a point has gaps where it carries little; see `friction_used`. axis: as for `plot_com`.
     """
+    checked_rollout(rollout)
     axis = _axis(axis)
     for forces, colour, name, width in (
         (rollout.planned, PLANNED, "planned", 3.5),
@@ -68,6 +74,7 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """Torque over its limit, for every joint that has one. axis: as for `plot_com`."""
+    checked_rollout(rollout)
     axis = _axis(axis)
     limited = np.isfinite(rollout.robot.torque_limits)
     share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
@@ -82,7 +89,11 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
 
     forces: (n, k), N, world, for n times and k/3 points.
     """
-    f = np.reshape(forces, (len(rollout.time), -1, 3))
+    checked_rollout(rollout)
+    found = plain_numbers(forces)  # NaN stands for none planned
+    if found is None or found.shape != rollout.measured.shape:
+        raise InputError(f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got {said(forces)}.")
+    f = np.reshape(found, (len(rollout.time), -1, 3))
     normals, mus = rollout.contacts.normals, rollout.contacts.mus
     push = np.einsum("nij,ij->ni", f, normals)
     slide = np.linalg.norm(f - push[:, :, None] * normals, axis=2)
@@ -99,7 +110,7 @@ def _normal(rollout: Rollout, forces: Array) -> Array:
 
 
 def _axis(axis: Axes | None) -> Axes:
-    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else axis
+    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else of_kind("axis", axis, Axes, "plt.gca()")
 
 
 def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:

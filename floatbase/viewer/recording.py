@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, checked, flag, of_kind, positive, said, text, whole
+from floatbase.errors import InputError
 from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture, tidy
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
 REPETITIONS = 10_000  # meshcat's default is 1: it plays once and returns to the start
+_MOST_PICTURES = 1e4  # a second: more than any record has rows
 STILL = 1e-7  # m, and 1 for colours and quaternions: what changes less gets no track; single precision would not show it
 _SMOOTH, _STEP = 2301, 2300  # three.js: linear and discrete interpolation
 
@@ -49,7 +51,7 @@ class _Course:
 
 
 def animate(
-    times: npt.ArrayLike, pictures: Iterable[Picture], root: str, speed: float = 1.0, paused: bool = False
+    times: npt.ArrayLike, pictures: Sequence[Picture], root: str, speed: float = 1.0, paused: bool = False
 ) -> Animation:
     """The animation of some pictures.
 
@@ -59,7 +61,10 @@ def animate(
     speed: 1 for real time.
     paused: whether the reader must press play first.
     """
-    t = np.asarray(times, dtype=np.float64) - np.asarray(times, dtype=np.float64)[0]
+    if not isinstance(pictures, Sequence) or not all(isinstance(picture, dict) for picture in pictures) or not pictures:
+        raise InputError(f"pictures must be a list of one picture or more, path -> item each, not {said(pictures)}.")
+    t, root = checked("times", times, (len(pictures),), "s"), text("root", root)
+    t, speed, paused = t - t[0], positive("speed", speed), flag("paused", paused)
     courses = _courses(list(pictures))
     clips = []
     for path, course in courses.items():
@@ -73,9 +78,18 @@ def animate(
 
 def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
     """The rows of a record to draw: the first, the last, and `rate` rows a second between. times: (n,), s, of all rows."""
-    t = np.asarray(times, dtype=np.float64)
+    t, rate = checked("times", times, (None,), "s"), positive("rate", rate, "1/s", most=_MOST_PICTURES)
+    if not t.size:
+        raise InputError("times holds no time, so there is nothing to draw.")
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
     return np.unique(np.clip(np.searchsorted(t, ticks - 1e-9), 0, len(t) - 1))
+
+
+def checked_rollout(rollout: Rollout) -> Rollout:
+    """The record, after checking that it is one."""
+    from floatbase.simulation import Rollout  # loads the physics, which pictures do without
+
+    return of_kind("rollout", rollout, Rollout)
 
 
 def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] | None:
@@ -83,7 +97,8 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
 
     seen: s that a push is still shown after its end.
     """
-    now = float(rollout.time[row])
+    now = float(checked_rollout(rollout).time[whole("row", row, -len(rollout), len(rollout) - 1)])
+    seen = positive("seen", seen, "s", allow_zero=True)
     for push in sorted(rollout.pushes, key=lambda push: push.start, reverse=True):
         if push.acts_at(now) or 0.0 <= now - push.start < push.duration + seen - 1e-9:
             return push.frame, push.force

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import positive, unit_vector
+from floatbase._arrays import flag, function, number, of_kind, positive, said, text, unit_vector, whole
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
 UP = (0.0, 0.0, 1.0)
+_MOST_PIXELS = 10_000  # of a picture's height
 # The browser tests whether it reaches the live page: `kernel_is_remote` may be wrong.
 _PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
   const frame = document.querySelector('iframe[src="URL"]');
@@ -70,14 +71,12 @@ class Viewer:
         ground: npt.ArrayLike | None = None,
         port: int = 0,
     ):
-        if not isinstance(robot, Robot):
-            raise InputError(f"Viewer needs a Robot, as in fb.Viewer(fb.load('go2')), not {type(robot).__name__}.")
-        if background not in BACKGROUNDS:
-            raise InputError(f"background is {background!r}; it must be one of {', '.join(BACKGROUNDS)}.")
-        if facets is not None:
-            FrictionPolyhedron(np.array(UP), 1.0, facets)  # raises InputError for a wrong number of facets
+        of_kind("robot", robot, Robot)
+        if not isinstance(background, str) or background not in BACKGROUNDS:
+            raise InputError(f"background is {said(background)}; it must be one of {', '.join(BACKGROUNDS)}.")
+        FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inside)  # raises InputError for wrong ones
         self.robot, self.background = robot, background
-        self.height = int(positive("height", height, "pixels"))
+        self.height = whole("height", height, 1, _MOST_PIXELS, "pixels")
         requested = None if scale is None else positive("scale", scale, "m/N")
         paper, _, lines, text = BACKGROUNDS[background]
         self.painter = Painter(robot, requested, facets, inside, _plane(ground), lines, text, paper)
@@ -139,6 +138,8 @@ class Viewer:
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
         `ViewerError` when the window is closed.
         """
+        _check_flags(com=com, cones=cones, support=support, labels=labels)
+        _check_texts(title=title, ghost_name=ghost_name)
         picture = self.painter.picture(
             state, contacts, forces, planned, com=com, cones=cones, support=support, wrench=wrench, push=push,
             ghost=ghost, frames=frames, labels=labels, extra=extra,
@@ -186,10 +187,12 @@ class Viewer:
         paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
-        if rollout.robot.name != self.robot.name:
+        if recording.checked_rollout(rollout).robot.name != self.robot.name:
             raise InputError(f"this viewer shows {self.robot.name}, but the record is one of {rollout.robot.name}.")
         if not len(rollout.time):
             raise InputError("the record has no rows, so there is nothing to play.")
+        _check_flags(planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused)
+        _check_texts(title=title, ghost_name=ghost_name)
         rows = recording.thinned(rollout.time, positive("rate", rate, "1/s"))
         pictures = [
             self.painter.picture(
@@ -234,7 +237,8 @@ class Viewer:
         if isinstance(view, str) and view in PRESETS:
             view = PRESETS[view]
         if not isinstance(view, View):
-            raise InputError(f"camera view is {view!r}; it must be one of {', '.join(PRESETS)}, or a View.")
+            raise InputError(f"camera view is {said(view)}; it must be one of {', '.join(PRESETS)}, or a View.")
+        _check_flags(follow=follow)
         self.canvas.set_again(*self._looking(view, follow))
         return self
 
@@ -253,7 +257,7 @@ class Viewer:
 
         Raises `ViewerError` when nothing is drawn yet, when the name does not end in .html, and when it cannot be written.
         """
-        target = Path(path)
+        target = Path(path if isinstance(path, Path) else text("path", path))
         if self.window.scene.is_empty:
             raise ViewerError("nothing is drawn yet, so there is nothing to save; call show(state) or play(rollout) first.")
         if target.suffix.lower() not in (".html", ".htm"):
@@ -266,6 +270,7 @@ class Viewer:
 
     def static_html(self, title: str | None = None) -> str:
         """The scene as it is now, as one HTML page that needs neither server nor network."""
+        _check_texts(title=title)
         return page.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
     def slider(
@@ -278,15 +283,18 @@ class Viewer:
         value: where it stands at first.
         low, high, step: its range and its smallest step.
         """
-        self._control(name, changed, value=float(value), min=float(low), max=float(high), step=float(step))
+        low, high = number("low", low), number("high", high, least=number("low", low))
+        value, step = number("value", value, "", low, high), positive("step", step)
+        self._control(name, function("changed", changed, "changed(value)"), value=value, min=low, max=high, step=step)
 
     def button(self, name: str, pressed: Callable[[], None]) -> None:
         """Add a button to the panel in the page; `pressed()` is called in the window's thread."""
+        function("pressed", pressed, "pressed()")
         self._control(name, lambda _: pressed())
 
     def checkbox(self, name: str, changed: Callable[[bool], None], value: bool) -> None:
         """Add a check box to the panel in the page; `changed(value)` is called in the window's thread."""
-        self._control(name, changed, value=bool(value))
+        self._control(name, function("changed", changed, "changed(value)"), value=flag("value", value))
 
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
@@ -304,7 +312,7 @@ class Viewer:
         return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"
 
     def _control(self, name: str, callback: Callable[[Any], None], **range_of_values: float) -> None:
-        self._controls[name] = callback
+        self._controls[text("name", name)] = callback
         controls = self._controls  # not self, so that the window does not keep its viewer alive
         self.window.on_control(lambda which, value: controls[which](value) if which in controls else None)
         self.window.put([wire.set_control(name, **range_of_values)])
@@ -329,6 +337,16 @@ class Viewer:
             if kind in shown
         ]
         self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
+
+
+def _check_flags(**flags: bool) -> None:
+    for name, value in flags.items():
+        flag(name, value)
+
+
+def _check_texts(**texts: str | None) -> None:
+    for name, value in texts.items():
+        text(name, "" if value is None and name == "title" else value)
 
 
 def _plane(ground: npt.ArrayLike | None) -> Plane | None:

@@ -312,9 +312,9 @@ def test_a_state_of_another_robot_is_refused() -> None:
 @pytest.mark.parametrize(
     ("swap", "text"),
     [
-        ({"robot": "go2"}, "the controller needs a Robot first, as from fb.load, not str"),
-        ({"contacts": ["FL_foot"]}, r"contacts must be Contacts, as fb\.Contacts\.points\(robot\), not list"),
-        ({"state": np.zeros(19)}, r"the state to hold must be a State, as robot\.standing\(\), not ndarray"),
+        ({"robot": "go2"}, r"robot must be a Robot, as fb.load\(.go2.\), not 'go2'"),
+        ({"contacts": ["FL_foot"]}, r"contacts must be Contacts, as fb\.Contacts\.points\(robot\), not \[.FL_foot.\]"),
+        ({"state": np.zeros(19)}, r"the state to hold must be a State, as robot\.standing\(\), not an array"),
         ({"contacts": fb.Contacts.points(judges.load("solo12"))}, "unknown frame of go2 'FL_FOOT'"),
     ],
 )

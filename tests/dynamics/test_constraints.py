@@ -132,7 +132,7 @@ def test_rows_that_do_not_fit_are_named(rows: Callable[..., tuple[Array, Array]]
 
 
 def test_a_constraint_needs_a_row() -> None:
-    with pytest.raises(fb.FloatbaseError, match=r"'none' has m = 0 rows; it must have at least 1"):
+    with pytest.raises(fb.FloatbaseError, match=r"m of none, its number of rows, is 0; it must be a whole number ≥ 1"):
         LinearConstraint("none", 0, lambda s, t: (np.zeros((0, 18)), np.zeros(0)))
 
 

@@ -53,8 +53,8 @@ ALL = fb.Contacts.points(GO2)
         (lambda: PointContact("toe", radius=-1.0), InputError, "radius of toe is -1; it must be ≥ 0 m"),
         (lambda: FlatFootContact("toe", np.zeros(3)), InputError, r"corners of toe has shape \(3,\); .*\(any, 3\) \(m\)"),
         (lambda: FlatFootContact("toe", [[1, 0, 0], [0, 0, 0], [2, 0, 0]]), InputError, "corners of toe span no area"),
-        (lambda: fb.equations_of_motion(GO2, ALL), InputError, "needs a State first, not Robot"),
-        (lambda: fb.equations_of_motion(GO2.standing(), [1]), InputError, r"Contacts second, as fb\.Contacts\.points\(robot\)"),
+        (lambda: fb.equations_of_motion(GO2, ALL), InputError, r"state must be a State, as robot\.standing\(\), not a Robot"),
+        (lambda: fb.equations_of_motion(GO2.standing(), [1]), InputError, r"must be Contacts, as fb\.Contacts\.points"),
         (lambda: fb.equations_of_motion(SOLO.standing(), ALL), UnknownNameError, "unknown frame of solo12 'FL_foot'"),
         (
             lambda: fb.equations_of_motion(GO2.standing(), ALL).acceleration(np.zeros(3), np.zeros(12)),

@@ -583,5 +583,5 @@ def test_coordinates_that_do_not_fit_are_refused() -> None:
         space(np.zeros(11))
     with pytest.raises(fb.FloatbaseError, match=r"beta holds nan at index \[0\]"):
         space(np.full(12, np.nan))
-    with pytest.raises(fb.FloatbaseError, match=r"the point has shape \(41,\); it must have shape \(42,\)"):
+    with pytest.raises(fb.FloatbaseError, match=r"qdd has shape \(17,\); it must have shape \(18,\)"):
         space.coordinates(np.zeros(17), np.zeros(12), np.zeros(12))

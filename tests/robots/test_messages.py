@@ -53,7 +53,7 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: GO2.standing(height=5.0), InputError, "Ask for another height, or load it with another posture"),
         (lambda: GO2.frame_id("FL_fot"), UnknownNameError, r"near names: FL_foot, .*robot\.frames lists them all"),
         (lambda: GO2.random_state(spread=-1.0), InputError, "spread is -1; it must be ≥ 0"),
-        (lambda: fb.State("go2", Q), InputError, r"State needs a Robot first, as in State\(robot, q, v\), not str"),
+        (lambda: fb.State("go2", Q), InputError, r"robot must be a Robot, as fb.load\(.go2.\), not 'go2'"),
         (lambda: fb.State(GO2, Q[:5]), InputError, r"q has shape \(5,\); it must have shape \(19,\)"),
         (lambda: fb.State(GO2, Q, Q), InputError, r"v has shape \(19,\); it must have shape \(18,\)"),
         (lambda: fb.State(GO2, "q"), InputError, r"q must be numbers of shape \(19,\), not 'q'"),

@@ -59,7 +59,7 @@ UP = [0.0, 0.0, 1.0]
             InputError,
             "a push at 'base' moves nothing: ur5 is bolted to the ground there. Push a link that moves: shoulder_link, ",
         ),
-        (lambda: fb.rollout(SIM, limp, 1.0, [3]), InputError, r"pushes must hold fb\.Push values; 3 is none"),
+        (lambda: fb.rollout(SIM, limp, 1.0, [3]), InputError, r"each of the pushes must be a Push, as fb\.Push.*, not 3"),
         (
             lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0),
             InputError,

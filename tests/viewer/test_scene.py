@@ -434,7 +434,7 @@ def test_wrong_input_is_explained(viewer: Viewer, go2: Robot, standing: State, c
     other = load("solo12").standing()
     for wrong, words in (
         (lambda: viewer.show(other), "this viewer shows go2, but the state is one of solo12; make a Viewer"),
-        (lambda: viewer.show(standing.q), "show needs a State, as in robot.standing.., not ndarray"),
+        (lambda: viewer.show(standing.q), "state must be a State, as robot.standing.., not an array"),
         (lambda: viewer.show(standing, forces=np.zeros(12)), "forces were given without contacts.*pass contacts="),
         (
             lambda: viewer.show(standing, contacts, np.zeros(9)),
