@@ -169,8 +169,7 @@ def _robot(
     **others: Any,
 ) -> Robot:
     """A robot of a URDF's text and of the model read from it, after joints are locked and what cannot be held is refused."""
-    if isinstance(locked, str):
-        raise InputError(f'locked must be a list of joints, as in locked=["{locked}"].')
+    locked = texts("locked", locked)
     floating = model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
     if locked:
         q = checked("posture", posture, (model.nq,))
