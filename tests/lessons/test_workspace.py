@@ -205,13 +205,17 @@ def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_u
     assert not (mine.parent / "nowhere.ipynb").exists()
 
 
-def test_nothing_is_written_through_a_link(mine: Path) -> None:
-    for name, text in ((LESSON, "1"), ("page.md", "2"), (NEW, "3")):
-        (mine.parent / text).write_text(text)
-        linked(mine / name, mine.parent / text)
+def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> None:
+    (mine.parent / "elsewhere").mkdir()
+    for name in (LESSON, "page.md", NEW):
+        kept = mine.parent / "elsewhere" / name
+        kept.write_bytes((mine / name).read_bytes() if name != NEW else b"mine")
+        linked(mine / name, kept)
+    before = {path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()}
     update(mine.parent)
     prepare(mine.parent)
-    assert [(mine.parent / text).read_text() for text in "123"] == ["1", "2", "3"]
+    assert {path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()} == before
+    assert all((mine / name).is_symlink() for name in before)
     assert source(mine / NEW2) == "first = 2"
 
 
@@ -245,9 +249,9 @@ def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) ->
     assert (source(mine / LESSON), source(mine / NEW)) == ("first = 'my answer'", long)
 
 
-def work(course: Path, acknowledged: int) -> None:
+def work(course: Path, first: int, acknowledged: int) -> None:
     """Update the course and use it, again and again."""
-    for n in count():
+    for n in count(first):
         for name in ("00_a", "01_b"):
             write(course / "part", f"first = {n}")
             (course / "part").replace(course / f"{name}.ipynb")
@@ -260,13 +264,14 @@ def test_a_kill_at_any_moment_loses_nothing(mine: Path, tmp_path: Path, monkeypa
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
     write(mine / LESSON, "first = 'my answer'")
     written, (read_end, write_end) = (mine / LESSON).read_bytes(), os.pipe()
-    for moment in np.random.default_rng(0).uniform(0.0, 0.06, KILLS):
-        process = multiprocessing.get_context("fork").Process(target=work, args=(mine.parent, write_end))
+    for i, moment in enumerate(np.random.default_rng(0).uniform(0.0, 0.06, KILLS)):
+        process = multiprocessing.get_context("fork").Process(target=work, args=(mine.parent, 1_000 * i, write_end))
         process.start()
         process.join(moment)
         process.kill()
         process.join()
         source(mine / "01_b.ipynb")  # is whole
+        update(mine.parent, 1_000 * i + 999)
         prepare(mine.parent)
         assert (mine / LESSON).read_bytes() == written
         assert source(mine / "01_b.ipynb") == source(mine.parent / "01_b.ipynb")
