@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from floatbase.lessons.publish.contents import README, lesson_table, readme_with_table, title_of
 from floatbase.lessons.publish.notebooks import execute, read, run, solved
-from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare, without_outputs
+from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare
 
 if TYPE_CHECKING:
     from floatbase.lessons.publish import conventions, equations, pages, prose
@@ -14,7 +14,7 @@ _PARTS = ("conventions", "equations", "pages", "prose")  # imported at first use
 
 __all__ = [
     "FOLDER", "MINE", "README", "conventions", "equations", "execute", "lesson_table", "pages", "prepare", "prose", "read",
-    "readme_with_table", "run", "solved", "title_of", "without_outputs",
+    "readme_with_table", "run", "solved", "title_of",
 ]  # fmt: skip
 
 

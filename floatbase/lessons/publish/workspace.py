@@ -60,7 +60,7 @@ def prepare(folder: Path = FOLDER) -> list[str]:
         return [*said, *memory.said]
 
 
-def without_outputs(notebook: Any) -> Any:
+def _without_outputs(notebook: Any) -> Any:
     """The notebook as if it had never been run. Changes it in place."""
     for cell in notebook["cells"]:
         if cell["cell_type"] == "code":
@@ -175,7 +175,7 @@ def _as_laid(source: Path) -> bytes:
     data = source.read_bytes()
     if source.suffix != ".ipynb":
         return data
-    return (json.dumps(without_outputs(json.loads(data)), indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
+    return (json.dumps(_without_outputs(json.loads(data)), indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
 
 
 def _digest(name: str, data: bytes) -> str:
