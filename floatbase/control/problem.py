@@ -19,6 +19,7 @@ from floatbase.qp import QP, RowLabel
 from floatbase.robots import Robot, State, torque_limits_of
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
+_PARTS_OF_A_TASK = ("block", "name", "weight", "residual")
 INCONSISTENT = 1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
 
 
@@ -68,6 +69,8 @@ class Problem(Value):
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The QP at a state and a time t in s."""
+        if isinstance(state, State) and state.robot != self.robot:
+            raise InputError(f"the state belongs to another robot, {state.robot.name}, than the problem, {self.robot.name}.")
         return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t)
 
 
@@ -115,6 +118,10 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
     tasks = tuple(tasks)
     for task in tasks:
+        lacks = [part for part in _PARTS_OF_A_TASK if not hasattr(task, part)]
+        if 0 < len(lacks) < len(_PARTS_OF_A_TASK):
+            has = "a task has block, name, weight and residual(eom, t), as floatbase.objectives.Task says"
+            raise InputError(f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; {has}.")
         if isinstance(task, type) or not isinstance(task, Task):
             raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {said(task)} is none.")
         if task.block not in BLOCKS:
@@ -126,7 +133,13 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
 
 def _residual(task: Task, eom: EquationsOfMotion, t: float) -> Affine:
     """The residual of a task, after checking that it takes its block of x."""
-    residual = task.residual(eom, t)
+    try:
+        residual = task.residual(eom, t)
+    except InputError as error:  # such as an `Affine` that holds NaN: say whose it is
+        raise InputError(f"task {task.name!r}: {error}") from None
+    if not isinstance(residual, Affine):
+        form = f"A x + b of its block x as fb.Affine(A, b), not {type(residual).__name__}"
+        raise InputError(f"the residual of {task.name!r} must be {form}.")
     size = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[task.block]
     if residual.n_in != size:
         raise InputError(f"the residual of {task.name!r} takes {residual.n_in} numbers; its block {task.block!r} has {size}.")

@@ -56,11 +56,16 @@ def not_convex(problem: object, H: Array) -> SolverError:
     )
 
 
+def violation_allowed(h: Array) -> float:
+    """How far rows of unit length with these right-hand sides (l,) may be violated: `FEASIBILITY_TOLERANCE`, and rounding."""
+    return FEASIBILITY_TOLERANCE + _ROUNDING * float(np.max(np.abs(h), initial=0.0))
+
+
 def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:
     """Indices of rows of G y ≤ h that cannot hold together, while any of them dropped leaves the others satisfiable.
 
     G: (l, n), h: (l,), in units that make violations of different rows comparable. Empty when a point satisfies all rows
-    to `FEASIBILITY_TOLERANCE`. Otherwise, by Farkas' lemma, multipliers m ≥ 0 of the rows prove that there is none: Gᵀ m = 0
+    but for `violation_allowed`. Otherwise, by Farkas' lemma, multipliers m ≥ 0 of the rows prove that there is none: Gᵀ m = 0
     and hᵀ m < 0. They minimise ‖Gᵀ m‖² + (hᵀ m + 1)²; the active-set method for m ≥ 0 ends with columns (G, h) of independent
     rows, so that no row of the proof can be spared. Source: Lawson and Hanson, Solving Least Squares Problems (1974), ch. 23.
     """
@@ -69,7 +74,7 @@ def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:
     if not len(G):
         return ()
     length, size = float(np.max(np.abs(G), initial=0.0)) or 1.0, float(np.max(np.abs(h))) or 1.0
-    loosened = h + FEASIBILITY_TOLERANCE + _ROUNDING * size
+    loosened = h + violation_allowed(h)
     aim = np.append(np.zeros(G.shape[1]), -1.0)
     try:
         m, _ = nnls(np.vstack([G.T / length, loosened / size]), aim, maxiter=_STEPS * len(G))

@@ -11,7 +11,14 @@ import numpy as np
 from floatbase._arrays import Array, of_kind
 from floatbase.errors import SolverError, unknown_name
 from floatbase.qp.active_set import active_set
-from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_rows, infeasible, not_convex, unbounded
+from floatbase.qp.conflicts import (
+    FEASIBILITY_TOLERANCE,
+    conflicting_rows,
+    infeasible,
+    not_convex,
+    unbounded,
+    violation_allowed,
+)
 from floatbase.qp.problem import QP
 from floatbase.qp.solution import Solution, with_equality_multipliers
 
@@ -88,9 +95,7 @@ def _active_set(qp: QP) -> Solution:
     """The method of `active_set.py` from a cold start, its answer polished."""
     found, space = active_set(qp).solution, qp.equality_space
     polished = _polished(qp, space.A.T @ (found.x - space.b), found.inequality_multipliers)
-    if polished is None or np.any(qp.G @ polished[0] - qp.h > FEASIBILITY_TOLERANCE * qp.row_lengths):
-        return found  # an optimum that is not unique: the steps may lead past rows that are not active
-    return with_equality_multipliers(qp, *polished, found.solver, found.iterations)
+    return found if polished is None else with_equality_multipliers(qp, *polished, found.solver, found.iterations)
 
 
 def _cvxpy(qp: QP) -> Solution | None:
@@ -134,7 +139,8 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
     """Two steps of Newton's method on the optimality conditions of the active rows, for the last digits: x and μ.
 
     With weights from 1e-8 to 1 the reduced H has few digits to spare for the slope; here it is summed in extended precision,
-    where the processor has it, from the problem as it was written. None where a step would do more than that.
+    where the processor has it, from the problem as it was written. None where a step would do more than that, or leads past a
+    row that is not active, as it may where the optimum is not unique.
 
     y: (p,), the minimiser of `qp.reduced`; mu: (l,), the multipliers of the inequalities.
     """
@@ -157,7 +163,10 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
         found -= step
     polished = np.zeros_like(mu)
     polished[active] = np.maximum(found[n:].astype(np.float64), 0.0)
-    return space(found[:n].astype(np.float64)), polished
+    point, size = space(found[:n].astype(np.float64)), qp.row_lengths
+    if np.any((qp.G @ point - qp.h) / size > violation_allowed(qp.h / size)):
+        return None
+    return point, polished
 
 
 def _objective_size(qp: QP) -> float:

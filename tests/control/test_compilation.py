@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import multiprocessing
 import os
 import pickle
 import re
 import resource
-import select
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -17,6 +16,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import judges
 import numba
@@ -28,7 +28,7 @@ from numba.core.runtime import rtsys
 
 import floatbase as fb
 from floatbase.__main__ import main
-from floatbase.control.tick import Compiled, announce_if_slow, cache, jit, tick
+from floatbase.control.tick import Compiled, announce_if_slow, jit, tick
 from floatbase.robots import Robot
 
 TICK = Path(tick.__file__).parent
@@ -106,6 +106,9 @@ def test_a_process_forked_while_threads_tick_ticks_on() -> None:
     controller, state = judges.controller_of("go2", path="compiled"), judges.load("go2").random_state(3, 0.1)
     expected, ended, answers = controller(state.q, state.v).tau.tobytes(), threading.Event(), []
 
+    def answer(out: Any) -> None:
+        out.send(controller(state.q, state.v).tau.tobytes())
+
     def spin() -> None:
         while not ended.is_set():
             controller(state.q, 0.5 * state.v)
@@ -113,21 +116,14 @@ def test_a_process_forked_while_threads_tick_ticks_on() -> None:
     threads = [threading.Thread(target=spin) for _ in range(2)]
     for thread in threads:
         thread.start()
+    into, out = multiprocessing.Pipe(duplex=False)
     for _ in range(20):
-        into, out = os.pipe()
-        child = os.fork()
-        if child == 0:
-            try:
-                os.write(out, controller(state.q, state.v).tau.tobytes())
-            finally:
-                os._exit(0)
-        answered = select.select([into], [], [], 10.0)[0]  # s: a tick takes some microseconds
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        answers.append(os.read(into, 1000) if answered else b"nothing")
-        os.close(into)
-        os.close(out)
-        if not answered:
+        child = multiprocessing.get_context("fork").Process(target=answer, args=(out,))
+        child.start()
+        answers.append(into.recv() if into.poll(10.0) else "nothing")  # s: a tick takes some microseconds
+        child.kill()
+        child.join()
+        if answers[-1] == "nothing":
             break
     ended.set()
     for thread in threads:
@@ -233,7 +229,7 @@ def make_small(digest: int) -> Callable[[float], float]:
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
     """Makes `make_small` ready in a folder of its own, checks its answer, and says whether it was loaded from disk."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(cache, "trouble", "")
+    monkeypatch.setattr(jit, "cache_trouble", "")
 
     def loaded() -> bool:
         function = jit.jit_cached(make_small)
@@ -266,12 +262,12 @@ def test_damaged_files_are_compiled_anew_and_replaced(suffix: str, small: Callab
     for name, damage in DAMAGES.items():
         file.write_bytes(damage(file.read_bytes()))
         assert not small() or suffix == ".nbi", name  # a bit of the index may say nothing; of code, every bit counts
-        assert small() and not cache.trouble, name
+        assert small() and not jit.cache_trouble, name
     file.unlink()
     assert not small() and small()
     file.unlink()
     (file / "inside").mkdir(parents=True)
-    assert not small() and "Is a directory" in cache.trouble
+    assert not small() and "Is a directory" in jit.cache_trouble
 
 
 def test_a_full_disk_leaves_a_compiled_tick_and_the_words(small: Callable[[], bool]) -> None:
@@ -281,7 +277,7 @@ def test_a_full_disk_leaves_a_compiled_tick_and_the_words(small: Callable[[], bo
         assert not small()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert "File too large" in cache.trouble
+    assert "File too large" in jit.cache_trouble
     robot = judges.load("go2")
     reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
     assert "cannot be kept (OSError: " in reason and "File too large): set NUMBA_CACHE_DIR" in reason
@@ -297,7 +293,7 @@ def test_the_tick_compiles_where_no_folder_can_be_written(small: Callable[[], bo
     robot = judges.load("go2")
     reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
     assert "cannot be kept (no folder can be written to): set NUMBA_CACHE_DIR" in reason
-    monkeypatch.setattr(cache, "trouble", "")
+    monkeypatch.setattr(jit, "cache_trouble", "")
     assert "NUMBA_CACHE_DIR" not in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
 
 

@@ -18,6 +18,20 @@ STATE = GO2.standing()
 UP = [0.0, 0.0, 1.0]
 
 
+class Own:
+    """A task of one's own, whose parts a test leaves out or makes wrongly."""
+
+    def __init__(self, without: str = "", residual: object = None):
+        parts = {"block": "qdd", "name": "mine", "weight": 1.0, "residual": lambda eom, t=0.0: residual}
+        vars(self).update({name: part for name, part in parts.items() if name != without})
+
+
+def own_with_nan() -> Own:
+    task = Own()
+    vars(task)["residual"] = lambda eom, t=0.0: fb.Affine(np.eye(18), np.full(18, np.nan))
+    return task
+
+
 def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
     return fb.WholeBodyController(GO2, CONTACTS, tasks, **options)
 
@@ -36,6 +50,15 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: controller(torque_limits=0.0), InputError, r"torque_limits must be one number > 0 or 12 of them \(N·m\)"),
         (lambda: controller(torque_limits=np.nan), InputError, "torque_limits must be one number > 0"),
         (lambda: controller(solver="dapq"), UnknownNameError, "unknown solver 'dapq'; .*daqp"),
+        (lambda: controller(Own(without="block")), InputError, "Own is no task yet, for it has no block; a task"),
+        (lambda: controller(Own(residual=np.ones(3))), InputError, r"residual of 'mine' .*fb\.Affine\(A, b\), not ndarray"),
+        (lambda: controller(Own()), InputError, "residual of 'mine' must be .*, not NoneType"),
+        (lambda: controller(own_with_nan()), InputError, r"task 'mine': b holds nan at index \[0\]"),
+        (
+            lambda: controller().qp(judges.load("solo12").standing()),
+            InputError,
+            "the state belongs to another robot, solo12, than the problem, go2",
+        ),
         (lambda: controller("stand"), InputError, r"tasks must hold tasks, such as fb\.CoMTask\(state\.com\); 'stand' is none"),
         (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "frame of go2 'FL_fot'; near names: FL_foot"),
         (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "unknown frame of go2 'torso'"),

@@ -137,10 +137,34 @@ def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver: str, ga
     assert caught.value.rows == ("inequality 0", "inequality 1")
 
 
-@pytest.mark.parametrize("solver", EXACT)
+@pytest.mark.parametrize("name", judges.FLOATING)
+def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str) -> None:
+    """Weak motors, slippery ground, feet that must press: feasible or not as a linear program says, never anything else."""
+    robot, rng = judges.load(name), np.random.default_rng(5)
+    verdicts = []
+    for seed in range(8):
+        limits = 10.0 ** rng.uniform(-2.0, -0.5) * robot.torque_limits
+        contacts, tasks = judges.stance(robot, rng.choice([0.2, 0.7])), fb.standing_tasks(robot.standing())
+        press = rng.choice([0.0, 2.0]) * robot.weight / contacts.n_points
+        controller = fb.WholeBodyController(
+            robot, contacts, tasks, torque_limits=limits, min_normal_force=press, path="readable"
+        )
+        qp = controller.qp(robot.random_state(seed, 0.3))
+        try:
+            solve(qp)
+        except InfeasibleError as error:
+            assert judges.is_smallest_conflict(qp, error.rows), seed
+            verdicts.append(False)
+        else:
+            assert judges.is_feasible(qp, list(range(len(qp.G)))), seed
+            verdicts.append(True)
+    assert not all(verdicts)
+
+
+@pytest.mark.parametrize("solver", solvers())
 def test_rows_that_only_just_meet_leave_a_point(solver: str) -> None:
     found = solve(QP(np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0]], [1.0, -1.0]), solver)
-    assert np.allclose(found.x, [1.0, -2.0])
+    assert np.allclose(found.x, [1.0, -2.0], atol=1e-6)
 
 
 @pytest.mark.parametrize("solver", solvers())
@@ -205,4 +229,28 @@ def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method_to
         answered.add(found.solver)
         assert found.residuals.inequality < FEASIBILITY_TOLERANCE
         assert residual_torque(found) < LAST_DIGITS
+    assert "active_set" in answered, "DAQP managed: these states no longer try what this test is about"
+
+
+def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -> None:
+    """DAQP calls these problems infeasible: weights from 1e-9 to 100, feet that must press. The truth is a linear program's."""
+    robot = judges.load("solo12")
+    at = robot.standing()
+    tasks = [fb.CoMTask(at.com, weight=100.0), fb.PostureTask(at.q), fb.ForceTask(weight=1e-9), fb.TorqueTask(weight=1e-9)]
+    answered = set()
+    for share, seed in ((share, seed) for share in (0.4, 1.3) for seed in range(10)):
+        press = share * robot.weight  # at every foot
+        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, min_normal_force=press, path="readable")
+        qp = controller.qp(robot.random_state(seed, 0.3))
+        try:
+            found = solve(qp)
+        except InfeasibleError as error:
+            assert judges.is_smallest_conflict(qp, error.rows)
+            continue
+        answered.add(found.solver)
+        assert judges.is_feasible(qp, list(range(len(qp.G))))
+        assert found.residuals.inequality < FEASIBILITY_TOLERANCE
+        slopes = (qp.H @ found.x, qp.g, qp.A.T @ found.equality_multipliers)
+        steepest, flattest = max(np.max(np.abs(slope)) for slope in slopes), np.linalg.eigvalsh(qp.reduced.H)[0]
+        assert residual_torque(found) < np.finfo(float).eps * steepest / flattest
     assert "active_set" in answered, "DAQP managed: these states no longer try what this test is about"

@@ -43,10 +43,10 @@ def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
 
 def cache_warning() -> str:
     """What to add to a message where compiled code cannot be kept on disk, or ""."""
-    from floatbase.control.tick import cache
+    from floatbase.control.tick import jit
 
     remedy = "set NUMBA_CACHE_DIR to a folder that has room and can be written to"
-    return f"; what is compiled cannot be kept ({cache.trouble}): {remedy}" if cache.trouble else ""
+    return f"; what is compiled cannot be kept ({jit.cache_trouble}): {remedy}" if jit.cache_trouble else ""
 
 
 def obstacle(problem: Problem, solver: str) -> str:

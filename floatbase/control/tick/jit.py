@@ -2,11 +2,12 @@
 
 numba caches a compiled function on disk and compiles it anew when its own file changes, but not when the file of a function
 that it calls does. So one function alone is cached, the entry point `tick`. It carries a digest of this folder in its closure,
-which is part of numba's cache key: an edit in any file compiles anew.
+which is part of numba's cache key: an edit in any file compiles anew. Whatever is wrong with the cache, the tick is compiled.
 """
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from functools import partial
 from hashlib import sha256
@@ -14,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.serialize import dumps
 
 from floatbase.control.problem import INCONSISTENT
-from floatbase.control.tick.cache import Cache, cannot_keep
 from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
 from floatbase.qp import FEASIBILITY_TOLERANCE
 from floatbase.robots import UNIT_LENGTH_TOLERANCE
@@ -31,6 +33,7 @@ jit_forced: Callable[..., Any] = partial(numba.njit, forceinline=True, **_OPTION
 jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
 
 compiles = hasattr(jit(lambda: None), "py_func")  # False where numba was told to leave functions as they are: NUMBA_DISABLE_JIT
+cache_trouble = ""  # why what is compiled cannot be kept on disk, in words
 
 
 def digest(folder: Path = Path(__file__).parent) -> int:
@@ -39,6 +42,51 @@ def digest(folder: Path = Path(__file__).parent) -> int:
     for file in sorted(folder.glob("*.py")):
         text += file.name.encode() + file.read_bytes()
     return int.from_bytes(sha256(text).digest()[:7], "big")
+
+
+def cannot_keep(error: Exception) -> None:
+    """Remember why what is compiled cannot be kept."""
+    global cache_trouble
+    # numba's word for folders that cannot be written to is a RuntimeError
+    cache_trouble = "no folder can be written to" if isinstance(error, RuntimeError) else f"{type(error).__name__}: {error}"
+
+
+class _Sealed(CompileResultCacheImpl):
+    """What numba keeps, with a checksum: machine code with a wrong byte would end the process, or answer wrongly."""
+
+    def reduce(self, compiled: Any) -> tuple[bytes, bytes]:
+        code = dumps(super().reduce(compiled))
+        return sha256(code).digest(), code
+
+    def rebuild(self, context: Any, kept: tuple[bytes, bytes]) -> Any:
+        checksum, code = kept
+        if sha256(code).digest() != checksum:
+            raise ValueError("the compiled code on disk is damaged")
+        return super().rebuild(context, pickle.loads(code))
+
+
+class Cache(FunctionCache):
+    """numba's cache of one function."""
+
+    _impl_class = _Sealed
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """What is kept for a signature, or None, at which numba compiles: files that are damaged count as missing."""
+        try:
+            return super().load_overload(signature, context)
+        except Exception:  # a damaged pickle may raise anything
+            return None
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep what was compiled, in place of damaged files. Where that fails, as on a full disk, `cache_trouble` says why."""
+        try:
+            try:
+                super().save_overload(signature, compiled)
+            except Exception:  # the list of what is kept may be damaged: start it over
+                self.flush()
+                super().save_overload(signature, compiled)
+        except Exception as error:
+            cannot_keep(error)
 
 
 def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
