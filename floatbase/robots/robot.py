@@ -82,7 +82,7 @@ class Robot(Value):
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        parts = "7 for the base, then its joints" if self.is_floating else "its joints"
+        parts = f"7 for the base, then {self.model.nq - 7} of the joints" if self.is_floating else "those of the joints"
         object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,), parts))
         check_unit_lengths(self.model, "posture", self.posture)
         object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
