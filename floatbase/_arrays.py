@@ -14,6 +14,7 @@ from floatbase.errors import InputError
 
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
 Kind = TypeVar("Kind")
+_FLOAT64 = np.dtype(np.float64)
 LARGEST = 1e30  # in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
 _NO_LENGTH = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
 _SEVERAL = ("Contacts", "EquationsOfMotion", "Limits", "HydraulicActuators")  # names that take no article
@@ -116,6 +117,8 @@ def read_only(value: Any) -> Array:
 
 def plain_numbers(value: Any) -> Array | None:
     """A float64 copy of numbers; None for anything else: complex or masked numbers, texts, truth values, dates, objects."""
+    if type(value) is np.ndarray and value.dtype is _FLOAT64:
+        return value.copy("K")  # most of them, and in the controller's loop
     try:
         array = np.array(value)
     except Exception:  # of another shape in each row, or of a class with an opinion of its own
@@ -158,7 +161,7 @@ def number(name: str, value: Any, unit: str = "", least: float = -LARGEST, most:
     if least <= found <= most:
         return found
     bounds = "a finite number" if least == -LARGEST and most == LARGEST else f"from {least:g} to {most:g}"
-    raise InputError(f"{name} is {found:g}; it must be {bounds}{f' {unit}' if unit else ''}.")
+    raise InputError(f"{name} is {found:g}; it must be {bounds}{f' ({unit})' if unit else ''}.")
 
 
 def positive(name: str, value: Any, unit: str = "", allow_zero: bool = False, most: float = LARGEST) -> float:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array
+from floatbase._arrays import LARGEST, Array
 from floatbase.affine import Quadratic
 from floatbase.errors import unknown_name
 from floatbase.lessons import progress
@@ -51,8 +51,8 @@ def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
         return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.")
     if given.shape not in shapes:
         return Verdict(False, _wrong_shape(given.shape, shapes[0]))
-    if not np.all(np.isfinite(given)):
-        return Verdict(False, "The answer holds numbers that are not finite.")
+    if not np.all(np.abs(given) <= LARGEST):
+        return Verdict(False, "The answer holds numbers that are not finite, or far too large.")
     return given
 
 

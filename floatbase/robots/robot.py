@@ -88,7 +88,7 @@ class Robot(Value):
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        parts = "7 for the base, then its joints" if self.is_floating else "its joints"
+        parts = f"7 for the base, then {self.model.nq - 7} of the joints" if self.is_floating else "those of the joints"
         object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,), parts))
         check_unit_lengths(self.model, "posture", self.posture)
         object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
@@ -131,7 +131,7 @@ class Robot(Value):
         """Of all that equations and physics take from the robot: the same in another process."""
         feet = [(foot.frame, foot.radius, *map(np.ndarray.tobytes, (foot.centre, foot.middle))) for foot in self.feet]
         corners = [b"" if foot.corners is None else foot.corners.tobytes() for foot in self.feet]
-        parts = self.name, self.model.saveToString(), feet, corners, self.torque_limits.tobytes(), self.posture.tobytes()
+        parts = self.name, self.urdf, self.model.saveToString(), feet, corners, self.torque_limits.tobytes(), self.posture.tobytes()
         return sha256(repr(parts).encode()).digest()
 
     def __eq__(self, other: object) -> bool:
