@@ -128,11 +128,11 @@ class Robot(Value):
 
     @cached_property
     def _fingerprint(self) -> bytes:
-        """Of all that equations and physics take from the robot: the same in another process."""
+        """Of all that equations, physics and pictures take from the robot: the same in another process."""
         feet = [(foot.frame, foot.radius, *map(np.ndarray.tobytes, (foot.centre, foot.middle))) for foot in self.feet]
         corners = [b"" if foot.corners is None else foot.corners.tobytes() for foot in self.feet]
-        parts = self.name, self.urdf, self.model.saveToString(), feet, corners, self.torque_limits.tobytes(), self.posture.tobytes()
-        return sha256(repr(parts).encode()).digest()
+        numbers = self.torque_limits.tobytes(), self.posture.tobytes()
+        return sha256(repr((self.name, self.urdf, self.model.saveToString(), feet, corners, numbers)).encode()).digest()
 
     def __eq__(self, other: object) -> bool:
         """Whether the other is the same robot: another `load` of it, or one that came out of a pickle."""
