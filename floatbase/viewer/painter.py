@@ -294,11 +294,13 @@ class Painter:
         return plane_under(contacts.normals, positions)
 
     def _check_state(self, state: Any) -> None:
-        if of_kind("state", state, State).robot.name != self.robot.name:
-            raise InputError(
-                f"this viewer shows {self.robot.name}, but the state is one of {state.robot.name}; "
-                "make a Viewer for that robot."
-            )
+        self.check_robot("state", of_kind("state", state, State).robot)
+
+    def check_robot(self, what: str, robot: Robot) -> None:
+        """Raise `InputError` where `what` belongs to a robot of another name or, as with joints locked, with other joints."""
+        looks = [(one.name, one.is_floating, one.joint_names) for one in (self.robot, robot)]
+        if looks[0] != looks[1]:
+            raise InputError(f"this viewer shows {self.robot}, but the {what} is one of {robot}; make a Viewer for that robot.")
 
 
 def kinds(picture: Picture) -> set[str]:

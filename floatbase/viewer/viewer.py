@@ -187,8 +187,7 @@ class Viewer:
         paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
-        if recording.checked_rollout(rollout).robot.name != self.robot.name:
-            raise InputError(f"this viewer shows {self.robot.name}, but the record is one of {rollout.robot.name}.")
+        self.painter.check_robot("record", recording.checked_rollout(rollout).robot)
         if not len(rollout.time):
             raise InputError("the record has no rows, so there is nothing to play.")
         _check_flags(planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused)

@@ -165,7 +165,7 @@ def test_every_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less
 
 
 def test_wrong_records_and_file_names_are_explained(viewer: Viewer, go2: Robot, standing: State, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="this viewer shows go2, but the record is one of solo12"):
+    with pytest.raises(InputError, match="this viewer shows Robot.'go2'.*, but the record is one of Robot.'solo12'"):
         viewer.play(record(load("solo12")))
     with pytest.raises(InputError, match="record has no rows"):
         viewer.play(record(go2, duration=0.0))

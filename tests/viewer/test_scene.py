@@ -431,9 +431,14 @@ def test_the_name_of_a_robot_is_text_in_the_notebook(go2: Robot) -> None:
 
 
 def test_wrong_input_is_explained(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
-    other = load("solo12").standing()
+    other, locked = load("solo12").standing(), load("go2", locked=["FL_hip_joint"]).standing()
     for wrong, words in (
-        (lambda: viewer.show(other), "this viewer shows go2, but the state is one of solo12; make a Viewer"),
+        (
+            lambda: viewer.show(other),
+            "this viewer shows Robot.'go2'.*, but the state is one of Robot.'solo12'.*make a Viewer",
+        ),
+        (lambda: viewer.show(locked), "this viewer shows Robot.'go2'.*, but the state is one of Robot.'go2'.*d=11 joints"),
+        (lambda: viewer.show(standing, ghost=locked), "this viewer shows Robot.'go2'.*, but the state is one of Robot.'go2'"),
         (lambda: viewer.show(standing.q), "state must be a State, as robot.standing.., not an array"),
         (lambda: viewer.show(standing, forces=np.zeros(12)), "forces were given without contacts.*pass contacts="),
         (
