@@ -67,13 +67,14 @@ def joint_servo(
     damping: N·m·s/rad.
     """
     d = of_kind("state", state, State).robot.d
+    joints = slice(state.robot.nv - d, None)
     steady = np.zeros(d) if tau is None else checked("tau", tau, (d,), "N·m")
     stiffness, damping = positive("stiffness", stiffness, allow_zero=True), positive("damping", damping, allow_zero=True)
     offset = function("path", path, "path(t)") if path is not None else lambda t: np.zeros(d)
 
     def controller(q: Array, v: Array, t: float) -> Torques:
         rate = (offset(t + _STEP) - offset(t - _STEP)) / (2.0 * _STEP)
-        error = -state.difference(q)[-d:] - offset(t)
-        return Torques(steady - stiffness * error - damping * (v[-d:] - rate))
+        error = -state.difference(q)[joints] - offset(t)
+        return Torques(steady - stiffness * error - damping * (v[joints] - rate))
 
     return controller

@@ -268,10 +268,12 @@ def joint_limits(model: pin.Model) -> tuple[Array, Array, Array, Array]:
 def within_limits(model: pin.Model, q: Array) -> Array:
     """A configuration with its joints within their limits: by whole turns where that will do, else at the nearest limit."""
     joints, at, low, high = joint_limits(model)
-    inside, x = np.array(q), q[at]
-    turned = x + 2.0 * np.pi * np.ceil((low - x) / (2.0 * np.pi))  # the least angle above the lower limit
+    inside, nearest = np.array(q), np.clip(q[at], low, high)
+    missed = q[at] - nearest
+    turned = q[at] - 2.0 * np.pi * np.sign(missed) * np.ceil(np.abs(missed) / (2.0 * np.pi))  # as few turns as will do
     turns = np.array([model.joints[joint].shortname().startswith("JointModelR") for joint in joints.tolist()], dtype=bool)
-    inside[at] = np.where(turns & ((x < low) | (x > high)) & (turned <= high), turned, np.clip(x, low, high))
+    will_do = turns & (np.abs(missed) > _LIMIT_ERROR) & (low <= turned) & (turned <= high)
+    inside[at] = np.where(will_do, turned, nearest)
     return read_only(inside)
 
 

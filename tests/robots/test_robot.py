@@ -13,6 +13,7 @@ import pytest
 import floatbase as fb
 from floatbase.control import AnalyticController
 from floatbase.errors import InputError
+from floatbase.lessons import joint_servo
 
 
 @pytest.fixture(params=judges.ROBOTS)
@@ -124,6 +125,7 @@ def test_a_robot_without_joints_falls_under_every_controller() -> None:
         command = controller(state.q, state.v)
         assert command.tau.shape == (0,)
         assert np.allclose(command.qdd, [0.0, 0.0, -9.81, 0.0, 0.0, 0.0])
+    assert joint_servo(state)(state.q, state.v, 0.0).tau.shape == (0,)
 
 
 def test_a_seed_may_be_any_whole_number() -> None:
