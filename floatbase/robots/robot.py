@@ -118,10 +118,10 @@ class Robot(Value):
     @cached_property
     def _fingerprint(self) -> bytes:
         """Of all that equations, physics and pictures take from the robot: the same in another process."""
-        feet = [(foot.frame, foot.radius, *map(np.ndarray.tobytes, (foot.centre, foot.middle))) for foot in self.feet]
-        corners = [b"" if foot.corners is None else foot.corners.tobytes() for foot in self.feet]
+        shapes = [foot.centre if foot.corners is None else foot.corners for foot in self.feet]
+        feet = [(foot.frame, foot.radius, shape.shape, shape.tobytes()) for foot, shape in zip(self.feet, shapes, strict=True)]
         numbers = self.torque_limits.tobytes(), self.posture.tobytes()
-        return sha256(repr((self.name, self.urdf, self.model.saveToString(), feet, corners, numbers)).encode()).digest()
+        return sha256(repr((self.name, self.urdf, self.model.saveToString(), feet, numbers)).encode()).digest()
 
     def __eq__(self, other: object) -> bool:
         """Whether the other is the same robot: another `load` of it, or one that came out of a pickle."""

@@ -12,6 +12,7 @@ import os
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from glob import escape
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -123,7 +124,7 @@ def _update(copy: Path, text: bytes, memory: _Memory) -> list[str]:
         said = [f"{copy.name}: {'new' if is_new else 'updated'}"]
     elif memory.offered.get(copy.name) == present:
         return []
-    elif present not in [_held(path) for path in copy.parent.iterdir() if path.match(f"{copy.stem}.new*{copy.suffix}")]:
+    elif present not in [_held(path) for path in copy.parent.glob(f"{escape(copy.stem)}.new*{copy.suffix}")]:
         names = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
         target = next(path for path in names if memory.may_replace(path))
         _lay(target, text, memory)
