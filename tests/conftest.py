@@ -34,7 +34,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # hypothesis reads its seed when it is configured
 def pytest_configure(config: pytest.Config) -> None:
-    if runs_the_others(config):
+    if is_no_worker(config):
         # to keep the files of a test, give pytest another folder for them: --basetemp=FOLDER
         folder = tempfile.mkdtemp(prefix="floatbase-tests-")
         config.add_cleanup(lambda: shutil.rmtree(folder))
@@ -43,15 +43,15 @@ def pytest_configure(config: pytest.Config) -> None:
     shift_seeds(config, config.getoption("--seed"))
 
 
-def runs_the_others(config: pytest.Config) -> bool:
-    """Whether this is pytest itself, not a worker of pytest-xdist."""
+def is_no_worker(config: pytest.Config) -> bool:
+    """Whether this process is pytest itself, not a worker of pytest-xdist."""
     return not hasattr(config, "workerinput")
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """End the processes that tests have left, browsers and kernels say, and fail when there are any."""
-    if not runs_the_others(session.config):
+    if not is_no_worker(session.config):
         return
     left = [process for process in psutil.process_iter() if is_left(process)]
     for process in left:
