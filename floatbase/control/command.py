@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import FrozenInstanceError
 from functools import cached_property
 from typing import Any
 
@@ -39,9 +38,6 @@ class Command(Value):
     ) -> None:
         # a frozen dataclass would take half a microsecond longer, at every tick
         self.__dict__.update(tau=tau, qdd=qdd, forces=forces, contacts=contacts, path=path, _solution=solution)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise FrozenInstanceError(f"cannot assign to field {name!r}: a Command does not change")
 
     @cached_property
     def solution(self) -> Solution:

@@ -31,8 +31,9 @@ quadratic programs Chang and Cottle, Math. Programming 18 (1980).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +71,7 @@ class Iteration(Value):
     direction: Array
     length: float
     blocking: str | None
-    multipliers: dict[str, float]
+    multipliers: Mapping[str, float]
     dropped: str | None
     objective: float
 
@@ -309,7 +310,7 @@ def _record(
         direction=read_only(p),
         length=length,
         blocking=None if blocking is None else names[blocking],
-        multipliers={names[i]: float(m) for i, m in zip(rows, mu, strict=False)},
+        multipliers=MappingProxyType({names[i]: float(m) for i, m in zip(rows, mu, strict=False)}),
         dropped=None if drop is None else names[drop],
         objective=problem.objective(x),
     )
