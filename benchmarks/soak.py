@@ -1,6 +1,6 @@
 """What leaks, slows down or breaks after many times: one command, a table, and exit code 1 when something does.
 
-    python benchmarks/soak.py                       all of `SOAKS`, as many times as it says: MINUTES minutes on two cores
+    python benchmarks/soak.py                       all of `SOAKS`, as many times as it says: 5 to 10 minutes
     python benchmarks/soak.py ticks kills           some of them
     python benchmarks/soak.py viewers --times 20    so many times
 
@@ -219,7 +219,7 @@ def run(name: str, times: int) -> Row:
 
 
 def table(rows: list[Row]) -> Iterator[str]:
-    yield "| soak | times | s | " + " | ".join(f"{what} (most)" for what in LIMITS) + " | |"
+    yield "| soak | times | s | " + " | ".join(f"{what}: end, rise (≤ {limit:g})" for what, limit in LIMITS.items()) + " | |"
     yield "|---" * (4 + len(LIMITS)) + "|"
     for row in rows:
         numbers = " | ".join(f"{end:.0f}, {much:+.1f}" for end, much in zip(row.values, row.growth, strict=True))

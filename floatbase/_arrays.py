@@ -173,10 +173,11 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
     return array
 
 
-def flat_forces(forces: Any, k: int, name: str = "forces") -> Array:
-    """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked."""
+def flat_forces(forces: Any, k: int | None, name: str = "forces") -> Array:
+    """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked. k: None for any."""
     found = plain_numbers(forces)
-    return checked(name, forces if found is None else found.ravel(), (k,), "N")
+    rows = found is not None and found.ndim == 2 and found.shape[1] == 3  # (3, k / 3) would come out in another order
+    return checked(name, found.ravel() if found is not None and rows else forces, (k,), "N")
 
 
 def number(name: str, value: Any, unit: str = "", least: float = -LARGEST, most: float = LARGEST) -> float:

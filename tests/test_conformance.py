@@ -92,10 +92,15 @@ MEANT = {
     "value": set(),
 }
 # and by parameter
+ANY_LENGTH = {"empty", "one too many"}  # nothing here says how long it must be
+NO_LIMIT = {"inf", "1e300", "1e308", "10**400"}
 ACCEPTED: dict[str, set[str]] = {
     "Problem.contacts": {"of another robot"}, "force_of.forces": {"NaN inside"}, "friction_used.forces": {"NaN inside"},
-    "on_status.listener": {"None"}, "max_normal_force": {"inf", "1e300", "1e308", "10**400"}, "flat_feet.mu": {"one too many"},
-    "Problem.robot": {"of another robot"}, "torque_limits": {"inf", "1e300", "1e308", "10**400"},
+    "on_status.listener": {"None"}, "max_normal_force": NO_LIMIT, "flat_feet.mu": {"one too many"},
+    "Problem.robot": {"of another robot"}, "torque_limits": NO_LIMIT, "Limits.torque_limits": NO_LIMIT | ANY_LENGTH,
+    "Affine.constant.b": ANY_LENGTH, "Affine.__call__.x": {"column"}, "ConstantTorques.tau": ANY_LENGTH,
+    "ForceTask.target": ANY_LENGTH, "TorqueTask.target": ANY_LENGTH, "PostureTask.q": ANY_LENGTH,
+    "time": {"one too many"}, "times": {"one too many"},
 }  # fmt: skip
 
 ZERO = np.zeros(12)

@@ -36,8 +36,9 @@ class Command(Value):
     def __init__(
         self, tau: Array, qdd: Array, forces: Array, contacts: Contacts, path: str, solution: Solution | Callable[[], Solution]
     ) -> None:
-        # a frozen dataclass would take half a microsecond longer, at every tick
-        self.__dict__.update(tau=tau, qdd=qdd, forces=forces, contacts=contacts, path=path, _solution=solution)
+        values = self.__dict__  # written to directly: a frozen dataclass takes 0.4 µs more at every tick, this 0.1 µs
+        values["tau"], values["qdd"], values["forces"] = tau, qdd, forces
+        values["contacts"], values["path"], values["_solution"] = contacts, path, solution
 
     @cached_property
     def solution(self) -> Solution:

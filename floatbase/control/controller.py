@@ -38,8 +38,10 @@ class WholeBodyController:
 
     The attribute `path` says which way runs, `path_reason` why. `problem` is what is solved. The first compiled controller ever
     compiles for about a minute, unless the set-up did (`python -m floatbase compile`). Later ones load what was compiled,
-    from the package's folder, the user's cache or NUMBA_CACHE_DIR, whichever can be written to. A state that the compiled tick
-    cannot answer to the last digits, or that has no answer, is handed to the readable path, and its `Command.path` says so.
+    from the package's folder, the user's cache or NUMBA_CACHE_DIR, whichever can be written to; they answer alike to the bit,
+    and the process that compiled may differ by rounding. Where nothing can be kept, `path_reason` says why. A state that the
+    compiled tick cannot answer to the last digits, or that has no answer, is handed to the readable path, and its
+    `Command.path` says so.
 
     Raises `InputError` for arguments that do not fit. A call raises `InfeasibleError` with the rows in conflict.
     """

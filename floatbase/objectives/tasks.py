@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, number, of_kind, plain_numbers, positive, read_only, text
+from floatbase._arrays import Array, Value, checked, flat_forces, number, of_kind, positive, read_only, text
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
@@ -72,9 +72,8 @@ def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
     for name in targets:
         target = getattr(task, name)
         if isinstance(target, type) or not (callable(target) or (target is None and task.block != "qdd")):
-            found = plain_numbers(target)  # forces may come as (n, 3)
-            flat = target if task.block == "qdd" or found is None else found.ravel()
-            kept[name] = checked(f"{name} of {task.name}", flat, shape)
+            what = f"{name} of {task.name}"
+            kept[name] = flat_forces(target, None, what) if task.block == "forces" else checked(what, target, shape)
     for name, value in kept.items():
         object.__setattr__(task, name, value)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,13 +13,14 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, flag, of_kind, positive, read_only, said, text, texts
+from floatbase._arrays import Array, flag, of_kind, positive, read_only, said, text, texts
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
 from floatbase.robots.entries import CATALOGUE, Entry
-from floatbase.robots.robot import Foot, Robot, within_limits
+from floatbase.robots.robot import Foot, Robot, checked_posture, has_free_base, within_limits
 from floatbase.robots.urdf import check_urdf, model_of, read_urdf, with_locked_joints, without_bolts
 
 PLATE = (0.4, 0.03)  # width and thickness, m, of the plate on which `unbolted` lets a robot stand
+_BLANK = "\ufeff \t\r\n"  # what may stand before a text: an XML declaration stands only at the very beginning
 _FLIGHT_HEIGHT = 1.0  # m: where a robot without bolts and plate floats
 
 
@@ -57,7 +59,7 @@ def load(
     path = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
     root = Path(data.getModelPath(path)).resolve()
     urdf = read_urdf(root / path)
-    model = model_of(urdf, loader.free_flyer)
+    model = model_of(name, urdf, loader.free_flyer)
     srdf = root / loader.path / loader.srdf_subpath / loader.srdf_filename if loader.srdf_filename else None
     start = _reference(model, loader, srdf, entry)  # also where a posture is given: it reads the inertia of rotors
     if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
@@ -113,17 +115,14 @@ def load_urdf(
     """
     urdf, folders = text("path", str(path) if isinstance(path, Path) else path), _folders(package_dirs)
     flag("floating", floating)
-    is_text = urdf.lstrip().startswith("<")
+    is_text = urdf.lstrip(_BLANK).startswith("<")
     name = text("name", name) if name is not None else "robot" if is_text else Path(urdf).stem
-    if not is_text:
-        file = Path(urdf).expanduser().resolve()
-        if not file.is_file():
-            raise InputError(f"there is no file {file}; give the path of a URDF file.")
-        urdf, folders = read_urdf(file), (*folders, file.parent)
-    try:
-        model = model_of(urdf, floating)
-    except (RuntimeError, ValueError) as error:
-        raise InputError(f"Pinocchio cannot read {name} as a URDF: {error}") from None
+    if is_text:
+        urdf = urdf.lstrip(_BLANK)
+    else:
+        file = Path(os.path.expanduser(urdf))
+        urdf, folders = read_urdf(file), (*folders, file.resolve().parent)
+    model = model_of(name, urdf, floating)
     start = within_limits(model, pin.neutral(model)) if posture is None else posture
     robot = _robot(name, urdf, model, start, locked, torque_limits, package_dirs=folders, feet=_feet(feet, foot_radius))
     _warn_of_weak_motors(robot)
@@ -169,18 +168,18 @@ def _robot(
     **others: Any,
 ) -> Robot:
     """A robot of a URDF's text and of the model read from it, after joints are locked and what cannot be held is refused."""
-    locked = texts("locked", locked)
-    floating = model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
+    locked, floating = texts("locked", locked), has_free_base(model)
     if locked:
-        q = checked("posture", posture, (model.nq,))
-        joints = list(model.names)[2 if floating else 1 :]
+        whole, q = model, checked_posture(name, model, posture)
+        joints = list(whole.names)[2 if floating else 1 :]
         for joint in locked:
             if joint not in joints:
                 raise unknown_name(f"joint of {name}", joint, joints, "Those that are fixed already need no lock.")
-        urdf = with_locked_joints(urdf, model, q, locked)
-        model.referenceConfigurations["to lock in"] = np.array(q)
-        model = pin.buildReducedModel(model, [model.getJointId(joint) for joint in locked], np.array(q))
-        posture = model.referenceConfigurations["to lock in"]
+        urdf = with_locked_joints(urdf, whole, q, locked)
+        model = model_of(name, urdf, floating)
+        kept = [whole.joints[whole.getJointId(joint)] for joint in list(model.names)[1:]]
+        posture = [x for joint in kept for x in q[joint.idx_q :][: joint.nq]]
+        model.armature = np.array([x for joint in kept for x in whole.armature[joint.idx_v :][: joint.nv]])
     check_urdf(name, urdf, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
@@ -199,8 +198,8 @@ def _warn_of_weak_motors(robot: Robot) -> None:
         if needed > limit
     ]
     if weak:
-        text = f"{robot.name} sinks: its motors are too weak to hold its posture against gravity, N·m: {', '.join(weak)}."
-        warnings.warn(text, RobotWarning, stacklevel=3)
+        sinks = f"{robot.name} sinks: its motors are too weak to hold its posture against gravity, N·m or N: {', '.join(weak)}."
+        warnings.warn(sinks, RobotWarning, stacklevel=3)
 
 
 def _loader(name: str, known: Mapping[str, Any]) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, plain_numbers, positive, read_only, said, text, whole
+from floatbase._arrays import LARGEST, Array, Value, checked, plain_numbers, positive, read_only, said, text, whole
 from floatbase.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -88,25 +88,12 @@ class Robot(Value):
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        parts = f"7 for the base, then {self.model.nq - 7} of the joints" if self.is_floating else "those of the joints"
-        object.__setattr__(self, "posture", checked("posture", self.posture, (self.model.nq,), parts))
-        check_unit_lengths(self.model, "posture", self.posture)
+        object.__setattr__(self, "posture", checked_posture(self.name, self.model, self.posture))
         object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         for foot in self.feet:
             self.frame_id(foot.frame)
-        self._check_limits()
         self._check_inertia()
-
-    def _check_limits(self) -> None:
-        """Raise `InputError` for a posture that joint limits do not allow."""
-        joints, at, low, high = joint_limits(self.model)
-        for joint, x, least, most in zip(joints, self.posture[at], low, high, strict=True):
-            if not least - _LIMIT_ERROR <= x <= most + _LIMIT_ERROR:
-                limits = f"its limits are {least:.6g} and {most:.6g}"
-                raise InputError(
-                    f"the posture of {self.name} has {self.model.names[int(joint)]} at {x:.6g}; {limits} (rad, or m)."
-                )
 
     def _check_inertia(self) -> None:
         """Raise `InputError` for a robot that has no mass, or that (1) cannot be solved for q̈ of."""
@@ -115,6 +102,8 @@ class Robot(Value):
         if not 0.0 < self.mass < np.inf:
             raise InputError(f"{self.name} has a mass of {self.mass:g} kg; give its links <inertial> in the URDF.")
         M = pin.crba(self.model, self.model.createData(), np.array(self.posture))
+        if not np.all(np.abs(M) <= LARGEST):
+            raise InputError(f"the inertia M (1) of {self.name} is not finite; look for lengths or masses that no robot has.")
         size = np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
         values, vectors = np.linalg.eigh(M / np.outer(size, size))
         part = np.abs(vectors[:, values < _SINGULAR]).max(axis=1, initial=0.0)
@@ -144,7 +133,7 @@ class Robot(Value):
     @cached_property
     def is_floating(self) -> bool:
         """Whether the base is free to move: nv = d + 6 rather than d."""
-        return self.model.njoints > 1 and self.model.joints[1].shortname() == "JointModelFreeFlyer"
+        return has_free_base(self.model)
 
     @property
     def nq(self) -> int:
@@ -246,7 +235,7 @@ class Robot(Value):
         that deviation in rad/s and m/s. Joints stay within their limits.
         """
         if not isinstance(seed, np.random.Generator):
-            whole("seed", seed, 0, 2**64, "or a numpy.random.Generator")
+            seed = whole("seed", seed, 0, 2**64, "or a numpy.random.Generator")
         rng, standing = np.random.default_rng(seed), self.standing()
         spread = positive("spread", spread, allow_zero=True)
         q = np.array(standing.integrate(rng.uniform(-spread, spread, self.nv)))
@@ -257,6 +246,11 @@ class Robot(Value):
     def __repr__(self) -> str:
         base = "floating" if self.is_floating else "fixed"
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
+
+
+def has_free_base(model: pin.Model) -> bool:
+    """Whether a model's base is free to move."""
+    return model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
 
 
 def joint_limits(model: pin.Model) -> tuple[Array, Array, Array, Array]:
@@ -279,6 +273,19 @@ def within_limits(model: pin.Model, q: Array) -> Array:
     turns = np.array([model.joints[joint].shortname().startswith("JointModelR") for joint in joints.tolist()], dtype=bool)
     inside[at] = np.where(turns & ((x < low) | (x > high)) & (turned <= high), turned, np.clip(x, low, high))
     return read_only(inside)
+
+
+def checked_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
+    """A configuration to stand in, shape (nq,), checked: its quaternions, and that joint limits allow it."""
+    parts = f"7 for the base, then {model.nq - 7} of the joints" if has_free_base(model) else "those of the joints"
+    q = checked("posture", posture, (model.nq,), parts)
+    check_unit_lengths(model, "posture", q)
+    joints, at, low, high = joint_limits(model)
+    for joint, x, least, most in zip(joints, q[at], low, high, strict=True):
+        if not least - _LIMIT_ERROR <= x <= most + _LIMIT_ERROR:
+            limits = f"its limits are {least:.6g} and {most:.6g}"
+            raise InputError(f"the posture of {name} has {model.names[int(joint)]} at {x:.6g}; {limits} (rad, or m).")
+    return q
 
 
 def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", first: int = 1) -> None:

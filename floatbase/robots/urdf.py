@@ -16,13 +16,24 @@ _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def read_urdf(path: Path) -> str:
-    """The text of a URDF file."""
-    return path.read_bytes().decode("utf-8-sig", errors="replace")  # a comment in another encoding changes no robot
+    """The text of a URDF file. Raises `InputError` for one that is not there or cannot be read."""
+    try:
+        return path.read_bytes().decode("utf-8-sig", errors="replace")  # a comment in another encoding changes no robot
+    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"there is no file {path.absolute()} to read ({reason}); give the path of a URDF file.") from None
 
 
-def model_of(urdf: str, floating: bool) -> pin.Model:
-    """Pinocchio's model of a URDF text, with a root joint where the base is free to move."""
-    return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
+def model_of(name: str, urdf: str, floating: bool) -> pin.Model:
+    """Pinocchio's model of a URDF text, with a root joint where the base is free to move.
+
+    Raises `InputError` for a text that is no URDF, or no XML: Pinocchio forgives more there than what reads it later.
+    """
+    try:
+        ElementTree.fromstring(urdf)
+        return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
+    except (ElementTree.ParseError, RuntimeError, ValueError) as error:
+        raise InputError(f"{name} cannot be read as a URDF: {error}") from None
 
 
 def check_urdf(name: str, urdf: str, model: pin.Model) -> None:

@@ -37,7 +37,7 @@ class JointMesh:
 
 def robot_meshes(robot: Robot) -> list[JointMesh]:
     """The meshes of a robot, one for each joint that moves something visible. Fixed parts belong to joint 0, the world."""
-    asset = _asset(robot.urdf)
+    asset = _asset(robot.urdf, robot.joint_names)
     if asset is not None:
         return _by_joint([mesh for part in _parts(asset) for mesh in _placed(robot, *part)])
     try:
@@ -67,12 +67,12 @@ def appearance(urdf: str, moving: Collection[str]) -> str:
 
 
 @lru_cache(maxsize=32)
-def _asset(urdf: str) -> Path | None:
-    """The file of light meshes that were made from such a URDF; None without one."""
+def _asset(urdf: str, joints: tuple[str, ...]) -> Path | None:
+    """The file of light meshes that were made from such a URDF, with at least these joints that move; None without one."""
     for asset in sorted((assets_root() / "meshes").glob("*.npz")):
         with np.load(asset) as file:
             moving = set(file["moving"].tolist())
-            if all(name in urdf for name in moving) and appearance(urdf, moving) == file["appearance"]:
+            if moving.issuperset(joints) and appearance(urdf, moving) == file["appearance"]:
                 return asset
     return None
 

@@ -205,7 +205,7 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
         """Show the new value of a control in every page, and report it to the window."""
         try:
             value = self.server.scene.move_control(name, value, page)
-        except ViewerError:
+        except (ViewerError, UnicodeEncodeError):  # half a character in the page's name
             return
         self.server.flush()
         try:

@@ -394,7 +394,7 @@ def test_robots_that_cannot_have_cylinders_are_refused() -> None:
 
 def test_a_sliding_joint_has_no_crank() -> None:
     with pytest.raises(fb.FloatbaseError, match=r"slides \(JointModelP"):
-        HydraulicActuators(fb.load("panda"))
+        HydraulicActuators(fb.load("panda", locked=["panda_finger_joint2"]))
 
 
 def test_steps_that_are_no_steps_are_refused() -> None:

@@ -67,6 +67,12 @@ ALL = fb.Contacts.points(GO2)
             r"forces has shape \(3,\); it must have shape \(12,\) \(N\)",
         ),
         (
+            lambda: fb.equations_of_motion(GO2.standing(), ALL).acceleration(np.zeros(12), np.zeros((3, 4))),
+            InputError,
+            r"forces has shape \(3, 4\); it must have shape \(12,\) \(N\)",
+        ),
+        (lambda: fb.ForceTask(np.zeros((3, 4))), InputError, r"target of force regularisation has shape \(3, 4\)"),
+        (
             lambda: fb.equations_of_motion(GO2.standing(), ALL).residual(np.zeros(3), np.zeros(12), np.zeros(12)),
             InputError,
             r"qdd has shape \(3,\); it must have shape \(18,\)",

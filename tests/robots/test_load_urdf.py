@@ -99,6 +99,23 @@ def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(name:
         assert judges.relative(state.h, h) < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("kind", "posture", "text"),
+    [
+        ("continuous", [2.0, 0.0], "posture.7:9., cosine and sine of 'elbow', has length 2"),
+        ("revolute", [10.0], "the posture of robot has elbow at 10; its limits are 0.5 and 2"),
+    ],
+)
+def test_a_joint_is_locked_only_where_it_can_be(kind: str, posture: list[float], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        fb.load_urdf(two_links(kind=kind), posture=[0.0] * 6 + [1.0, *posture], locked=["elbow"])
+
+
+def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice() -> None:
+    urdf = two_links(joint="top").replace("<robot", '\n<?xml version="1.0"?>\n<robot', 1)
+    assert fb.load_urdf(urdf, locked=["top", "top"]).d == 0
+
+
 def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path: Path) -> None:
     file = tmp_path / "arm.urdf"
     file.write_text(fb.load("ur5").urdf, encoding="utf-8")
@@ -129,6 +146,7 @@ def two_links(mass: object = 1.0, iyy: object = 1.0, joint: str = "elbow", kind:
         (two_links(joint="root_joint"), "a joint of robot is called root_joint, as Pinocchio calls that of a free base"),
         (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), r"elbow mimics wrist.*Hold these joints still, locked=\['elbow'\]"),
         (two_links(mass=0, iyy=0), "robot has a singular inertia M .*: elbow can accelerate without moving any mass"),
+        (two_links(extra=LIMIT + "<xacro:a/>"), "robot cannot be read as a URDF: unbound prefix"),
         (two_links(kind="planar"), r"joint 'elbow' of robot moves in 3 ways; a motor drives one. Make it revolute"),
         (two_links(kind="floating"), r"joint 'elbow' of robot moves in 6 ways; a motor drives one"),
         ('<robot name="none"><link name="base"/></robot>', "robot has a mass of 0 kg; give its links <inertial> in the URDF"),
@@ -151,9 +169,11 @@ def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_tha
 
 
 def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"there is no file .*nothing\.urdf; give the path of a URDF file"):
+    with pytest.raises(InputError, match=r"there is no file .*nothing\.urdf to read .*; give the path of a URDF file"):
         fb.load_urdf(tmp_path / "nothing.urdf")
+    with pytest.raises(InputError, match="there is no file .* to read"):
+        fb.load_urdf("zero\0.urdf")
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot>")
-    with pytest.raises(InputError, match=r"Pinocchio cannot read broken as a URDF"):
+    with pytest.raises(InputError, match="broken cannot be read as a URDF"):
         fb.load_urdf(broken)

@@ -126,6 +126,12 @@ def test_a_robot_without_joints_falls_under_every_controller() -> None:
         assert np.allclose(command.qdd, [0.0, 0.0, -9.81, 0.0, 0.0, 0.0])
 
 
+def test_a_seed_may_be_any_whole_number() -> None:
+    robot = judges.load("go2")
+    for seed in (3.0, np.int64(3), np.random.default_rng(3)):
+        np.testing.assert_array_equal(robot.random_state(seed).q, robot.random_state(3).q)
+
+
 def test_joints_of_standing_and_random_states_keep_their_limits(robot) -> None:
     model = robot.model
     for state in [robot.standing(), *judges.states(robot.name, 10, spread=0.5)]:

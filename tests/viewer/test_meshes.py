@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -76,13 +77,16 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
 
 def test_light_meshes_are_those_of_a_urdf_and_not_of_a_name() -> None:
     """The same text under another name, of other masses or with legs further apart, has them. One of the same name with
-    other feet, or another robot altogether, has not."""
+    other feet, with a joint more, or another robot altogether, has not."""
     urdf = load("go2").urdf
     light = [mesh.vertices for mesh in robot_meshes(load("go2"))]
     for old, new, same in (("6.921", "7.5", True), ("0 0.0955 0", "0 0.12 0", True), ("0 0 -0.213", "0 0 -0.25", False)):
         assert old in urdf
         drawn = [mesh.vertices for mesh in robot_meshes(load_urdf(urdf.replace(old, new), name="mine" if same else "go2"))]
         assert same == (len(drawn) == len(light) and all(map(np.array_equal, drawn, light)))
+    ankle = re.sub('"FL_foot_joint"\\s*type="fixed"', '"FL_foot_joint" type="continuous"', urdf)
+    walker = load_urdf(re.sub('<axis\\s*xyz="0 0 0"', '<axis xyz="0 1 0"', ankle))
+    assert walker.model.getJointId("FL_foot_joint") in {mesh.joint for mesh in robot_meshes(walker)}  # its foot turns
     other = load_urdf(MESHES.parent / "models" / "cart.urdf", name="go2")
     assert len(robot_meshes(other)) < len(light)
 

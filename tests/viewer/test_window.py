@@ -292,6 +292,7 @@ STRANGE = [
     *(json.dumps({"type": "control", "name": "slider", "value": v}) for v in (None, "1", [1], True, np.nan, np.inf, 10**400)),
     *(json.dumps({"type": "control", "name": "box", "value": v}) for v in (None, "true", [True], 1, np.nan)),
     '{"type": "control", "name": "slider"}',
+    json.dumps({"type": "control", "name": "slider", "value": 0.5, "by": "\ud800"}),
 ]  # fmt: skip
 
 

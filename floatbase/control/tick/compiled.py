@@ -114,16 +114,11 @@ class Compiled:
         targets = self._targets_at(t) if self._moving else self.targets
         if targets is None:
             return None
-        answer = self.empty_answer()
-        n_active = self._run(q, v, targets, answer)
-        return (answer, n_active, targets) if n_active >= 0 else None
-
-    def _run(self, q: Array, v: Array, targets: Array, answer: Array) -> int:
-        """One run of `tick.tick`."""
-        dynamics = self.dynamics
+        dynamics, answer = self.dynamics, self.empty_answer()
         with dynamics.lock:
             dynamics.update(q, v)
-            return int(self._tick(q, v, targets, *self.arguments, answer, self._parts))
+            n_active = self._tick(q, v, targets, *self.arguments, answer, self._parts)
+        return (answer, n_active, targets) if n_active >= 0 else None
 
     def warm_up(self) -> str:
         """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it.
@@ -131,9 +126,12 @@ class Compiled:
         Returns why that is not possible, or "".
         """
         standing = self._problem.robot.standing()
+        q, v = np.array(standing.q), np.array(standing.v)
         with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."):
             try:
-                self._run(np.array(standing.q), np.array(standing.v), self.targets, self.empty_answer())
+                with self.dynamics.lock:
+                    self.dynamics.update(q, v)
+                    self._tick(q, v, self.targets, *self.arguments, self.empty_answer(), self._parts)
             except Exception as error:  # whatever numba raises, the readable path does without; no code of the user's runs
                 return f"numba could not compile the tick ({type(error).__name__}: {error})"
         return ""
