@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Sequence
-from functools import cached_property
+from dataclasses import FrozenInstanceError
+from functools import cached_property, partial
+from threading import RLock
 from types import MappingProxyType
 from typing import Any, Self, TypeAlias, TypeVar
 
@@ -44,6 +48,12 @@ class Value:
     What a value has computed for itself (`cached_property`) stays behind and is computed anew.
     """
 
+    def __setattr__(self, name: str, value: object) -> None:
+        raise FrozenInstanceError(f"cannot assign to field {name!r}: a {type(self).__name__} does not change")
+
+    def __delattr__(self, name: str) -> None:
+        raise FrozenInstanceError(f"cannot delete field {name!r}: a {type(self).__name__} does not change")
+
     def __copy__(self) -> Self:
         return self
 
@@ -61,6 +71,20 @@ class Value:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
             object.__setattr__(self, name, MappingProxyType(value) if type(value) is dict else value)
+
+
+def _unlock(kind: type) -> None:
+    """New locks for what values compute for themselves: in a forked process nobody is left to release one that was held."""
+    for part in vars(kind).values():
+        if isinstance(part, cached_property):
+            part.lock = RLock()  # type: ignore[attr-defined]
+    derived: type
+    for derived in kind.__subclasses__():
+        _unlock(derived)
+
+
+if sys.version_info < (3, 12) and hasattr(os, "register_at_fork"):  # later ones compute without a lock
+    os.register_at_fork(after_in_child=partial(_unlock, Value))
 
 
 def of_kind(name: str, value: object, kind: type[Kind], example: str = "") -> Kind:

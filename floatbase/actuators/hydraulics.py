@@ -138,19 +138,32 @@ class Cylinders(Value):
     pose from `pose(q)`; v the joints' velocities, shape (d,), rad/s.
     """
 
+    hydraulics: Hydraulics
+    centre: Array
+    areas: Array
+    crank: Array
+    base: Array
+    _dead: Array
+    _flow: Array
+    _leakage: Array
+    _best: float
+
     def __init__(self, hydraulics: Hydraulics, size: npt.ArrayLike, centre: npt.ArrayLike):
-        self.hydraulics = of_kind("hydraulics", hydraulics, Hydraulics)
+        of_kind("hydraulics", hydraulics, Hydraulics)
         size = checked("size", size, (None,))
         if np.any(size <= 0.0):
             raise InputError(f"size of a cylinder is {size.min():g}; it must be > 0.")
-        self.centre = checked("centre", centre, size.shape, "rad")
-        self.areas = read_only(np.outer(hydraulics.areas, size ** (2.0 / 3.0)))
-        self.crank = read_only(hydraulics.crank * size ** (1.0 / 3.0))
-        self.base = read_only(hydraulics.base * size ** (1.0 / 3.0))
-        self._dead = hydraulics.dead_volume * size
-        self._flow = hydraulics.valve_gain * size
-        self._leakage = hydraulics.leakage * size
-        self._best = float(np.arccos(hydraulics.crank / hydraulics.base))  # γ with crank and cylinder square
+        vars(self).update(
+            hydraulics=hydraulics,
+            centre=checked("centre", centre, size.shape, "rad"),
+            areas=read_only(np.outer(hydraulics.areas, size ** (2.0 / 3.0))),
+            crank=read_only(hydraulics.crank * size ** (1.0 / 3.0)),
+            base=read_only(hydraulics.base * size ** (1.0 / 3.0)),
+            _dead=hydraulics.dead_volume * size,
+            _flow=hydraulics.valve_gain * size,
+            _leakage=hydraulics.leakage * size,
+            _best=float(np.arccos(hydraulics.crank / hydraulics.base)),  # γ with crank and cylinder square
+        )
 
     @property
     def d(self) -> int:

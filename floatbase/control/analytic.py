@@ -54,6 +54,16 @@ class AnalyticController(Value):
     wrench; a light robot feels the weight of the posture more. Raises `InputError` for values that do not fit.
     """
 
+    robot: Robot
+    contacts: Contacts
+    com: Array
+    _desired: State
+    _bias: Quadratic
+    _kp: float
+    _kd: float
+    _posture: float
+    _torque: float
+
     def __init__(
         self,
         robot: Robot,
@@ -75,12 +85,18 @@ class AnalyticController(Value):
         if state.robot != robot:
             raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
         equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
-        self.robot, self.contacts, self._desired = robot, contacts, state
-        self.com = checked("com", state.com if com is None else com, (3,), "m")
         share = robot.weight / max(contacts.n_points, 1)
-        self._bias = positive("bias_weight", bias_weight) * force_bias(contacts, alpha, share if a is None else a)
-        self._kp, self._kd = positive("kp", kp, "1/s²"), positive("kd", kd, "1/s")
-        self._posture, self._torque = positive("posture", posture), positive("torque", torque)
+        vars(self).update(
+            robot=robot,
+            contacts=contacts,
+            com=checked("com", state.com if com is None else com, (3,), "m"),
+            _desired=state,
+            _bias=positive("bias_weight", bias_weight) * force_bias(contacts, alpha, share if a is None else a),
+            _kp=positive("kp", kp, "1/s²"),
+            _kd=positive("kd", kd, "1/s"),
+            _posture=positive("posture", posture),
+            _torque=positive("torque", torque),
+        )
 
     def objective(self, eom: EquationsOfMotion) -> tuple[Quadratic, Quadratic, Quadratic]:
         """The costs on q̈, τ and λ whose sum is minimised."""

@@ -31,8 +31,9 @@ quadratic programs Chang and Cottle, Math. Programming 18 (1980).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -41,7 +42,7 @@ from floatbase._arrays import Array, Value, checked, of_kind, read_only, texts
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
-from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, SHARE, infeasible, not_convex, unbounded
+from floatbase.qp.conflicts import SHARE, infeasible, not_convex, unbounded, violation_allowed
 from floatbase.qp.labels import RowLabel
 from floatbase.qp.problem import QP, InequalityQP
 from floatbase.qp.solution import Solution, with_equality_multipliers
@@ -70,7 +71,7 @@ class Iteration(Value):
     direction: Array
     length: float
     blocking: str | None
-    multipliers: dict[str, float]
+    multipliers: Mapping[str, float]
     dropped: str | None
     objective: float
 
@@ -105,14 +106,17 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
     working: names of inequality rows to start with in W, such as the last run's `working`; those that depend on earlier
         ones are left out.
 
-    Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum or is
-    not convex, `UnknownNameError` for a row that does not exist, `InputError` for a start of another shape.
+    Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum, is not
+    convex or does not let the method end on its rows, `UnknownNameError` for a row that does not exist, `InputError` for a
+    start of another shape.
     """
     space, problem = of_kind("qp", qp, QP).equality_space, qp.reduced
     rows = _independent_rows(problem, [_index(qp, name) for name in texts("working", working)])
     y = None if start is None else space.A.T @ (checked("start", start, (qp.n,)) - space.b)
     search = _feasible_start(problem, _starting_point(problem, y, rows), rows)
     walk = _walk(problem, search.x, search.rows)
+    if np.any(_violated(problem, walk.x)):  # rows so nearly parallel that the method takes them for one
+        raise SolverError(f"active_set ends beyond rows of {qp!r} that nearly repeat each other. Check their scaling.")
     mu = np.zeros(len(qp.G))
     mu[walk.rows] = np.maximum(walk.multipliers, 0.0)
     taken = len(search.iterations) + len(walk.iterations)
@@ -188,7 +192,7 @@ def _feasible_start(problem: QP, y: Array, rows: list[int]) -> _Walk:
     n, size = problem.n, problem.row_lengths
     violation = (problem.G @ y - problem.h) / size
     violation[rows] = 0.0
-    violated = violation > FEASIBILITY_TOLERANCE
+    violated = violation > violation_allowed(problem.h / size, y)
     if not np.any(violated):
         return _Walk(y, rows, np.zeros(0), [])
     s_row = len(problem.G)
@@ -204,11 +208,17 @@ def _feasible_start(problem: QP, y: Array, rows: list[int]) -> _Walk:
     )
     worst = int(np.argmax(violation))
     walk = _walk(elastic, np.append(y, violation[worst]), [*rows, worst], last=s_row)
-    if walk.x[-1] > FEASIBILITY_TOLERANCE:
+    if walk.rows[-1] != s_row and np.any(_violated(problem, walk.x[:-1])):
         share = walk.multipliers * elastic.row_lengths[walk.rows]  # those of the violated rows add up to 1
         raise infeasible(problem.inequality_names[i] for i in sorted(np.array(walk.rows)[share > SHARE]))
     found = _independent_rows(problem, [i for i in walk.rows if i != s_row])
     return _Walk(walk.x[:-1], found, np.zeros(0), walk.iterations)
+
+
+def _violated(problem: QP, x: Array) -> npt.NDArray[np.bool_]:
+    """Which rows a point does not satisfy, shape (l,)."""
+    size = problem.row_lengths
+    return (problem.G @ x - problem.h) / size > violation_allowed(problem.h / size, x)
 
 
 def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
@@ -237,7 +247,7 @@ def _longest_step(problem: QP, x: Array, p: Array, reach: float, rows: list[int]
     closing = speed > _ROUNDING * size * np.linalg.norm(p)
     closing[rows] = False
     if np.isfinite(reach):
-        closing &= slack - reach * speed < -FEASIBILITY_TOLERANCE * size
+        closing &= _violated(problem, x + reach * p)
     blocking = np.flatnonzero(closing)
     if not blocking.size:
         if reach == np.inf:
@@ -300,7 +310,7 @@ def _record(
         direction=read_only(p),
         length=length,
         blocking=None if blocking is None else names[blocking],
-        multipliers={names[i]: float(m) for i, m in zip(rows, mu, strict=False)},
+        multipliers=MappingProxyType({names[i]: float(m) for i, m in zip(rows, mu, strict=False)}),
         dropped=None if drop is None else names[drop],
         objective=problem.objective(x),
     )

@@ -16,7 +16,7 @@ from floatbase.qp.labels import RowLabel
 
 FEASIBILITY_TOLERANCE = 1e-9  # how far a solver may violate an inequality of unit length: N, N·m; well above rounding
 SHARE = 1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
-_ROUNDING = 1e-12  # part of a row, and of the largest |h|, that may be rounding
+_ROUNDING = 1e-12  # part of a row, of its |h| and of the largest |x| that may be rounding
 _STEPS = 100  # for each row, before the search for a conflict gives up; it takes about one
 _FEW = 4  # rows that are listed in one line
 
@@ -56,9 +56,13 @@ def not_convex(problem: object, H: Array) -> SolverError:
     )
 
 
-def violation_allowed(h: Array) -> float:
-    """How far rows of unit length with these right-hand sides (l,) may be violated: `FEASIBILITY_TOLERANCE`, and rounding."""
-    return FEASIBILITY_TOLERANCE + _ROUNDING * float(np.max(np.abs(h), initial=0.0))
+def violation_allowed(h: Array, x: Array | None = None) -> Array:
+    """How far rows of unit length may be violated, shape (l,): `FEASIBILITY_TOLERANCE`, and rounding.
+
+    h: (l,), their right-hand sides. x: (n,), the point that is tried, or None where there is none.
+    """
+    size = 0.0 if x is None else float(np.max(np.abs(x), initial=0.0))
+    return FEASIBILITY_TOLERANCE + _ROUNDING * (np.abs(h) + size)
 
 
 def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:

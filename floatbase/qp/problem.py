@@ -91,7 +91,8 @@ class QP(Value):
         U, s, Vt, rank = ranked_svd(A)
         residual = np.max(np.abs(U[:, rank:].T @ b), initial=0.0)
         if residual > _CONSISTENCY_TOLERANCE * (1.0 + np.max(np.abs(b), initial=0.0)):
-            sides = conflicting_rows(np.vstack([A, -A]), np.append(b, -b))  # A x ≤ b and A x ≥ b
+            resolved = (U[:, :rank] * s[:rank]) @ Vt[:rank]  # rows that nearly repeat each other would meet far away
+            sides = conflicting_rows(np.vstack([resolved, -resolved]), np.append(b, -b))  # A x ≤ b and A x ≥ b
             rows = [self.equality_names[i] for i in sorted(side % len(A) for side in sides)]
             raise InfeasibleError(f"these equality rows are inconsistent: {', '.join(rows)}. Drop one of them.", rows)
         return Affine(Vt[rank:].T, Vt[:rank].T @ ((U[:, :rank].T @ b) / s[:rank]))

@@ -164,7 +164,7 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
     polished = np.zeros_like(mu)
     polished[active] = np.maximum(found[n:].astype(np.float64), 0.0)
     point, size = space(found[:n].astype(np.float64)), qp.row_lengths
-    if np.any((qp.G @ point - qp.h) / size > violation_allowed(qp.h / size)):
+    if np.any((qp.G @ point - qp.h) / size > violation_allowed(qp.h / size, point)):
         return None
     return point, polished
 

@@ -101,9 +101,10 @@ def test_threads_may_share_a_controller() -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 @pytest.mark.filterwarnings("ignore:.*fork")  # Python 3.12 warns of just this
-def test_a_process_forked_while_threads_tick_ticks_on() -> None:
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_process_forked_while_threads_tick_ticks_on(path: str) -> None:
     """The other threads, and the locks that they hold, stay behind in the middle of a tick."""
-    controller, state = judges.controller_of("go2", path="compiled"), judges.load("go2").random_state(3, 0.1)
+    controller, state = judges.controller_of("go2", path=path), judges.load("go2").random_state(3, 0.1)
     expected, ended, answers = controller(state.q, state.v).tau.tobytes(), threading.Event(), []
 
     def answer(out: Any) -> None:
@@ -120,7 +121,7 @@ def test_a_process_forked_while_threads_tick_ticks_on() -> None:
     for _ in range(20):
         child = multiprocessing.get_context("fork").Process(target=answer, args=(out,))
         child.start()
-        answers.append(into.recv() if into.poll(10.0) else "nothing")  # s: a tick takes some microseconds
+        answers.append(into.recv() if into.poll(10.0) else "nothing")  # s: a tick takes some milliseconds at most
         child.kill()
         child.join()
         if answers[-1] == "nothing":

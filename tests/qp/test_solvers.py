@@ -167,6 +167,39 @@ def test_rows_that_only_just_meet_leave_a_point(solver: str) -> None:
     assert np.allclose(found.x, [1.0, -2.0], atol=1e-6)
 
 
+@pytest.mark.parametrize("solver", EXACT)
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6, 1e10])
+def test_rows_through_one_point_leave_it_whatever_its_unit(solver: str, scale: float) -> None:
+    """One row is minus a sum of others that it meets at a point: feasible in real numbers, and but for rounding in these."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(2, 8))
+        point, meeting, G = scale * rng.normal(size=n), int(rng.integers(1, n)), rng.normal(size=(2 * n, n))
+        h = G @ point + scale * np.where(np.arange(2 * n) < meeting, 0.0, rng.uniform(size=2 * n))
+        G = np.vstack([G, -rng.uniform(0.1, 1.0, meeting) @ G[:meeting]])
+        qp = QP(np.eye(n), scale * rng.normal(size=n), np.zeros((0, n)), [], G, np.append(h, G[-1] @ point))
+        assert solve(qp, solver).residuals.inequality <= 10.0 * (FEASIBILITY_TOLERANCE + 1e-12 * scale), seed
+
+
+@pytest.mark.parametrize("solver", EXACT)
+@pytest.mark.parametrize("slope", 10.0 ** -np.arange(2.0, 16.0))
+def test_rows_that_meet_far_away_only_are_met_there_or_refused(solver: str, slope: float) -> None:
+    """x ≤ -1 and slope y ≤ x: nearly parallel rows, which meet at y = -1 / slope."""
+    try:
+        found = solve(QP(np.eye(2), np.zeros(2), *NONE, [[1.0, 0.0], [-1.0, slope]], [-1.0, 0.0]), solver)
+    except (InfeasibleError, SolverError):
+        assert slope < 1e-4
+    else:
+        assert found.residuals.inequality <= FEASIBILITY_TOLERANCE + 1e-12 / slope
+
+
+@pytest.mark.parametrize("slope", [1e-11, 1e-13])
+def test_equalities_that_nearly_repeat_each_other_are_named(slope: float) -> None:
+    with pytest.raises(InfeasibleError) as caught:
+        solve(QP(np.eye(2), np.zeros(2), [[1.0, 0.0], [1.0, slope]], [0.0, 1.0], *NONE))
+    assert caught.value.rows == ("equality 0", "equality 1")
+
+
 @pytest.mark.parametrize("solver", solvers())
 def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> None:
     A = np.array([[1.0, 0.0], [1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [0.0, 3.0]])
