@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import mmap
 import socket
 import sys
 from pathlib import Path
@@ -106,7 +107,12 @@ def test_a_soak_tells_what_stays_and_what_breaks(monkeypatch):
     kept = []
 
     def leaking():
-        yield lambda: kept.append((np.ones(250_000), socket.socket()))
+        def step():
+            fresh = mmap.mmap(-1, 2_000_000)  # an array might take memory that other tests have freed
+            fresh.write(b"x" * len(fresh))
+            kept.append((fresh, socket.socket()))
+
+        yield step
 
     def breaks():
         def step():
