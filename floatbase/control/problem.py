@@ -70,7 +70,7 @@ class Problem(Value):
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The QP at a state and a time t in s."""
         if isinstance(state, State) and state.robot != self.robot:
-            raise InputError(f"the state belongs to another robot, {state.robot.name}, than the problem, {self.robot.name}.")
+            raise InputError(f"the state belongs to another robot, {state.robot!r}, than the problem, {self.robot!r}.")
         return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t)
 
 

@@ -71,7 +71,7 @@ def load(
             raise InputError(
                 f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be given: "
                 f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
-                f"Its limbs end with {', '.join(_limb_ends(model))}."
+                f"Its limbs end with {', '.join(_limb_ends(model))}. A robot that flies has none: feet=[]."
             )
     robot = _robot(
         name,
@@ -121,6 +121,11 @@ def load_urdf(
         urdf = urdf.lstrip(_BLANK)
     else:
         file = Path(os.path.expanduser(urdf))
+        if not file.exists():
+            import example_robot_data as data
+
+            if urdf in data.robots_loader.ROBOTS:
+                raise InputError(f'there is no file {urdf}, but a robot of that name: fb.load("{urdf}") loads it.')
         urdf, folders = read_urdf(file), (*folders, file.resolve().parent)
     model = model_of(name, urdf, floating)
     start = within_limits(model, pin.neutral(model)) if posture is None else posture

@@ -92,7 +92,8 @@ class Robot(Value):
         object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         for foot in self.feet:
-            self.frame_id(foot.frame)
+            if [self.frame_id(other.frame) for other in self.feet].count(self.frame_id(foot.frame)) > 1:
+                raise InputError(f"foot {foot.frame!r} of {self.name} is given twice; name each foot once.")
         self._check_inertia()
 
     def _check_inertia(self) -> None:
@@ -110,9 +111,12 @@ class Robot(Value):
         names = [*["its base"] * (self.nv - self.d), *self.joint_names]
         light = list(dict.fromkeys(name for name, share in zip(names, part, strict=True) if share > _SHARE))
         if light:
+            joints = [name for name in light if name != "its base"]
+            held = f", or hold joints still, as with locked={joints}" if joints else ""
+            bolted = ", or load it with floating=False where it is bolted to the ground" if "its base" in light else ""
             raise InputError(
                 f"{self.name} has a singular inertia M (1) in its posture: {', '.join(light)} can accelerate without moving "
-                "any mass. Give the links there mass and inertia, or hold such joints still with locked=[…]."
+                f"any mass. Give the links there mass and inertia{held}{bolted}."
             )
 
     @cached_property

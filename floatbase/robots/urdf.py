@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
 
@@ -11,8 +12,11 @@ import pinocchio as pin
 
 from floatbase._arrays import Array
 from floatbase.errors import InputError
+from floatbase.robots.robot import has_free_base
 
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_LIMITED = ("revolute", "prismatic")  # types of joints that need a <limit>
+_ROUNDING = 1e-12  # kg m²: programs that write URDFs put -5e-20 for an inertia of 0, and no part of a robot has so little
 
 
 def read_urdf(path: Path) -> str:
@@ -33,7 +37,26 @@ def model_of(name: str, urdf: str, floating: bool) -> pin.Model:
         ElementTree.fromstring(urdf)
         return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
     except (ElementTree.ParseError, RuntimeError, ValueError) as error:
-        raise InputError(f"{name} cannot be read as a URDF: {error}") from None
+        raise InputError(f"{name} cannot be read as a URDF: {_fault(urdf, error)}") from None
+
+
+def _fault(urdf: str, error: Exception) -> str:
+    """Why a text is no URDF; Pinocchio writes the reason to the terminal, not into its error."""
+    if "xacro:" in urdf:
+        return f"{str(error).rstrip('.')}. It is written in xacro: run xacro first, as in xacro robot.xacro > robot.urdf."
+    if isinstance(error, ElementTree.ParseError):
+        return str(error)
+    root = ElementTree.fromstring(urdf)
+    if root.tag != "robot":
+        return f"its outermost element is <{root.tag}>; that of a URDF is <robot>."
+    for kind in ("link", "joint"):
+        for called, times in Counter(element.get("name") for element in root.findall(kind)).items():
+            if times > 1:
+                return f"{times} {kind}s are called {called!r}; give each a name of its own."
+    for joint in root.findall("joint"):
+        if joint.get("type") in _LIMITED and joint.find("limit") is None:
+            return f"{joint.get('type')} joint {joint.get('name')!r} has no <limit>, with lower, upper, effort and velocity."
+    return str(error)
 
 
 def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
@@ -51,12 +74,36 @@ def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
                 raise InputError(f"{where} has {wrong[0]}; it needs a mass ≥ 0, kg, and six numbers ixx … izz, kg m².")
     moving = [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
     names = [joint.get("name", "") for joint in moving]
+    for joint in moving:
+        called, limit, axis = joint.get("name"), joint.find("limit"), joint.find("axis")
+        low, high = (_number(limit.get(end, "0")) if limit is not None else 0.0 for end in ("lower", "upper"))
+        if joint.get("type") in _LIMITED and low > high:
+            raise InputError(
+                f"joint {called!r} of {name} has the lower limit {low:g} above the upper limit {high:g} (rad, or m; a limit "
+                "that is not given is 0). Swap lower and upper in <limit>, or make it continuous if it turns without limit."
+            )
+        if axis is not None and not any(map(_number, axis.get("xyz", "1").split())):
+            raise InputError(f'joint {called!r} of {name} has an <axis> of zeros; give its direction, as in xyz="0 0 1".')
+    for i, inertia in list(enumerate(model.inertias))[1:]:  # with all that is welded: a sum may mend a negative part
+        least = float(inertia.inertia.diagonal().min())
+        if least < -_ROUNDING:
+            where = "the base" if model.names[i] == "root_joint" else f"the link that joint {model.names[i]!r} moves"
+            raise InputError(
+                f"{where} of {name} has a negative moment of inertia, {least:.4g} kg m², with all that is welded to it; "
+                "ixx, iyy and izz of <inertia> must be above zero there."
+            )
+    own = next((frame for frame in model.frames if frame.name == "base"), None)
+    if own is not None and own.parentJoint != int(has_free_base(model)):
+        raise InputError(
+            f"a {'link' if own.type == pin.BODY else 'joint'} of {name} that moves is called base, the word for the link "
+            "that all others hang from, on every robot; rename it."
+        )
     if list(model.names).count("root_joint") > 1:
         raise InputError(f"a joint of {name} is called root_joint, as Pinocchio calls that of a free base; rename it.")
-    for joint in model.joints:
-        if joint.nv > 1 and model.names[joint.id] in names:
+    for moved in model.joints:
+        if moved.nv > 1 and model.names[moved.id] in names:
             raise InputError(
-                f"joint {model.names[joint.id]!r} of {name} moves in {joint.nv} ways; a motor drives one. Make it "
+                f"joint {model.names[moved.id]!r} of {name} moves in {moved.nv} ways; a motor drives one. Make it "
                 "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
             )
     masters = {joint.get("name", ""): mimic.get("joint", "") for joint in moving for mimic in joint.findall("mimic")}

@@ -6,6 +6,7 @@ Only the ground's plane and balls at the feet touch. Links that are welded toget
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import mujoco
@@ -104,10 +105,11 @@ def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
     spec.compiler.fusestatic = True
     bodies = spec.bodies[1:]  # the first is the world
     totals = {body.name: _fused(body) for body in bodies if body.joints or (robot.is_floating and body.parent.name == "world")}
+    wrong = [body for body in bodies if body.name in totals and not _can_move(totals[body.name])]
+    if wrong:
+        raise SimulationError(_impossible(robot, wrong, totals[wrong[0].name]))
     for body in bodies:
         total = totals.get(body.name, pin.Inertia.Zero())
-        if body.name in totals:
-            _check_inertia(robot, body.name, total)
         tensor, body.explicitinertial = total.inertia, body.name in totals
         body.mass, body.ipos, body.iquat = total.mass, total.lever, [1.0, 0.0, 0.0, 0.0]
         diagonal = tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]  # MuJoCo's word for none
@@ -129,15 +131,23 @@ def _fused(body: mujoco.MjsBody) -> pin.Inertia:
     return total
 
 
-def _check_inertia(robot: Robot, link: str, total: pin.Inertia) -> None:
-    """Raise `SimulationError` for an inertia that no mass distribution has, or none at all."""
+def _can_move(total: pin.Inertia) -> bool:
+    """Whether some mass distribution has this inertia; none at all does not count."""
     smallest, middle, largest = np.linalg.eigvalsh(total.inertia)
-    if not (total.mass > 0.0 and smallest > _SMALLEST_INERTIA and smallest + middle >= largest * (1.0 - _ROUNDING)):
-        raise SimulationError(
-            f"MuJoCo cannot move link {link!r} of {robot.name}: with all that is welded to it, it has {total.mass:.4g} kg and "
-            f"principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} kg m². They must be above zero, and none above "
-            "the sum of the two others. Correct the URDF, or weld the link to the next one with locked=[…] of fb.load."
-        )
+    return bool(total.mass > 0.0 and smallest > _SMALLEST_INERTIA and smallest + middle >= largest * (1.0 - _ROUNDING))
+
+
+def _impossible(robot: Robot, wrong: Sequence[mujoco.MjsBody], total: pin.Inertia) -> str:
+    """What to say of bodies that MuJoCo cannot move; total: the inertia of the first."""
+    smallest, middle, largest = np.linalg.eigvalsh(total.inertia)
+    others = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+    joints = [joint.name for body in wrong for joint in body.joints]
+    weld = f", or weld such links to the ones they hang from with locked={joints} of fb.load" if joints else ""
+    return (
+        f"MuJoCo cannot move link {wrong[0].name!r} of {robot.name}{others}: with all that is welded to it, it has "
+        f"{total.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} kg m². They must be above "
+        f"zero, and none above the sum of the two others. Correct the URDF{weld}."
+    )
 
 
 def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:

@@ -57,7 +57,7 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (
             lambda: controller().qp(judges.load("solo12").standing()),
             InputError,
-            "the state belongs to another robot, solo12, than the problem, go2",
+            r"another robot, Robot\('solo12', .*\), than the problem, Robot\('go2', .* 4 feet",
         ),
         (lambda: controller("stand"), InputError, r"tasks must hold tasks, such as fb\.CoMTask\(state\.com\); 'stand' is none"),
         (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "frame of go2 'FL_fot'; near names: FL_foot"),

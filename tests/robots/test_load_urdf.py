@@ -136,6 +136,11 @@ def two_links(mass: object = 1.0, iyy: object = 1.0, joint: str = "elbow", kind:
     return f'<robot name="two">{links}<joint name="{joint}" type="{kind}">{ends}{extra}</joint></robot>'
 
 
+HUNG = """<link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+</link><joint name="swing" type="prismatic"><parent link="top"/><child link="tip"/><limit effort="0" velocity="1"/></joint>
+</robot>"""
+
+
 @pytest.mark.parametrize(
     ("urdf", "text"),
     [
@@ -143,10 +148,20 @@ def two_links(mass: object = 1.0, iyy: object = 1.0, joint: str = "elbow", kind:
         (two_links(mass="inf"), "<inertial> of link 'top' of robot has mass inf"),
         (two_links(mass="1,5"), "<inertial> of link 'top' of robot has mass 1,5"),
         (two_links(iyy="nan"), "<inertial> of link 'top' of robot has iyy nan"),
+        (two_links(iyy=-0.1), "the link that joint 'elbow' moves of robot has a negative moment of inertia, -0.1 kg m²"),
+        (two_links().replace("0 1 0", "0 0 0"), "joint 'elbow' of robot has an <axis> of zeros; give its direction"),
+        (two_links(extra=LIMIT.replace("0.5", "3")), "'elbow' of robot has the lower limit 3 above the upper limit 2 .*Swap"),
+        (two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")), "lower limit 0 above the upper limit -2"),
+        (two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'), "a joint .* is called base"),
+        (two_links().replace('"base"', '"a"').replace('"top"', '"base"'), "a link .* is called base, .*rename"),
         (two_links(joint="root_joint"), "a joint of robot is called root_joint, as Pinocchio calls that of a free base"),
         (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), r"elbow mimics wrist.*Hold these joints still, locked=\['elbow'\]"),
         (two_links(mass=0, iyy=0), "robot has a singular inertia M .*: elbow can accelerate without moving any mass"),
-        (two_links(extra=LIMIT + "<xacro:a/>"), "robot cannot be read as a URDF: unbound prefix"),
+        (two_links(extra=LIMIT + "<xacro:a/>"), "robot cannot be read as a URDF: unbound prefix.*run xacro first"),
+        (two_links(extra=""), "revolute joint 'elbow' has no <limit>, with lower, upper, effort and velocity"),
+        (two_links().replace('k name="top"', 'k name="base"'), "2 links are called 'base'; give each a name of its own"),
+        ("<html/>", "robot cannot be read as a URDF: its outermost element is <html>; that of a URDF is <robot>"),
+        (two_links().replace('"1"', '"0"', 4), "Give the links there mass and inertia, .*, or load it with floating=False"),
         (two_links(kind="planar"), r"joint 'elbow' of robot moves in 3 ways; a motor drives one. Make it revolute"),
         (two_links(kind="floating"), r"joint 'elbow' of robot moves in 6 ways; a motor drives one"),
         ('<robot name="none"><link name="base"/></robot>', "robot has a mass of 0 kg; give its links <inertial> in the URDF"),
@@ -155,6 +170,13 @@ def two_links(mass: object = 1.0, iyy: object = 1.0, joint: str = "elbow", kind:
 def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(urdf: str, text: str) -> None:
     with pytest.raises(InputError, match=text):
         fb.load_urdf(urdf)
+
+
+def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equal_are_none() -> None:
+    bolted = two_links(joint="base", kind="fixed").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"')
+    robot = fb.load_urdf(bolted.replace("</robot>", "") + HUNG, floating=False)
+    assert robot.base == "a" and robot.model.frames[robot.frame_id("base")].parentJoint == 0
+    assert abs(robot.random_state(0, spread=3.0).q[0]) > 0.0
 
 
 def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_that_are_told() -> None:
@@ -173,6 +195,8 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
         fb.load_urdf(tmp_path / "nothing.urdf")
     with pytest.raises(InputError, match="there is no file .* to read"):
         fb.load_urdf("zero\0.urdf")
+    with pytest.raises(InputError, match=r'there is no file go2, but a robot of that name: fb.load\("go2"\) loads it'):
+        fb.load_urdf("go2")
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot>")
     with pytest.raises(InputError, match="broken cannot be read as a URDF"):

@@ -28,6 +28,7 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
     ("make", "kind", "text"),
     [
         (lambda: fb.load("go3"), UnknownNameError, r"unknown robot 'go3'; near names: go2, .*fb\.catalogue\(\) says what"),
+        (lambda: fb.load("GO2 "), UnknownNameError, "unknown robot 'GO2 '; near names: go2, "),
         (lambda: fb.load("talus"), UnknownNameError, "unknown robot 'talus'; near names: .*talos"),
         (lambda: fb.load("zzz"), UnknownNameError, "unknown robot 'zzz'; known: "),
         (lambda: fb.load(3), UnknownNameError, "unknown robot 3"),
@@ -39,6 +40,8 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: fb.load(Path("x.urdf")), UnknownNameError, r"fb.load_urdf\('x.urdf'"),
         (lambda: fb.load("anymal"), InputError, r"limbs end with .*LF_FOOT.*, RH_FOOT"),
         (lambda: fb.load("anymal"), InputError, r'so its feet must be given: fb.load\("anymal", feet=\["name of a foot frame'),
+        (lambda: fb.load("iris"), InputError, r"A robot that flies has none: feet=\[\]"),
+        (lambda: fb.load("go2", feet=["FL_foot", "FL_foot"]), InputError, "foot 'FL_foot' of go2 is given twice; name each"),
         (lambda: fb.load("cassie"), InputError, "cassie comes as an SDF file; floatbase reads URDF. Choose one of go2"),
         (lambda: fb.load("go2", feet="FL_foot"), InputError, r'must be a list of frames, as in feet=\["FL_foot"\]'),
         (lambda: fb.load("go2", feet=["FL_fot"]), UnknownNameError, r"unknown frame of go2 'FL_fot'; near names: FL_foot"),

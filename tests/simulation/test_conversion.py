@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import re
 from pathlib import Path
 
 import judges
@@ -123,8 +125,10 @@ def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_pa
     assert judges.relative(state.h, judge.h) < 1e-12
 
 
-def test_a_moving_link_with_an_impossible_inertia_is_named() -> None:
-    with pytest.raises(
-        SimulationError, match=r"MuJoCo cannot move link 'r_hip_1' of icub_reduced: .*principal inertias 0, 0, 0 kg"
-    ):
+def test_moving_links_with_an_impossible_inertia_are_named_with_the_joints_to_hold() -> None:
+    text = r"MuJoCo cannot move link 'r_hip_1' of icub_reduced .*principal inertias 0, 0, 0 kg.*locked=(\[.*\]) of fb.load"
+    with pytest.raises(SimulationError, match=text) as caught:
         fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"]))
+    found = re.search(text, str(caught.value))
+    assert found
+    fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"], locked=ast.literal_eval(found[1])))
