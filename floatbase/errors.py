@@ -55,7 +55,7 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
     """An `UnknownNameError` that lists the names nearest to `name`, and all of them when there are few."""
     known = sorted(known)
     wanted = str(name).strip().lower()
-    alike = get_close_matches(wanted, {k.lower() for k in known}, n=5, cutoff=0.5)
+    alike = get_close_matches(wanted, {k.lower() for k in known}, n=5)
     near = [k for low in alike for k in known if k.lower() == low][:5] or [k for k in known if wanted in k.lower()][:5]
     parts = ["near names: " + ", ".join(near)] if near else []
     if not near or len(known) <= 6:
