@@ -131,8 +131,8 @@ def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], ac
     timestep = sim.model.opt.timestep
     if timestep != sim.timestep:
         raise InputError(
-            f"sim.model.opt.timestep is {timestep:g} s; the simulation was made with {sim.timestep:g} s, and the control period "
-            f"counts in that: make another, fb.Simulation(robot, timestep={timestep:g})."
+            f"sim.model.opt.timestep is {timestep:g} s; the simulation was made with {sim.timestep:g} s, and control periods "
+            f"count in that: make another, fb.Simulation(robot, timestep={timestep:g})."
         )
     function("the controller", controller, "controller(q, v, t)")
     check_actuators(actuators)
