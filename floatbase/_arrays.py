@@ -6,10 +6,11 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
+from difflib import get_close_matches
 from functools import cached_property, partial
 from threading import RLock
 from types import MappingProxyType
-from typing import Any, Self, TypeAlias, TypeVar
+from typing import Any, ClassVar, Self, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +72,26 @@ class Value:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
             object.__setattr__(self, name, MappingProxyType(value) if type(value) is dict else value)
+
+
+class Fixed:
+    """Base of objects that keep what they were made with: once they have `_made`, no public attribute takes another value.
+
+    A class derived from one of them may set attributes of its own.
+    """
+
+    _instead: ClassVar[dict[str, str]] = {}  # by public name: what to do instead of assigning to it
+
+    def __setattr__(self, name: str, value: object) -> None:
+        known = name in self._instead
+        if name.startswith("_") or "_made" not in vars(self) or not (known or Fixed in type(self).__bases__):
+            object.__setattr__(self, name, value)
+            return
+        kind = type(self).__name__
+        if known:
+            raise InputError(f"{name} of a {kind} cannot be set once it is made: {self._instead[name]}.")
+        near = get_close_matches(name, self._instead, n=1)
+        raise InputError(f"a {kind} has no {name!r} to set{f'; {near[0]}? {self._instead[near[0]]}' if near else ''}.")
 
 
 def _unlock(kind: type) -> None:

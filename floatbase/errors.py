@@ -28,10 +28,15 @@ class RobotWarning(UserWarning):
     """A robot was loaded that cannot do what one expects of it; the message says what."""
 
 
+class SimulationWarning(UserWarning):
+    """A rollout runs, and a part of what it was given does nothing; the message says which, and why."""
+
+
 class InfeasibleError(FloatbaseError):
     """No point satisfies all rows of a quadratic program.
 
-    `rows` holds the names of a smallest set of rows in conflict: drop any one of them and the others can be met.
+    `rows` holds the names of a smallest set of rows in conflict: they can be met without any one of them. Other rows
+    may be in conflict too.
     """
 
     def __init__(self, message: str, rows: Iterable[str] = ()):

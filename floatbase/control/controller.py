@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal, TypeAlias, get_args
+from typing import ClassVar, Literal, TypeAlias, get_args
 
 import numpy.typing as npt
 
-from floatbase._arrays import LARGEST, Array, checked, number, of_kind, plain_numbers, read_only
+from floatbase._arrays import LARGEST, Array, Fixed, checked, number, of_kind, plain_numbers, read_only
 from floatbase.control.command import Command
 from floatbase.control.problem import Limits, Problem, build_qp
 from floatbase.control.tick import Compiled, cache_warning, obstacle
@@ -21,8 +21,11 @@ from floatbase.robots import Robot, State, torque_limits_of
 
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
+_ANOTHER = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
+_OPTIONS = ("facets", "inside", "min_normal_force", "torque_limits", "solver", "path")
 
-class WholeBodyController:
+
+class WholeBodyController(Fixed):
     """(26)(27) at every tick: the torques that serve the tasks best while (7), friction, contacts and motors allow them.
 
     robot: the robot to control.
@@ -45,6 +48,12 @@ class WholeBodyController:
 
     Raises `InputError` for arguments that do not fit. A call raises `InfeasibleError` with the rows in conflict.
     """
+
+    _instead: ClassVar[dict[str, str]] = {
+        **{name: f"controller.replace({name}=…) is a new one that has it" for name in ("contacts", "tasks")},
+        **{name: _ANOTHER.format(name) for name in _OPTIONS},
+        **dict.fromkeys(("robot", "limits", "problem", "compiled", "path_reason", "requested_path"), _ANOTHER.format("…")),
+    }
 
     def __init__(
         self,
@@ -80,6 +89,7 @@ class WholeBodyController:
         self.compiled = None if reason else compiled
         self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
         self.path_reason = reason or "the tasks and contacts are the package's own" + cache_warning()
+        self._made = True
 
     def __getstate__(self) -> tuple[Problem, str, Path]:
         """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""

@@ -192,13 +192,15 @@ def reveal(name: str) -> None:
 
 
 def show_progress() -> None:
-    """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried."""
+    """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried; and why tries cannot be kept, if so."""
     tried, known = progress.load(), all_exercises()
     marks = {name: _mark(tried.get(name)) for name in known}
     for lesson in sorted({name.split(".")[0] for name in known}):
         here = [name for name in known if name.startswith(f"{lesson}.")]
         print(f"lesson {lesson}  " + "  ".join(f"{name} {marks[name]}" for name in here))
     print(f"solved: {sum(mark == '✓' for mark in marks.values())} of {len(known)}")
+    if obstacle := progress.obstacle():
+        print(obstacle)
 
 
 def _same(answer: Any, placeholder: Any) -> bool:

@@ -38,15 +38,29 @@ def record(name: str, right: bool) -> None:
     """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten, without an error."""
     # the line end comes first: a line that a full disk cut short before this one stays alone
     line = "\n" + json.dumps({name: {"tries": 1, "right": int(right)}})
+    _append(line.encode())
+
+
+def obstacle() -> str:
+    """Why tries cannot be kept, and what to do; "" where they can."""
+    return _append(b"")
+
+
+def _append(line: bytes) -> str:
+    """Write a line at the end of the file; what prevented it, or ""."""
+    advice = "Set FLOATBASE_HOME to a folder that you may write to"
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
         file = os.open(path(), os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         try:
-            os.write(file, line.encode())
+            os.write(file, line)
         finally:
             os.close(file)
-    except (OSError, RuntimeError):
-        pass
+    except OSError as error:
+        return f"Tries cannot be kept in {path().parent}: {error.strerror}. {advice}."
+    except RuntimeError:
+        return f"Tries cannot be kept: there is no home folder. {advice}."
+    return ""
 
 
 def _texts() -> Iterator[bytes]:

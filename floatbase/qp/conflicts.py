@@ -35,7 +35,7 @@ def infeasible(rows: Iterable[str]) -> InfeasibleError:
         text = "".join(f"\n  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()) + "\n"
     return InfeasibleError(
         f"no point satisfies all rows. Given the equalities, these are in conflict:{text}"
-        "Loosen or drop any one of them: at least one has to go.",
+        "At least one of these rows has to be loosened or dropped; other rows may be in conflict too.",
         labels,
     )
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy.typing as npt
 
 from floatbase._arrays import function, of_kind, positive, text
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.physics import Push, Simulation, acting
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
 
@@ -168,7 +168,9 @@ class Live:
             now = self.sim.time
             self._pushes = tuple(p for p in self._pushes if now < p.start + p.duration + SEEN)
             self._pushes += tuple(replace(push, start=now) for push in requested)
-            record = rollout(self.sim, controller, self._duration, self._pushes, self._period, self._actuators)
+            present = acting(self._pushes, now, now + self._duration)  # the others are only listed, to be seen
+            record = rollout(self.sim, controller, self._duration, present, self._period, self._actuators)
+            record = replace(record, pushes=self._pushes)
             if len(record):
                 self._show(record)
             outcome = record.outcome if record.error is None else f"{record.outcome}: {record.error}"

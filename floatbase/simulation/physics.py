@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
+from typing import ClassVar, Self
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, cross, number, of_kind, positive, said, text
+from floatbase._arrays import Array, Fixed, Value, checked, cross, number, of_kind, positive, said, text
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -23,6 +25,8 @@ _FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))  # of the base's tilt since the
 _LEAST_STATURE = 1e-3  # m: a base that begins lower than this lies on the ground, and its height measures no fall
 _LONGEST_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms is followed
 _CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
+_ANOTHER = "make another, fb.Simulation(robot, ground=…, timestep=…)"
+_MOVE = "sim.reset(sim.state.replace(q=…, v=…)) puts the robot there, at time 0"
 _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
 
 
@@ -66,7 +70,12 @@ def pushes_of(pushes: Sequence[Push]) -> tuple[Push, ...]:
     return tuple(of_kind("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])") for push in pushes)
 
 
-class Simulation:
+def acting(pushes: tuple[Push, ...], begin: float, end: float) -> tuple[Push, ...]:
+    """Those that act at any time from begin to end, s."""
+    return tuple(p for p in pushes if p.start < end - _CLOCK_ERROR and begin < p.start + p.duration - _CLOCK_ERROR)
+
+
+class Simulation(Fixed):
     """A robot on the ground in MuJoCo, driven by joint torques.
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat foot one at each corner),
@@ -75,7 +84,13 @@ class Simulation:
 
     robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s. `model` and
     `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
+    What it was made with does not change any more; what `model` and `data` hold may. A copy has `model` and `data` of its own.
     """
+
+    _instead: ClassVar[dict[str, str]] = {
+        **dict.fromkeys(("robot", "ground", "timestep", "feet", "model", "data", "point_names"), _ANOTHER),
+        **dict.fromkeys(("state", "q", "v", "joints", "time"), _MOVE),
+    }
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
         self.robot = of_kind("robot", robot, Robot)
@@ -92,6 +107,10 @@ class Simulation:
         self._below = self.model.geom_size[self._balls, :1] * self.ground.normal
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self.reset()
+        self._made = True
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)  # two robots with the same data would move each other
 
     @property
     def point_names(self) -> tuple[str, ...]:

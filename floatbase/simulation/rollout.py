@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -10,8 +11,8 @@ import numpy as np
 
 from floatbase._arrays import Array, checked, function, of_kind, plain_numbers, positive, said
 from floatbase.dynamics import Contacts
-from floatbase.errors import FloatbaseError, InputError
-from floatbase.simulation.physics import Push, Simulation, pushes_of
+from floatbase.errors import FloatbaseError, InputError, SimulationWarning
+from floatbase.simulation.physics import Push, Simulation, acting, pushes_of
 from floatbase.simulation.record import Recorder, Rollout
 
 _MOST_TICKS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
@@ -65,6 +66,7 @@ def rollout(
     end the rollout: `outcome` says so, and the rows up to there are returned.
     Raises `InputError` for a control period or a duration that is no whole number of periods, for a push that moves nothing,
     for a controller that cannot be called as controller(q, v, t), and for an answer without `.tau`.
+    Warns (`SimulationWarning`) where pushes are given and none acts in this rollout.
     """
     pushes = pushes_of(pushes)
     _check(sim, controller, pushes, actuators)
@@ -73,6 +75,9 @@ def rollout(
     ticks = _multiple("duration", duration, "the control period", substeps * sim.timestep)
     if ticks > _MOST_TICKS:
         raise InputError(f"duration {duration:g} s has {ticks} control periods; at most {_MOST_TICKS} fit in one record.")
+    idle = _idle(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
+    if idle:
+        warnings.warn(idle, SimulationWarning, stacklevel=2)
     record = Recorder(sim, _stance(sim, controller), ticks)
     for _ in range(ticks):
         q, v = sim.q, sim.v
@@ -106,9 +111,29 @@ def _multiple(name: str, time: float, unit: str, period: float) -> int:
     return count
 
 
+def _idle(pushes: tuple[Push, ...], begin: float, end: float) -> str:
+    """What is said where there are pushes and none acts from begin to end, s: "" where one does."""
+    if not pushes or acting(pushes, begin, end):
+        return ""
+    first = pushes[0]
+    several = f"none of the {len(pushes)} pushes acts: the first" if len(pushes) > 1 else "the push does not act: it"
+    if first.start < begin:
+        what = f"sim.reset() starts the clock again, or give start=sim.time + {first.start:g}"
+    else:
+        what = f"a duration of more than {first.start - begin:g} s reaches it"
+    span = f"goes from {first.start:g} to {first.start + first.duration:g} s, this rollout from {begin:g} to {end:g} s"
+    return f"{several} {span}; {what}."
+
+
 def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None) -> None:
     """Raise `InputError` for what is of another kind or of another robot."""
     of_kind("sim", sim, Simulation)
+    timestep = sim.model.opt.timestep
+    if timestep != sim.timestep:
+        raise InputError(
+            f"sim.model.opt.timestep is {timestep:g} s; the simulation was made with {sim.timestep:g} s, and control periods "
+            f"count in that: make another, fb.Simulation(robot, timestep={timestep:g})."
+        )
     function("the controller", controller, "controller(q, v, t)")
     check_actuators(actuators)
     for name, part in (("controller is", controller), ("actuators are", actuators)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import judges
@@ -121,3 +122,29 @@ def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> 
     command = controller(task)(STATE.q, STATE.v)
     expected = controller(fb.CoMTask(UP, kp=10.0, kd=10.0, weight=10.0))(STATE.q, STATE.v)
     assert np.allclose(command.tau, expected.tau)
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("torque_limits", "make another, .*torque_limits=…"),
+        ("path", "make another"),
+        ("tasks", r"controller\.replace\(tasks=…\)"),
+        ("task", "no 'task' to set; tasks.*replace"),
+    ],
+)
+def test_what_a_controller_was_made_with_is_not_set_afterwards(name: str, advice: str) -> None:
+    made = controller(fb.ForceTask(), path="readable")
+    for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
+        with pytest.raises(InputError, match=advice):
+            setattr(one, name, 2.0)
+
+
+def test_a_class_of_ones_own_sets_its_own_attributes() -> None:
+    class Counting(fb.WholeBodyController):
+        calls = 0
+
+    made = Counting(GO2, CONTACTS, [fb.ForceTask()], path="readable")
+    made.calls += 1
+    with pytest.raises(InputError, match="make another"):
+        made.path = "compiled"

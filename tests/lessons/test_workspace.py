@@ -168,7 +168,10 @@ def test_a_damaged_memory_costs_nothing_that_was_written(mine: Path, text: str) 
     prepare(mine.parent)
     assert (mine / LESSON).read_text() == "half a noteb"
     assert source(mine / NEW) == source(mine / "01_b.new.ipynb") == "first = 2"
-    assert prepare(mine.parent) == []
+    again = f"{LESSON}: yours is empty or damaged; to get the course's again, move it away and start again"
+    assert prepare(mine.parent) == [again]
+    (mine / LESSON).rename(mine / "away")
+    assert prepare(mine.parent) == [f"{LESSON}: new"]
 
 
 def linked(path: Path, to: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+import warnings
 from collections.abc import Callable
 
 import judges
@@ -10,7 +13,7 @@ import pytest
 from judges import limp
 
 import floatbase as fb
-from floatbase.errors import FloatbaseError, InputError, SimulationError, UnknownNameError
+from floatbase.errors import FloatbaseError, InputError, SimulationError, SimulationWarning, UnknownNameError
 from floatbase.simulation import Ground
 
 GO2 = judges.load("go2")
@@ -100,3 +103,43 @@ def test_a_controller_of_one_robot_is_not_run_on_another() -> None:
     controller = fb.WholeBodyController(GO2, fb.Contacts.points(GO2), fb.standing_tasks(GO2.standing()))
     with pytest.raises(InputError, match="solo12"):
         fb.rollout(fb.Simulation(judges.load("solo12")), controller, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "advice"),
+    [
+        ("timestep", 0.002, "make another, fb.Simulation"),
+        ("ground", 0.5, "make another, fb.Simulation"),
+        ("q", GO2.standing().q, "sim.reset"),
+        ("timestap", 0.002, "no 'timestap' to set; timestep"),
+        ("anything", 1, "no 'anything' to set"),
+    ],
+)
+def test_what_a_simulation_was_made_with_is_not_set_afterwards(name: str, value: object, advice: str) -> None:
+    for sim in (SIM, copy.deepcopy(SIM), pickle.loads(pickle.dumps(SIM))):
+        with pytest.raises(InputError, match=advice):
+            setattr(sim, name, value)
+
+
+def test_a_timestep_changed_in_mujocos_model_is_refused() -> None:
+    sim = fb.Simulation(GO2)
+    sim.model.opt.timestep = 0.002
+    with pytest.raises(InputError, match=r"fb\.Simulation\(robot, timestep=0.002\)"):
+        fb.rollout(sim, limp, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("start", "says"),
+    [
+        (0.0, r"it goes from 0 to 0.01 s, this rollout from 0.02 to 0.03 s; .* start=sim.time \+ 0\."),
+        (0.03, "a duration of more than 0.01 s reaches it"),
+    ],
+)
+def test_a_push_that_does_not_act_in_a_rollout_is_said(start: float, says: str) -> None:
+    sim = fb.Simulation(GO2)
+    idle, near = (fb.Push(UP, start=start, duration=0.01), fb.Push(UP, start=0.02, duration=0.01))
+    with warnings.catch_warnings(action="error"):
+        fb.rollout(sim, limp, 0.02)
+        fb.rollout(copy.copy(sim), limp, 0.01, [idle, near])  # of a copy: sim itself stays where it is
+    with pytest.warns(SimulationWarning, match=says):
+        fb.rollout(sim, limp, 0.01, [idle])

@@ -24,6 +24,7 @@ MINE = "my"
 _MEMORY = ".from.json"
 _PART = (".floatbase-", ".part")  # how the hidden name begins and ends that a file has until all of it is written
 _DAMAGED = (ValueError, LookupError, TypeError, AttributeError, RecursionError)  # what JSON that is no notebook raises
+_CHECK = "Check that you may read and write {} and {}, then start again."
 _FAILED = "{}: not brought up to date"
 # what JupyterLab writes when a notebook is only run and looked at; all else is the learner's writing
 _OF_RUN = {"execution_count", "id", "outputs"}
@@ -47,7 +48,8 @@ def prepare(folder: Path = FOLDER) -> list[str]:
     except FileExistsError:
         raise InputError(f"{mine} is a file or a broken link; it must be a folder. Move it away, then start again.") from None
     except OSError as error:
-        raise InputError(f"{mine} cannot be made: {error.strerror}. See to the disk and to who may write there.") from None
+        told = f"{mine} cannot be made: {error.strerror}. Check that the disk has room and that you may write there."
+        raise InputError(told) from None
     with _alone_in(mine):
         memory, said = _Memory(mine / _MEMORY), []
         for source in [*sorted(folder.glob("*.ipynb")), *sorted(folder.glob("*.md"))]:
@@ -55,7 +57,7 @@ def prepare(folder: Path = FOLDER) -> list[str]:
             try:
                 said += _update(copy, _as_laid(source), memory)
             except OSError as error:
-                said.append(f"{_FAILED.format(source.name)}: {error.strerror}. See to {source} and {copy}, then start again.")
+                said.append(f"{_FAILED.format(source.name)}: {error.strerror}. {_CHECK.format(source, copy)}")
             except _DAMAGED:
                 said.append(f"{_FAILED.format(source.name)}: the course's own is no notebook. `git status` may say why.")
         return [*said, *memory.said]
@@ -104,7 +106,7 @@ class _Memory:
         except OSError as error:
             self.said = [
                 f"{self.path.name}: cannot be stored: {error.strerror}. Nothing of yours is lost, but a later update takes "
-                f"every lesson for written in. See to {self.path}, then start again."
+                f"every lesson for written in. Check that you may read and write {self.path}, then start again."
             ]
 
     def may_replace(self, path: Path) -> bool:
@@ -117,18 +119,20 @@ def _update(copy: Path, text: bytes, memory: _Memory) -> list[str]:
     present, is_new, said = _digest(copy.name, text), not os.path.lexists(copy), list[str]()
     if not is_new and not copy.is_file():
         return [f"{_FAILED.format(copy.name)}: a folder or a broken link has its name. Move {copy} away, then start again."]
+    if copy.suffix == ".ipynb" and copy.is_file() and _text_of(copy.read_bytes()) is None:
+        said = [f"{copy.name}: yours is empty or damaged; to get the course's again, move it away and start again"]
     if _held(copy) == present:
         memory.remember_laid(copy.name, present)
     elif memory.may_replace(copy):
         _lay(copy, text, memory)
         said = [f"{copy.name}: {'new' if is_new else 'updated'}"]
     elif memory.offered.get(copy.name) == present:
-        return []
+        return said
     elif present not in [_held(path) for path in copy.parent.glob(f"{escape(copy.stem)}.new*{copy.suffix}")]:
         names = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
         target = next(path for path in names if memory.may_replace(path))
         _lay(target, text, memory)
-        said = [f"{copy.name}: yours is kept; the course's new text is in {target.name}"]
+        said += [f"{copy.name}: yours is kept; the course's new text is in {target.name}"]
     memory.remember_offered(copy.name, present)
     return said
 
@@ -181,10 +185,15 @@ def _as_laid(source: Path) -> bytes:
 
 def _digest(name: str, data: bytes) -> str:
     """A digest of what is written in a file: of a notebook without what Jupyter writes, of all bytes of any other."""
-    if name.endswith(".ipynb"):
-        with suppress(*_DAMAGED):  # a damaged notebook is still the learner's
-            data = json.dumps(_written(json.loads(data)), sort_keys=True).encode()
-    return hashlib.sha256(data).hexdigest()
+    written = _text_of(data) if name.endswith(".ipynb") else None
+    return hashlib.sha256(data if written is None else written).hexdigest()  # a damaged notebook is still the learner's
+
+
+def _text_of(data: bytes) -> bytes | None:
+    """What is written in a notebook, without what Jupyter writes; None where it is no notebook."""
+    with suppress(*_DAMAGED):
+        return json.dumps(_written(json.loads(data)), sort_keys=True).encode()
+    return None
 
 
 def _held(path: Path) -> str | None:
