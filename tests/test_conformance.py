@@ -168,7 +168,7 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
-        "vertices", "conflicting_rows", "linear_program", "nearest_rotation", "with_equality_multipliers", "QP.objective",
+        "vertices", "conflicting_rows", "linear_program", "nearest_rotation", "QP.objective",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
         "recording.checked_rollout",

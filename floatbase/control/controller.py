@@ -16,7 +16,7 @@ from floatbase.control.tick import Compiled, cache_warning, obstacle
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives import Task
-from floatbase.qp import QP, Solution, check_solver, solve, with_equality_multipliers
+from floatbase.qp import QP, Solution, check_solver, solve
 from floatbase.robots import Robot, State, torque_limits_of
 
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
@@ -145,7 +145,7 @@ class WholeBodyController:
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         qp = build_qp(eom, tick.tasks(targets), self.limits, t)
         x, mu = numbers[: tick.forces.stop], tick.multipliers(numbers, n_active)
-        return with_equality_multipliers(qp, x, mu, "compiled", n_active)
+        return Solution(qp, x, mu, "compiled", n_active)
 
     def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
         """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""

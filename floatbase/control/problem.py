@@ -102,7 +102,7 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
         H[block, block] += task.weight * residual.A.T @ residual.A
         g[block] += task.weight * residual.A.T @ residual.b
     motion, b = _motion_rows(eom)
-    A = np.block([[eom.M, -eom.S, -eom.J.T], [motion, np.zeros((len(motion), d + k))]])
+    A = np.vstack([np.hstack([eom.M, -eom.S, -eom.J.T]), np.hstack([motion, np.zeros((len(motion), d + k))])])
     G_force, h_force, force_names = _force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = _torque_rows(eom.robot, limits)
     G = np.zeros((len(G_force) + len(G_torque), n))
