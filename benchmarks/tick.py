@@ -1,6 +1,6 @@
 """How fast the controller's tick is, and that its paths agree: one command, a table and a plot.
 
-    python benchmarks/tick.py                      times, growth, closed loop -> benchmarks/tick.md, benchmarks/tick.png
+    python benchmarks/tick.py                      times, growth -> benchmarks/tick.md, benchmarks/tick.png
     python benchmarks/tick.py --agreement 2000     compares the paths on that many random states for each robot and stance
 
 Both paths take turns within one run, on the same states. Times are ratios to be trusted, microseconds to be taken with salt.
@@ -151,24 +151,7 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
     figure.savefig(HERE / "tick.png", dpi=120)
 
 
-# closed loop, agreement, long run --------------------------------------------------------------------------------------------
-
-
-def closed_loop(seconds: float = 4.0) -> Iterator[str]:
-    """MuJoCo and the controller at 1 kHz, in the loop written out and in `rollout`, which keeps a record."""
-    for name in ("go2", "solo12"):
-        robot = fb.load(name)
-        for path in PATHS:
-            command, sim = controller(robot, path), fb.Simulation(robot)
-            ticks = round((seconds if path == "compiled" else seconds / 8) / sim.timestep)
-            start = time.perf_counter()
-            for _ in range(ticks):
-                sim.step(command(sim.q, sim.v, sim.time).tau)
-            bare = ticks * sim.timestep / (time.perf_counter() - start)
-            start = time.perf_counter()
-            record = fb.rollout(fb.Simulation(robot), command, duration=ticks * sim.timestep)
-            recorded = ticks * sim.timestep / (time.perf_counter() - start)
-            yield f"| {name} | {path} | {1 / sim.timestep:.0f} Hz | {bare:.1f} × | {recorded:.1f} × | {record.outcome} |"
+# agreement, long run ---------------------------------------------------------------------------------------------------------
 
 
 def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
@@ -254,12 +237,7 @@ def main() -> None:
     ]
     lines += ["Growth, median tick (tick.png):", "", "| what | number | easy | saturated |", "|---|---|---|---|"]
     lines += [f"| {what} | {x} | {a:.1f} µs | {b:.1f} µs |" for what, rows in curves.items() for x, a, b in rows]
-    lines += ["", "Closed loop with MuJoCo, times real time:", ""]
-    lines += [
-        "| robot | path | rate of both | loop alone | `fb.rollout` | outcome |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [*closed_loop(), ""]
+    lines.append("")
     (HERE / "tick.md").write_text("\n".join(lines), encoding="utf-8")
     print("\n".join(lines))
 
