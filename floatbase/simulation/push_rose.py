@@ -133,9 +133,12 @@ def push_rose(
         "step": positive("step", step, "N"),
     }
     first = ceil(positive("most", robot.weight if most is None else most, "N") / step)
-    largest = partial(_largest, make=make, frame=frame, first=first, **settings)
+
+    def largest_push(direction: float) -> float:  # the bar shows this name
+        return _largest(direction, make, frame, first, **settings)
+
     angles = 2.0 * np.pi * np.arange(directions) / directions
-    table = sweep(largest, {"direction": angles}, workers=workers, cluster=cluster, progress=progress)
+    table = sweep(largest_push, {"direction": angles}, workers=workers, cluster=cluster, progress=progress)
     for row in table.errors:
         raise SimulationError(f"the push towards {np.rad2deg(row['direction']):.0f}° ended with {row['error']}")
     return PushRose(
@@ -175,10 +178,10 @@ def _largest(
     direction: float,
     make: Callable[[], tuple[Simulation, Any]],
     frame: str,
+    first: int,
     start: float,
     duration: float,
     watch: float,
-    first: int,
     step: float,
 ) -> float:
     """The largest multiple of `step`, N, that is survived as a push in a direction, rad; `first` is the first one tried."""
