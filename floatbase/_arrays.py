@@ -30,13 +30,17 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
     except (TypeError, ValueError):
         required = f"numbers of shape {_text(shape)}" if shape else "a number"
         raise InputError(f"{name} must be {required}, not {value!r}.") from None
-    fits = array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         raise InputError(f"{name} has shape {array.shape}; it must have shape {_text(shape)}{f' ({unit})' if unit else ''}.")
-    if not np.all(np.isfinite(array)):
+    # the sum of squares is finite where all entries are, but for huge ones, and ten times faster
+    if not np.vdot(array, array) < np.inf and not np.all(np.isfinite(array)):
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise InputError(f"{name} holds {array[tuple(where)]} at index {where}; every entry must be a finite number.")
     return array
+
+
+def _fits(have: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    return len(have) == len(shape) and all(n is None or one == n for one, n in zip(have, shape, strict=True))
 
 
 def positive(name: str, value: Any, unit: str = "", allow_zero: bool = False) -> float:
