@@ -156,9 +156,10 @@ class WholeBodyController:
         problem = replace(self.problem, **{name: value for name, value in new.items() if value is not None})
         other = object.__new__(type(self))
         other._prepare(problem, self.solver, self.requested_path, warm_up=self.compiled is None)
-        # the compiled tick's tables found that the package's tasks fit new contacts
-        if tasks is not None or limits is not None or other.compiled is None or other.compiled.own.any:
+        if other.compiled is None:
             problem.check()
+        elif tasks is not None or limits is not None or other.compiled.own.any:  # what its tables have not found to fit
+            problem.check(other.compiled.unknown)
         return other
 
     def __repr__(self) -> str:

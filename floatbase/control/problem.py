@@ -48,10 +48,13 @@ class Problem:
         """The QP at a state and a time t in s."""
         return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t)
 
-    def check(self) -> None:
-        """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and make no QP."""
+    def check(self, tasks: Sequence[Task] | None = None) -> None:
+        """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and make no QP.
+
+        tasks: those to check, all by default.
+        """
         eom = _standing(self.robot, self.contacts)
-        for task in self.tasks:
+        for task in self.tasks if tasks is None else tasks:
             residual_of(task, eom)
         self.limits.normal_forces(self.contacts)
         for rows in self.limits.rows:

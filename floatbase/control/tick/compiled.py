@@ -21,7 +21,7 @@ from floatbase.control.problem import Problem, assemble_qp, residual_of
 from floatbase.control.tick.own import Given, Own
 from floatbase.control.tick.tables import dynamics_of, tables_of
 from floatbase.errors import InputError
-from floatbase.objectives import nearest_rotation
+from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, TorqueTask, nearest_rotation
 from floatbase.qp import QP
 from floatbase.robots import Robot, State, check_unit_lengths
 
@@ -82,6 +82,7 @@ class Compiled:
     the array of numbers that `tick.tick` fills, how many rows are active, and what else the tick was given.
 
     qdd, tau, forces: where these are among the numbers.
+    unknown: tasks of which the tables cannot tell whether they fit: those of one's own, moving ones, and postures.
     arguments: what `tick.tick` takes after q, v and `Given.numbers`, but for the answer and the parts to run.
     given: as it is without a state, zeros for what moves and nothing of one's own.
     workspace: real and whole numbers, memory of the tick.
@@ -95,7 +96,9 @@ class Compiled:
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics = problem, dynamics_of(robot)
         *tables, targets, self._moving = tables_of(problem)
-        self.own = Own(problem, self.dynamics)
+        self.own, moving = Own(problem, self.dynamics), {target.task for target in self._moving}
+        still = (CoMTask, OrientationTask, FrameTask, ForceTask, TorqueTask)
+        self.unknown = [task for i, task in enumerate(problem.tasks) if i in moving or type(task) not in still]
         self.given, self.n_targets = self.own.nothing(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)

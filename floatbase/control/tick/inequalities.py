@@ -25,6 +25,7 @@ class Inequalities(NamedTuple):
         Any  # (P (F + 1), 5), F facets, then -normal of each point: row of G for its force, length, where in λ its force starts
     )
     facets: Any  # F
+    points: Any  # P
     torque_limits: Any  # (d,), N·m
     given: Any  # what `own.Own` packed
     bounds: Any  # where in it P least and P largest normal forces start, N
@@ -79,7 +80,7 @@ def violated_force_row(limits: Inequalities, forces):
     """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they violate none."""
     cones, worst, found = limits.cones, FEASIBILITY_TOLERANCE, -1
     n_rows = limits.facets + 1
-    for i in range(cones.shape[0] // n_rows):
+    for i in range(limits.points):
         first, at = i * n_rows, int(cones[i * n_rows, 4])
         f = forces[at], forces[at + 1], forces[at + 2]
         row, excess = worst_facet(limits, first, f)
@@ -95,7 +96,7 @@ def violated_force_row(limits: Inequalities, forces):
 @jit_forced
 def force_rows_of(limits: Inequalities):
     """How many rows there are on forces."""
-    return limits.cones.shape[0] + limits.cones.shape[0] // (limits.facets + 1)
+    return limits.cones.shape[0] + limits.points
 
 
 @jit
@@ -105,12 +106,11 @@ def violated_late_row(limits: Inequalities, space: Space, beta, forces, tau, qdd
     forces, tau: (k,), (d,), those at β. qdd: (nv,), memory.
     """
     worst, found, known, cones = FEASIBILITY_TOLERANCE, -1, False, limits.cones
-    n_points = cones.shape[0] // (limits.facets + 1)
-    for i in range(n_points):
+    for i in range(limits.points):
         row = i * (limits.facets + 1) + limits.facets
         start = int(cones[row, 4])
         along = -dot(row_part(cones, row, 0), (forces[start], forces[start + 1], forces[start + 2]))
-        excess = along - limits.given[limits.bounds + n_points + i]
+        excess = along - limits.given[limits.bounds + limits.points + i]
         if excess > worst * cones[row, 3]:
             worst, found = excess / cones[row, 3], cones.shape[0] + i
     at, number, given = limits.first, force_rows_of(limits) + 2 * tau.size, limits.given
@@ -189,7 +189,7 @@ def row_in_beta(number, limits: Inequalities, space: Space, nv, out):
         n_rows, row, sign, bound = limits.facets + 1, number, 1.0, 0.0
         if number >= cone_rows:  # the largest normal force: the row of the least one, turned round
             row, sign = (number - cone_rows) * n_rows + limits.facets, -1.0
-            bound = limits.given[limits.bounds + force_rows - cone_rows + number - cone_rows]
+            bound = limits.given[limits.bounds + limits.points + number - cone_rows]
         elif number % n_rows == limits.facets:
             bound = -limits.given[limits.bounds + number // n_rows]
         first = nv + int(cones[row, 4])

@@ -46,6 +46,7 @@ class Own:
         self._contacts = [contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS]
         self.any = bool(self._tasks or self._contacts or self._limits.rows)
         self.changes = self.any or self._limits.move
+        self._bounds = _finite(self._limits.normal_forces(problem.contacts))
 
     def nothing(self, targets: Array) -> Given:
         """Targets, what still bounds of normal forces are, and otherwise as many zeros as a tick without a state needs."""
@@ -53,13 +54,13 @@ class Own:
         bounds = self._limits.normal_forces(contacts)
         own = sum(len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts)
         nothing = np.zeros(own + 3 * len(self._tasks) + 2 * len(self._limits.rows))
-        return Given(np.concatenate([targets, *_finite(bounds), nothing]), normal_forces=bounds)
+        return Given(np.concatenate([targets, *self._bounds, nothing]), normal_forces=bounds)
 
     def given(self, targets: Array, q: Array, v: Array, t: float) -> Given:
         """What a tick is given at a state. Raises `InputError`, or what functions of the owner's raise."""
         problem, limits = self._problem, self._limits
         bounds = limits.normal_forces(problem.contacts, t)
-        parts: list[npt.ArrayLike] = [targets, *_finite(bounds)]
+        parts: list[npt.ArrayLike] = [targets, *(_finite(bounds) if limits.move else self._bounds)]
         if not self.any:
             return Given(np.concatenate(parts), normal_forces=bounds)
         eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)

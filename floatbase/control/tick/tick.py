@@ -51,7 +51,7 @@ def unpack(nv, sizes, indices, numbers, given):
     rows, last = own_rows(given, first, sizes[10], nv, k, d)
     tasks = TaskTable(task_table, gains, take_matrix(numbers, n_tasks, 12), given, first, sizes[10], rows)
     cones, torque_limits = take_matrix(numbers, n_points * n_rows, 5), take_vector(numbers, d)
-    limits = Inequalities(cones, n_rows - 1, torque_limits, given, bounds, last, sizes[11], sizes[13] == 1)
+    limits = Inequalities(cones, n_rows - 1, n_points, torque_limits, given, bounds, last, sizes[11], sizes[13] == 1)
     return tree, links, contacts, tasks, limits
 
 
