@@ -1,7 +1,8 @@
 """The inequalities of (27)(28), G β ≤ h, which are written out only for the rows that β violates.
 
 Rows are numbered: F facets and the least normal force of each of P points, then their P largest normal forces, d upper torque
-limits, d lower ones, and the rows of one's own.
+limits, d lower ones, and the rows of one's own. What every problem needs is compiled into the search (`jit_forced`), what few
+need is not: left to itself, the compiler takes in neither, and a tick with many active rows takes 6 % longer.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def worst_facet(limits: Inequalities, first, f):
     return found, worst
 
 
-@jit
+@jit_forced
 def violated_force_row(limits: Inequalities, forces):
     """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they violate none."""
     cones, worst, found = limits.cones, FEASIBILITY_TOLERANCE, -1
@@ -133,7 +134,7 @@ def violated_late_row(limits: Inequalities, space: Space, beta, forces, tau, qdd
     return found
 
 
-@jit
+@jit_forced
 def violated_row(limits: Inequalities, space: Space, beta, forces, tau, qdd):
     """The number of a row of (27)(28) that β (nb,) violates, -1 for none; forces (k,), tau (d,), qdd (nv,): memory.
 
@@ -177,7 +178,7 @@ def own_row_in_beta(number, limits: Inequalities, space: Space, nv, out):
     return bound
 
 
-@jit
+@jit_forced
 def row_in_beta(number, limits: Inequalities, space: Space, nv, out):
     """A row of (27)(28) by its number: out (nb,) = its row of G. Returns its bound in h."""
     V, T, cones = space.V, space.T, limits.cones
