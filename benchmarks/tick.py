@@ -22,6 +22,8 @@ from pathlib import Path
 import numpy as np
 
 import floatbase as fb
+from floatbase.control import Rows
+from floatbase.dynamics import EquationsOfMotion, LinearConstraint
 from floatbase.errors import InfeasibleError
 
 HERE = Path(__file__).parent
@@ -97,11 +99,49 @@ def parts(n: int) -> Iterator[str]:
             spent = []
             for q, v in states(robot, n, spread):
                 update = clock(compiled.dynamics.update, [(q, v)] * 5)
-                given = (q, v, compiled.targets, *compiled.arguments, numbers)
+                given = (q, v, compiled.given.numbers, *compiled.arguments, numbers)
                 ticks = [clock(tick.tick, [(*given, last)] * 5) for last in range(1, tick.PARTS + 1)]
                 ends = [np.min(times) for times in (update, *ticks, clock(command, [(q, v)] * 5))]
                 spent.append([ends[0], *np.diff([0.0, *ends[1:-1]]), ends[-1] - ends[0] - ends[-2]])
             yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0)) + " |"
+
+
+class OwnCoM:
+    """`fb.CoMTask` as a user writes it."""
+
+    name, weight, block = "my centre of mass", 10.0, "qdd"
+
+    def __init__(self, target: np.ndarray):
+        self.target = target
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        s = eom.state
+        desired = -100.0 * (s.com - self.target) - 20.0 * s.com_velocity
+        return fb.Affine(s.com_jacobian, s.com_drift - desired)
+
+
+def own(n: int) -> Iterator[str]:
+    """The same problem with the package's task for the centre of mass, with a user's, and with rows and a constraint beside."""
+    yield "| robot | states | package's tasks | own task | own task and 2 rows | own constraint | own task, readable |"
+    yield "|---" * 7 + "|"
+    for name in ROBOTS:
+        robot = fb.load(name)
+        at, feet = robot.standing(), fb.Contacts.feet(robot)
+        joint = np.eye(robot.nv)[-1:]
+        tasks = fb.standing_tasks(at)
+        mine = [OwnCoM(at.com), *tasks[1:]]
+        rows = Rows("acceleration", "qdd", (np.vstack([joint, -joint]), np.full(2, 50.0)))
+        held = feet + fb.Contacts([LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))])
+        ways = [
+            fb.WholeBodyController(robot, feet, tasks, path="compiled"),
+            fb.WholeBodyController(robot, feet, mine, path="compiled"),
+            fb.WholeBodyController(robot, feet, mine, rows=[rows], path="compiled"),
+            fb.WholeBodyController(robot, held, tasks, path="compiled"),
+            fb.WholeBodyController(robot, feet, mine, path="readable"),
+        ]
+        for label in ("easy", "saturated"):
+            medians = [np.median(times) for times in interleaved(ways, states(robot, n, SPREADS[label]), 3)]
+            yield f"| {name} | {label} | " + " | ".join(f"{median:.1f} µs" for median in medians) + " |"
 
 
 # growth --------------------------------------------------------------------------------------------------------------------
@@ -235,6 +275,7 @@ def main() -> None:
         *parts(options.states // 4),
         "",
     ]
+    lines += ["What a user writes, run at every tick beside the compiled one (median):", "", *own(options.states // 4), ""]
     lines += ["Growth, median tick (tick.png):", "", "| what | number | easy | saturated |", "|---|---|---|---|"]
     lines += [f"| {what} | {x} | {a:.1f} µs | {b:.1f} µs |" for what, rows in curves.items() for x, a, b in rows]
     lines.append("")
