@@ -12,7 +12,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
-from floatbase._arrays import Array, positive, read_only
+from floatbase._arrays import Array, Value, checked, positive, read_only
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationError
 from floatbase.friction import wrench_set
@@ -28,7 +28,7 @@ _LEVEL = 1e-9  # least cosine between direction and an edge's normal: less is an
 
 
 @dataclass(frozen=True, eq=False)
-class PushRose:
+class PushRose(Value):
     """The largest push that was survived in each of n directions, and theory's curves beside it. All pushes are in N.
 
     directions: (n,) rad, of the pushes, in the world's horizontal plane, from x towards y.
@@ -48,6 +48,11 @@ class PushRose:
     frame: str
     state: State
     contacts: Contacts
+
+    def __post_init__(self) -> None:
+        directions = checked("directions", self.directions, (None,), "rad")
+        object.__setattr__(self, "directions", directions)
+        object.__setattr__(self, "pushes", checked("pushes", self.pushes, directions.shape, "N"))
 
     @cached_property
     def unit_vectors(self) -> Array:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._arrays import Value
 from floatbase.errors import InputError, unknown_name
 
 RESERVED = ("point", "error")  # names of the store's own
@@ -22,7 +23,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(Value):
     """Rows with named columns: one row for each point of a sweep's grid, in the grid's order.
 
     rows: name -> value, for each point: its parameters, then what the function returned, then "error": None, or type and
@@ -59,7 +60,7 @@ class Table:
 
     def __getitem__(self, column: str) -> npt.NDArray[Any]:
         """A column as a read-only array; where a row has no number there is NaN, where it has nothing else None."""
-        if column not in self.columns:
+        if not isinstance(column, str) or column not in self.columns:
             raise unknown_name("column", column, self.columns)
         values = [row.get(column) for row in self.rows]
         if any(_is_number(value) for value in values):

@@ -442,10 +442,10 @@ def make(**options: object) -> Callable[[], object]:
         (make(max_normal_force={"FL_foot": -1.0}), InputError, "max_normal_force of FL_foot is -1; it must be ≥ 0 N"),
         (make(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "unknown contact in min_normal_force 'FL_fot'; .*FL_foot"),
         (make(min_normal_force={"FL_foot": lambda t: -1.0}), InputError, "min_normal_force of FL_foot is -1; it must be ≥ 0 N"),
-        (make(rows=Rows("r", "tau", (np.eye(12), np.ones(12)))), InputError, "rows must be a list of Rows, not Rows"),
-        (make(rows=[np.eye(12)]), InputError, "rows must hold Rows, as floatbase.control.Rows"),
+        (make(rows=Rows("r", "tau", (np.eye(12), np.ones(12)))), InputError, "rows must be a list of Rows, not a Rows"),
+        (make(rows=[np.eye(12)]), InputError, "each of rows must be a Rows, as floatbase.control.Rows"),
         (lambda: Rows("r", "lambda", (np.eye(12), np.ones(12))), InputError, "rows 'r' have block 'lambda'; it must be"),
-        (lambda: Rows("r", "tau", np.eye(12)), InputError, r"rows 'r' must be G and h, as in \(G, h\), not ndarray"),
+        (lambda: Rows("r", "tau", np.eye(12)), InputError, r"rows 'r' must be G and h, as in \(G, h\), not an array"),
         (
             lambda: Rows("r", "tau", (np.eye(12), np.ones(3))),
             InputError,
