@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import mmap
 import socket
 import sys
 from pathlib import Path
@@ -104,8 +105,12 @@ def test_a_short_soak_holds(name, monkeypatch):
 def test_a_soak_tells_what_stays_and_what_breaks(monkeypatch):
     kept = []
 
+    def leak():
+        kept.append((mmap.mmap(-1, 2_000_000), socket.socket()))  # memory of its own: an array might take some that was freed
+        kept[-1][0].write(bytes(2_000_000))
+
     def leaking():
-        yield lambda: kept.append((np.ones(250_000), socket.socket()))
+        yield leak
 
     def breaks():
         def step():
