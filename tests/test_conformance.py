@@ -97,6 +97,7 @@ NO_LIMIT = {"inf", "1e300", "1e308", "10**400"}
 ACCEPTED: dict[str, set[str]] = {
     "Problem.contacts": {"of another robot"}, "force_of.forces": {"NaN inside"}, "friction_used.forces": {"NaN inside"},
     "on_status.listener": {"None"}, "max_normal_force": NO_LIMIT, "flat_feet.mu": {"one too many"},
+    "Limits.min_normal_force": {"dict"}, "Limits.max_normal_force": {"dict", "inf", "1e300", "1e308", "10**400"},
     "Problem.robot": {"of another robot"}, "torque_limits": NO_LIMIT, "Limits.torque_limits": NO_LIMIT | ANY_LENGTH,
     "Affine.constant.b": ANY_LENGTH, "Affine.__call__.x": {"column"}, "ConstantTorques.tau": ANY_LENGTH,
     "ForceTask.target": ANY_LENGTH, "TorqueTask.target": ANY_LENGTH, "PostureTask.q": ANY_LENGTH,
@@ -173,6 +174,7 @@ LEFT_OUT = {
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
         "vertices", "conflicting_rows", "linear_program", "nearest_rotation", "QP.objective", "Rows.labels",
+        "Rows.at", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
         "recording.checked_rollout",

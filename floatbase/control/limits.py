@@ -43,10 +43,10 @@ class Rows(Value):
 
     def __post_init__(self) -> None:
         text("name of the rows", self.name)
-        if self.block not in BLOCKS:
+        if text("block of the rows", self.block) not in BLOCKS:
             raise InputError(f'rows {self.name!r} have block {said(self.block)}; it must be "qdd", "tau" or "forces".')
         object.__setattr__(self, "owners", texts(f"owners of {self.name}", self.owners))
-        if not callable(self.rows):
+        if not callable(self.rows) or isinstance(self.rows, type):
             object.__setattr__(self, "rows", self._checked(self.rows, None))
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
@@ -65,7 +65,7 @@ class Rows(Value):
         return tuple(RowLabel(f"{self.name} {i}" if m > 1 else self.name, "rows", self.name, i) for i in range(m))
 
     def _checked(self, given: RowsAt, n: int | None) -> tuple[Array, Array]:
-        if not isinstance(given, tuple) or len(given) != 2:
+        if not isinstance(given, tuple | list) or len(given) != 2:
             raise InputError(f"rows {self.name!r} must be G and h, as in (G, h), not {said(given)}.")
         G = checked(f"G of {self.name}", given[0], (None, n))
         return G, checked(f"h of {self.name}", given[1], (len(G),))
