@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -64,7 +64,7 @@ class Rows(Value):
             return tuple(RowLabel(f"{self.name} {owner}", self.name, owner) for owner in self.owners)
         return tuple(RowLabel(f"{self.name} {i}" if m > 1 else self.name, "rows", self.name, i) for i in range(m))
 
-    def _checked(self, given: RowsAt, n: int | None) -> tuple[Array, Array]:
+    def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
         if not isinstance(given, tuple | list) or len(given) != 2:
             raise InputError(f"rows {self.name!r} must be G and h, as in (G, h), not {said(given)}.")
         G = checked(f"G of {self.name}", given[0], (None, n))
