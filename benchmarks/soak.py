@@ -32,6 +32,8 @@ import psutil
 from soak_learner import kills
 
 import floatbase as fb
+from floatbase.control import Rows
+from floatbase.dynamics import EquationsOfMotion
 
 # how much may stay in all: MB, because the allocator keeps freed memory for later; and a connection that is being closed
 LIMITS = {"memory, MB": 8.0, "threads": 1.0, "descriptors": 2.0}
@@ -53,6 +55,36 @@ def ticks() -> Soak:
     """The controller at states around standing."""
     robot = fb.load("go2")
     controller, states = stander(robot), cycle([robot.random_state(seed, 0.1) for seed in range(1000)])
+
+    def step() -> None:
+        state = next(states)
+        controller(state.q, state.v)
+
+    yield step
+
+
+class Height:
+    """A task of one's own: the height of the centre of mass."""
+
+    name, weight, block = "height", 10.0, "qdd"
+
+    def __init__(self, height: float) -> None:
+        self.height = height
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        s = eom.state
+        desired = 100.0 * (self.height - s.com[2:]) - 20.0 * s.com_velocity[2:]
+        return fb.Affine(s.com_jacobian[2:], s.com_drift[2:] - desired)
+
+
+def own() -> Soak:
+    """The controller with a task, rows and a bound of one's own."""
+    robot = fb.load("go2")
+    at, contacts = robot.standing(), fb.Contacts.feet(robot)
+    rows = Rows("acceleration", "qdd", lambda eom, t: (np.eye(eom.nv)[6:], np.full(eom.d, 50.0)))
+    options: dict[str, Any] = {"rows": [rows], "max_normal_force": {"FL_foot": lambda t: 40.0}, "path": "compiled"}
+    controller = fb.WholeBodyController(robot, contacts, [Height(at.com[2]), *fb.standing_tasks(at)], **options)
+    states = cycle([robot.random_state(seed, 0.05) for seed in range(1000)])
 
     def step() -> None:
         state = next(states)
@@ -171,6 +203,7 @@ def wait_for(condition: Callable[[], bool], otherwise: str) -> None:
 # what is done, and how many times
 SOAKS: dict[str, tuple[Callable[[], Soak], int]] = {
     "ticks": (ticks, 1_000_000),
+    "own": (own, 1_000_000),
     "infeasible": (infeasible, 2_000),
     "rollouts": (rollouts, 2_000),
     "viewer": (viewer, 100_000),

@@ -13,7 +13,7 @@ Robots        catalogue, load, load_urdf, Robot, State
 Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accelerations_from_torques (14), feasible_space (13)
 Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask, TorqueTask, standing_tasks
 Control       WholeBodyController (26)(27), QP, solve
-Simulation    Simulation, Ground, Push, rollout, Rollout
+Simulation    Simulation, Ground, Push, rollout, Rollout, sweep, push_rose
 Pictures      Viewer
 Errors        FloatbaseError, InfeasibleError
 
@@ -49,7 +49,7 @@ from floatbase.qp import QP, solve
 from floatbase.robots import Robot, State, catalogue, load, load_urdf
 
 if TYPE_CHECKING:
-    from floatbase.simulation import Ground, Push, Rollout, Simulation, rollout
+    from floatbase.simulation import Ground, Push, Rollout, Simulation, push_rose, rollout, sweep
     from floatbase.viewer import Viewer
 
 __version__ = "0.2.0"
@@ -61,7 +61,9 @@ _LAZY = {
     "Rollout": "floatbase.simulation",
     "Simulation": "floatbase.simulation",
     "Viewer": "floatbase.viewer",
+    "push_rose": "floatbase.simulation",
     "rollout": "floatbase.simulation",
+    "sweep": "floatbase.simulation",
 }
 
 __all__ = [
@@ -92,9 +94,11 @@ __all__ = [
     "forces_from_torques",
     "load",
     "load_urdf",
+    "push_rose",
     "rollout",
     "solve",
     "standing_tasks",
+    "sweep",
 ]
 
 

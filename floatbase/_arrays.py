@@ -154,10 +154,19 @@ def whole(name: str, value: Any, least: int, most: int, why: str = "") -> int:
 
 
 def read_only(value: Any) -> Array:
-    """A float64 copy of `value` that cannot be written to."""
+    """`value` as a float64 array that cannot be written to: a copy, unless it is one already."""
+    if _is_read_only(value):
+        return value
     array = np.array(value, dtype=np.float64)
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
+
+
+def _is_read_only(value: Any) -> bool:
+    """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one that can."""
+    if type(value) is not np.ndarray or value.dtype is not _FLOAT64 or value.flags.writeable or not value.flags.c_contiguous:
+        return False
+    return value.base is None or (type(value.base) is np.ndarray and not value.base.flags.writeable)
 
 
 def plain_numbers(value: Any) -> Array | None:
@@ -174,23 +183,25 @@ def plain_numbers(value: Any) -> Array | None:
 
 
 def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
-    """A read-only copy of `value`, after checking that it holds plain numbers of `shape` (None = any length), finite ones.
+    """`value`, `read_only`, after checking that it holds plain numbers of `shape` (None = any length), finite ones.
 
     Raises `InputError` with the name, the shape found and the shape required.
     """
-    array = plain_numbers(value)
+    array = value if _is_read_only(value) else plain_numbers(value)
     if array is None:
         required = f"numbers of shape {_text(shape)}" if shape else "a number"
         raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {said(value)}.")
-    fits = array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
+    fits = array.shape == shape or (
+        array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
+    )
     if not fits:
         raise InputError(f"{name} has shape {array.shape}; it must have shape {_text(shape)}{f' ({unit})' if unit else ''}.")
-    usual = np.abs(array) <= LARGEST  # False for NaN too
-    if not usual.all():
+    # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger, the entries decide
+    if not (np.vdot(array, array) <= LARGEST**2 or (usual := np.abs(array) <= LARGEST).all()):
         at = tuple(np.argwhere(~usual)[0].tolist())
         place = f"holds {array[at]:g} at index {list(at)}; every entry must be" if shape else f"is {array[at]:g}; it must be"
         raise InputError(f"{name} {place} a finite number{f' of at most {LARGEST:g}' if np.isfinite(array[at]) else ''}.")
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 
@@ -250,7 +261,8 @@ def unit_vector(name: str, value: Any) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """a × b of two vectors, shape (3,); numpy's own takes twenty times as long on three numbers."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
 def _text(shape: tuple[int | None, ...]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -16,6 +17,8 @@ MOST_VARIABLES = 10_000  # a matrix with as many rows and columns takes 0.8 GB
 FLAT = 1e-12  # curvature below this part of the largest counts as none
 _CONCAVE = 1e-9  # part of the largest curvature that one may be negative by: rounding of pullbacks
 _SLOPE = 1e-7  # part of 1 + the largest |g| that a slope without curvature may have: rounding of pullbacks
+
+_NO_BLOCKS: Mapping[str, slice] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +48,7 @@ class Affine(Value):
     @staticmethod
     def identity(n: int) -> Affine:
         """The map x -> x on R^n."""
-        return Affine(np.eye(size("n", n)), np.zeros(size("n", n)))
+        return _identity(size("n", n))
 
     @staticmethod
     def constant(b: npt.ArrayLike, n: int) -> Affine:
@@ -252,8 +255,15 @@ def size(name: str, n: int) -> int:
     return whole(name, n, 0, MOST_VARIABLES, "more make matrices that no memory holds")
 
 
+@lru_cache(maxsize=64)
+def _identity(n: int) -> Affine:
+    return Affine(np.eye(n), np.zeros(n))
+
+
 def block_slices(blocks: Mapping[str, slice]) -> Mapping[str, slice]:
     """A read-only copy of names of slices, checked."""
+    if type(blocks) is dict and not blocks:
+        return _NO_BLOCKS  # most maps have none
     if isinstance(blocks, Mapping) and all(isinstance(k, str) and isinstance(v, slice) for k, v in blocks.items()):
         return MappingProxyType(dict(blocks))
     raise InputError(f'blocks must be names of slices, as {{"tau": slice(0, 12)}}, not {said(blocks)}.')

@@ -97,6 +97,7 @@ NO_LIMIT = {"inf", "1e300", "1e308", "10**400"}
 ACCEPTED: dict[str, set[str]] = {
     "Problem.contacts": {"of another robot"}, "force_of.forces": {"NaN inside"}, "friction_used.forces": {"NaN inside"},
     "on_status.listener": {"None"}, "max_normal_force": NO_LIMIT, "flat_feet.mu": {"one too many"},
+    "Limits.min_normal_force": {"dict"}, "Limits.max_normal_force": {"dict", "inf", "1e300", "1e308", "10**400"},
     "Problem.robot": {"of another robot"}, "torque_limits": NO_LIMIT, "Limits.torque_limits": NO_LIMIT | ANY_LENGTH,
     "Affine.constant.b": ANY_LENGTH, "Affine.__call__.x": {"column"}, "ConstantTorques.tau": ANY_LENGTH,
     "ForceTask.target": ANY_LENGTH, "TorqueTask.target": ANY_LENGTH, "PostureTask.q": ANY_LENGTH,
@@ -111,7 +112,8 @@ EXAMPLES: dict[str, Any] = {
     "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
     "plots.plot_torques.axis": AXES, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,
-    "bulk_modulus": 1.3e9, "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,
+    "bulk_modulus": 1.3e9,
+    "column": "force", "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,
     "changed": lambda value: None, "AnalyticController.com": STATE.com, "com": True, "com_acceleration": UP,
     "WrenchSet.cones": VALUES["WrenchSet"].cones, "cones": True, "contact": "FL_foot", "contacts": CONTACTS,
     "control_period": 0.002, "controller": CONTROLLER, "corners": TALOS.feet[0].corners,
@@ -143,7 +145,9 @@ EXAMPLES: dict[str, Any] = {
     "cost_on_space.qdd": fb.Quadratic.zero(18), "qdd": np.zeros(18), "qp": QP, "inward_acceleration.r": UP, "r": ZERO,
     "radius": 0.02, "rate": 30.0, "rated_drop": 70e5, "rated_flow": 1.25e-4, "residual": fb.Affine(np.eye(12), ZERO),
     "Contacts.flat_feet.robot": TALOS, "robot": ROBOT, "unbolted.robot": judges.load("ur5"), "rod": 0.01, "rollout": RECORD,
-    "root": "/robot", "rotation": np.eye(3), "row": 0, "rows": lambda state, t: None, "scale": 0.004, "seed": 3, "seen": 0.4,
+    "root": "/robot", "owners": [f"joint {i}" for i in range(12)], "rotation": np.eye(3), "row": 0,
+    "LinearConstraint.rows": lambda state, t: None, "Rows.rows": lambda eom, t: (np.eye(18), np.ones(18)), "rows": (),
+    "scale": 0.004, "seed": 3, "seen": 0.4,
     "show": lambda record: None, "sim": SIM, "Cylinders.size": np.ones(12), "solver": "daqp", "space": SPACE, "speed": 1.0,
     "spread": 0.2, "WrenchSet.reach.start": 150.0 * np.eye(6)[2], "active_set.start": np.zeros(QP.n), "start": 0.1,
     "state": STATE, "status": "inside", "step": 0.1, "stiffness": 100.0, "supply_pressure": 160e5, "support": True, "t": 0.5,
@@ -159,6 +163,7 @@ RESULTS = {
     "EquationsOfMotion": "equations_of_motion", "FeasibleSpace": "feasible_space", "Rollout": "rollout", "Solution": "solve",
     "Iteration": "active_set", "ActiveSetRun": "active_set", "Residuals": "Solution.residuals", "Decomposition": "decompose",
     "TorqueForForces": "torque_for_forces", "Pose": "Cylinders.pose", "Power": "Cylinders.power", "Robot": "load",
+    "PushRose": "push_rose", "Table": "sweep",
     "AnalyticCommand": "AnalyticController", "Command": "WholeBodyController", "Verdict": "check", "Piece": "urdf_visuals",
     "Item": "shapes", "RowLabel": "QP", "recording.Animation": "animate", "OilState": "HydraulicActuators",
 }  # fmt: skip
@@ -168,7 +173,8 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
-        "vertices", "conflicting_rows", "linear_program", "nearest_rotation", "with_equality_multipliers", "QP.objective",
+        "vertices", "conflicting_rows", "linear_program", "nearest_rotation", "QP.objective", "Rows.labels",
+        "Rows.at", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
         "recording.checked_rollout",
@@ -181,6 +187,7 @@ LEFT_OUT = {
             for method in ("positions", "jacobian", "constraint", "generators", "slip")),
     ),
     "ends what other calls need": ("Viewer.close", "Live.close"),
+    "starts processes, with tests of its own": ("sweep", "push_rose", "Table.read"),
     "starts a thread": ("Live.push", "Live.start", "Live.reset"),
 }  # fmt: skip
 ALONE = {name for names in LEFT_OUT.values() for name in names}

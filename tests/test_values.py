@@ -19,7 +19,7 @@ import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.control import AnalyticController
 
-WITHOUT_ARRAYS = ("ActiveSetRun", "FeasibleSpace", "Problem", "Residuals")
+WITHOUT_ARRAYS = ("ActiveSetRun", "FeasibleSpace", "Problem", "Residuals", "Rows", "Table")
 NO_VALUES = {
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators Simulation WholeBodyController",
     "a text": "RowLabel",

@@ -7,11 +7,12 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
-from floatbase.control import AnalyticController
+from floatbase.control import AnalyticController, Rows
 from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_frame, moving_frame, seen_from_turning_frame
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torque_for_forces
 from floatbase.qp import active_set, table_top
+from floatbase.simulation import PushRose, Table
 
 UP = np.array([0.0, 0.0, 1.0])
 ROBOT = judges.load("go2")
@@ -42,5 +43,7 @@ VALUES = {
     "OilState": HYDRAULIC.state, "Pose": POSE,
     "Power": HYDRAULIC.cylinders.power(np.zeros(12), HYDRAULIC.state.pressures, POSE, np.zeros(12)),
     "bias forces": bias_forces(STATE), "contact space": contact_space(EOM), "drive": moving_frame("base", np.zeros_like),
+    "Rows": Rows("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
+    "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", STATE, CONTACTS),
     "turning view": seen_from_turning_frame([0.0, 0.1], UP, UP),
 }  # fmt: skip

@@ -3,13 +3,15 @@
 from floatbase.control.analytic import AnalyticController
 from floatbase.control.command import Command
 from floatbase.control.controller import WholeBodyController
-from floatbase.control.problem import Limits, Problem, build_qp
+from floatbase.control.limits import Limits, Rows
+from floatbase.control.problem import Problem, build_qp
 
 __all__ = [
     "AnalyticController",
     "Command",
     "Limits",
     "Problem",
+    "Rows",
     "WholeBodyController",
     "build_qp",
 ]

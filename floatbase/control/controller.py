@@ -5,24 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar, Literal, TypeAlias, get_args
+from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
 import numpy.typing as npt
 
 from floatbase._arrays import LARGEST, Array, Fixed, checked, number, of_kind, plain_numbers, read_only
 from floatbase.control.command import Command
-from floatbase.control.problem import Limits, Problem, build_qp
-from floatbase.control.tick import Compiled, cache_warning, obstacle
-from floatbase.dynamics import Contacts, equations_of_motion
+from floatbase.control.limits import Limits, NormalForces, Rows
+from floatbase.control.problem import Problem
+from floatbase.control.tick import Compiled, Given, cache_warning, obstacle
+from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives import Task
-from floatbase.qp import QP, Solution, check_solver, solve, with_equality_multipliers
+from floatbase.qp import QP, Solution, check_solver, solve
 from floatbase.robots import Robot, State, torque_limits_of
 
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
 _ANOTHER = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
-_OPTIONS = ("facets", "inside", "min_normal_force", "torque_limits", "solver", "path")
+_OPTIONS = ("facets", "inside", "min_normal_force", "max_normal_force", "torque_limits", "rows", "solver", "path")
 
 
 class WholeBodyController(Fixed):
@@ -33,11 +34,13 @@ class WholeBodyController(Fixed):
     tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none acts on forces, or
         none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added, so that the optimum is unique.
     facets, inside: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
-    min_normal_force: N, at every contact point.
+    min_normal_force, max_normal_force: N, at every contact point; one number, or a mapping from the name of a contact to a
+        number or a function of t: a foot that is unloaded.
     torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.
+    rows: inequality rows of one's own on q̈, τ or λ, see `floatbase.control.Rows`.
     solver: one of `floatbase.qp.solvers()`.
     path: "readable" assembles and solves the QP as it is written. "compiled" solves the same problem many times faster
-        (`floatbase.control.tick`), where tasks and contacts are the package's own. "auto" takes compiled where it can.
+        (`floatbase.control.tick`), with tasks, constraints and rows of one's own too. "auto" takes compiled where it can.
 
     The attribute `path` says which way runs, `path_reason` why. `problem` is what is solved. The first compiled controller ever
     compiles for about a minute, unless the set-up did (`python -m floatbase compile`). Later ones load what was compiled,
@@ -50,9 +53,9 @@ class WholeBodyController(Fixed):
     """
 
     _instead: ClassVar[dict[str, str]] = {
-        **{name: f"controller.replace({name}=…) is a new one that has it" for name in ("contacts", "tasks")},
+        **{name: f"controller.replace({name}=…) is a new one that has it" for name in ("contacts", "tasks", "limits")},
         **{name: _ANOTHER.format(name) for name in _OPTIONS},
-        **dict.fromkeys(("robot", "limits", "problem", "compiled", "path_reason", "requested_path"), _ANOTHER.format("…")),
+        **dict.fromkeys(("robot", "problem", "compiled", "path_reason", "requested_path"), _ANOTHER.format("…")),
     }
 
     def __init__(
@@ -63,14 +66,17 @@ class WholeBodyController(Fixed):
         *,
         facets: int = 4,
         inside: bool = True,
-        min_normal_force: float = 0.0,
+        min_normal_force: NormalForces = 0.0,
+        max_normal_force: NormalForces | None = None,
         torque_limits: npt.ArrayLike | None = None,
+        rows: Sequence[Rows] = (),
         solver: str = "daqp",
         path: Path = "auto",
     ):
         of_kind("robot", robot, Robot)
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
-        problem = Problem(robot, contacts, tasks, Limits(limits, facets, inside, min_normal_force))
+        bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows)
+        problem = Problem(robot, contacts, tasks, bounds)
         problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
         self._prepare(problem, solver, path)
 
@@ -88,7 +94,7 @@ class WholeBodyController(Fixed):
             raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
         self.compiled = None if reason else compiled
         self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
-        self.path_reason = reason or "the tasks and contacts are the package's own" + cache_warning()
+        self.path_reason = reason or "nothing stands in its way" + cache_warning()
         self._made = True
 
     def __getstate__(self) -> tuple[Problem, str, Path]:
@@ -148,23 +154,25 @@ class WholeBodyController(Fixed):
         solution = partial(self._solution_of, at, moving, t, *answer)
         return Command(numbers[tick.tau], numbers[tick.qdd], numbers[tick.forces], self.contacts, "compiled", solution)
 
-    def _solution_of(self, q: Array, v: Array, t: float, numbers: Array, n_active: int, targets: Array) -> Solution:
+    def _solution_of(self, q: Array, v: Array, t: float, numbers: Array, n_active: int, given: Given) -> Solution:
         """The readable problem at q, v and t, with what `Compiled.__call__` returned for them as its solution."""
         tick = self.compiled
         assert tick is not None  # it answered
-        eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
-        qp = build_qp(eom, tick.tasks(targets), self.limits, t)
-        x, mu = numbers[: tick.forces.stop], tick.multipliers(numbers, n_active)
-        return with_equality_multipliers(qp, x, mu, "compiled", n_active)
+        x, mu = numbers[: tick.forces.stop], tick.multipliers(numbers, n_active, given)
+        return Solution(tick.qp(q, v, t, given), x, mu, "compiled", n_active)
 
-    def replace(self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None) -> WholeBodyController:
-        """A new controller with other contacts or tasks and everything else as here; cheap enough for the loop."""
-        contacts = self.contacts if contacts is None else contacts
-        problem = replace(self.problem, contacts=contacts, tasks=self.tasks if tasks is None else tasks)
+    def replace(
+        self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None, limits: Limits | None = None
+    ) -> WholeBodyController:
+        """A new controller with other contacts, tasks or limits and everything else as here; cheap enough for the loop."""
+        new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
+        problem = replace(self.problem, **{name: value for name, value in new.items() if value is not None})
         other = object.__new__(type(self))
         other._prepare(problem, self.solver, self.requested_path, warm_up=self.compiled is None)
-        if tasks is not None or other.compiled is None:  # the compiled tick's tables found that known tasks fit new contacts
-            problem.qp(self.robot.standing())
+        if other.compiled is None:
+            problem.check()
+        elif tasks is not None or limits is not None or other.compiled.own.any:  # what its tables have not found to fit
+            problem.check(other.compiled.unknown)
         return other
 
     def __repr__(self) -> str:

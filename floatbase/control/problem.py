@@ -5,48 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import cast
+from typing import TypeAlias, cast
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, of_kind, plain_numbers, positive, read_only, said
+from floatbase._arrays import Array, Value, of_kind, positive, said
 from floatbase.affine import Affine
-from floatbase.dynamics import MOTION_NOISE, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
+from floatbase.control.limits import BLOCKS, Limits, force_bounds, force_rows, torque_rows
+from floatbase.dynamics import MOTION_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError
-from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import ForceTask, Task, TorqueTask
 from floatbase.qp import QP, RowLabel
 from floatbase.robots import Robot, State, torque_limits_of
 
-BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
+Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
 _PARTS_OF_A_TASK = ("block", "name", "weight", "residual")
 INCONSISTENT = 1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
-
-
-@dataclass(frozen=True, eq=False)
-class Limits(Value):
-    """The inequalities of (27).
-
-    torque_limits: shape (d,), N·m, +inf where there is none.
-    facets: number of facets of the friction polyhedron (28) of every contact point.
-    inside: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
-    min_normal_force: N, least normal · f at every contact point.
-
-    Raises `InputError` for values that do not fit.
-    """
-
-    torque_limits: Array
-    facets: int = 4
-    inside: bool = True
-    min_normal_force: float = 0.0
-
-    def __post_init__(self) -> None:
-        limits = plain_numbers(self.torque_limits)
-        object.__setattr__(self, "torque_limits", torque_limits_of(1 if limits is None else limits.size, self.torque_limits))
-        object.__setattr__(self, "min_normal_force", positive("min_normal_force", self.min_normal_force, "N", allow_zero=True))
-        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets, self.inside)
-        for name in ("facets", "inside"):
-            object.__setattr__(self, name, getattr(polyhedron, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +47,18 @@ class Problem(Value):
             raise InputError(f"the state belongs to another robot, {state.robot!r}, than the problem, {self.robot!r}.")
         return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t)
 
+    def check(self, tasks: Sequence[Task] | None = None) -> None:
+        """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and make no QP.
+
+        tasks: those to check, all by default.
+        """
+        eom = _standing(self.robot, self.contacts)
+        for task in self.tasks if tasks is None else tasks:
+            residual_of(task, eom)
+        self.limits.normal_forces(self.contacts)
+        for rows in self.limits.rows:
+            rows.labels(len(rows.at(eom)[0]))
+
 
 def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
@@ -93,23 +79,54 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     of_kind("limits", limits, Limits)
     if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
+    costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
+    return assemble_qp(eom, costs, limits, limits.normal_forces(eom.contacts, t), [rows.at(eom, t) for rows in limits.rows])
+
+
+def assemble_qp(
+    eom: EquationsOfMotion,
+    costs: Costs,
+    limits: Limits,
+    normal_forces: tuple[Array, Array],
+    rows: Sequence[tuple[Array, Array]],
+) -> QP:
+    """`build_qp` from what is known at the state: one array or residual for each function.
+
+    costs: block, weight and residual of each task.
+    normal_forces: least and largest of every point, (P,), N.
+    rows: G and h of each of `limits.rows`.
+    """
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
     n = nv + d + k
     H, g = np.zeros((n, n)), np.zeros(n)
-    for task in tasks:
-        block, residual = blocks[task.block], _residual(task, eom, t)
-        H[block, block] += task.weight * residual.A.T @ residual.A
-        g[block] += task.weight * residual.A.T @ residual.b
+    for each, weight, residual in costs:
+        block = blocks[each]
+        H[block, block] += weight * residual.A.T @ residual.A
+        g[block] += weight * residual.A.T @ residual.b
     motion, b = _motion_rows(eom)
-    A = np.block([[eom.M, -eom.S, -eom.J.T], [motion, np.zeros((len(motion), d + k))]])
-    G_force, h_force, force_names = _force_rows(eom.contacts, limits)
-    G_torque, h_torque, torque_names = _torque_rows(eom.robot, limits)
-    G = np.zeros((len(G_force) + len(G_torque), n))
-    G[: len(G_force), blocks["forces"]] = G_force
-    G[len(G_force) :, blocks["tau"]] = G_torque
-    b, h = np.concatenate([-eom.h, b]), np.concatenate([h_force, h_torque])
-    return QP(H, g, A, b, G, h, _equality_names(eom.robot, eom.contacts), force_names + torque_names, blocks)
+    A = np.vstack([np.hstack([eom.M, -eom.S, -eom.J.T]), np.hstack([motion, np.zeros((len(motion), d + k))])])
+    G_force, names = force_rows(eom.contacts, limits)
+    G_torque, h_torque, torque_names = torque_rows(eom.robot, limits)
+    parts: list[tuple[Block, Array, Array]] = [
+        ("forces", G_force, force_bounds(eom.contacts, limits, *normal_forces)),
+        ("tau", G_torque, h_torque),
+    ]
+    names += torque_names
+    for own, (G_own, h_own) in zip(limits.rows, rows, strict=True):
+        parts.append((own.block, G_own, h_own))
+        names += own.labels(len(G_own))
+    G, h, first = np.zeros((len(names), n)), np.concatenate([part[2] for part in parts]), 0
+    for each, G_part, _ in parts:
+        G[first : first + len(G_part), blocks[each]] = G_part
+        first += len(G_part)
+    return QP(H, g, A, np.concatenate([-eom.h, b]), G, h, _equality_names(eom.robot, eom.contacts), names, blocks)
+
+
+@lru_cache(maxsize=64)
+def _standing(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
+    """(7) where the robot stands."""
+    return equations_of_motion(robot.standing(), contacts)
 
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
@@ -131,7 +148,7 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
     return tasks + tuple(cast("list[Task]", missing))
 
 
-def _residual(task: Task, eom: EquationsOfMotion, t: float) -> Affine:
+def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     """The residual of a task, after checking that it takes its block of x."""
     try:
         residual = task.residual(eom, t)
@@ -160,33 +177,6 @@ def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
             f"these motions are inconsistent: {', '.join(rows)}. At least one of their constraints has to go.", rows
         )
     return A, b
-
-
-# what does not depend on the state is built once for each contacts, robot and limits (all immutable)
-@lru_cache(maxsize=64)
-def _force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
-    """Friction facets and normal force of every point: G λ ≤ h, and the names of the rows."""
-    per_point = limits.facets + 1
-    names: list[RowLabel] = []
-    G, h = np.zeros((per_point * contacts.n_points, contacts.k)), np.zeros(per_point * contacts.n_points)
-    for i, point in enumerate(contacts.point_names):
-        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
-        rows = slice(per_point * i, per_point * (i + 1))
-        G[rows, contacts.point_entries[3 * i : 3 * i + 3]] = np.vstack([cone.rows, -cone.normal])
-        h[rows.stop - 1] = -limits.min_normal_force
-        names += [RowLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
-        names.append(RowLabel(f"{point} normal force", "normal force", point))
-    return read_only(G), read_only(h), tuple(names)
-
-
-@lru_cache(maxsize=64)
-def _torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
-    """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h, and the names of the rows."""
-    limited = np.flatnonzero(np.isfinite(limits.torque_limits))
-    rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
-    sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]
-    names = tuple(RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side, joint in sides)
-    return read_only(np.vstack([rows, -rows])), read_only(np.tile(bound, 2)), names
 
 
 @lru_cache(maxsize=64)

@@ -76,15 +76,18 @@ class OnePoint(Value):
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """Jacobian of the body's point at the contact, shape (3, nv), world-aligned."""
-        J = state.frame_jacobian(self.frame)
-        return read_only(J[:3] - pin.skew(self._arm(state)[0]) @ J[3:])
+        return self._jacobian(state, self._arm(state)[0])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A = J and b = -J̇ q̇, shapes (3, nv) and (3,), m/s², where J q̇ = v_frame + ω × arm."""
         arm, arm_rate = self._arm(state)
         drift, omega = state.frame_drift(self.frame), state.frame_velocity(self.frame)[3:]
         b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))
-        return self.jacobian(state, t), read_only(b)
+        return self._jacobian(state, arm), read_only(b)
+
+    def _jacobian(self, state: State, arm: Array) -> Array:
+        J = state.frame_jacobian(self.frame)
+        return read_only(J[:3] - pin.skew(arm) @ J[3:])
 
     def _arm(self, state: State) -> tuple[Array, Array]:
         """From the frame's origin to the contact point, m, and its derivative, m/s; shapes (3,), world."""

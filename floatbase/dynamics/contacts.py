@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, Value, checked, number, of_kind, plain_numbers, read_only, said, texts
-from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, PointContact
+from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, OnePoint, PointContact
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 
@@ -138,6 +138,11 @@ class Contacts(Value):
         b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
+    def _jacobian_and_constraint(self, state: State, t: float) -> tuple[Array, Array, Array]:
+        """J of (4) with A and b of (5); for point contacts J = A, computed once."""
+        A, b = self.constraint(state, t)
+        return A if all(map(_holds_its_point, self.items)) else self.jacobian(state, t), A, b
+
     def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
         return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
 
@@ -188,6 +193,12 @@ class Contacts(Value):
 
     def __repr__(self) -> str:
         return f"Contacts({', '.join(self.names)}; k={self.k})"
+
+
+def _holds_its_point(contact: Contact) -> bool:
+    """Whether J = A by definition: a class of one's own may say otherwise."""
+    kind = type(contact)
+    return isinstance(contact, OnePoint) and (kind.jacobian, kind.constraint) == (OnePoint.jacobian, OnePoint.constraint)
 
 
 def _contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:

@@ -79,5 +79,5 @@ def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> Equ
     """
     of_kind("state", state, State)
     of_kind("contacts", contacts, Contacts)
-    J, (A, b) = contacts.jacobian(state, t), contacts.constraint(state, t)
+    J, A, b = contacts._jacobian_and_constraint(state, t)
     return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)

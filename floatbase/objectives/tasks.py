@@ -32,6 +32,20 @@ class Task(Protocol):
     """A weighted residual on one block of x = (q̈, τ, λ).
 
     name: in messages and tables. weight: of ½‖residual‖² in the objective.
+
+    An object of one's own of this form is a task too, on the compiled tick as on the readable path: this one keeps the height
+    of the centre of mass, as far as its acceleration may be 100 (h - z) - 20 ż, m/s².
+
+        class Height:
+            name, weight, block = "height", 10.0, "qdd"
+
+            def __init__(self, height):
+                self.height = height
+
+            def residual(self, eom, t=0.0):
+                s = eom.state
+                desired = 100.0 * (self.height - s.com[2:]) - 20.0 * s.com_velocity[2:]
+                return fb.Affine(s.com_jacobian[2:], s.com_drift[2:] - desired)
     """
 
     block: ClassVar[Block]

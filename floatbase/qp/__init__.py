@@ -5,11 +5,10 @@ from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_rows
 from floatbase.qp.labels import RowLabel
 from floatbase.qp.linear_programs import INFEASIBLE, OPTIMAL, UNBOUNDED, linear_program
 from floatbase.qp.problem import QP
-from floatbase.qp.solution import Residuals, Solution, with_equality_multipliers
+from floatbase.qp.solution import Residuals, Solution
 from floatbase.qp.solve import check_solver, solve, solvers
 
 __all__ = [
     "FEASIBILITY_TOLERANCE", "INFEASIBLE", "OPTIMAL", "QP", "UNBOUNDED", "ActiveSetRun", "Iteration", "Residuals", "RowLabel",
     "Solution", "active_set", "check_solver", "conflicting_rows", "linear_program", "solve", "solvers", "table_top",
-    "with_equality_multipliers",
 ]  # fmt: skip

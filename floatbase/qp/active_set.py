@@ -45,7 +45,7 @@ from floatbase.linear_algebra import RANK_TOLERANCE, null_space
 from floatbase.qp.conflicts import SHARE, infeasible, not_convex, unbounded, violation_allowed
 from floatbase.qp.labels import RowLabel
 from floatbase.qp.problem import QP, InequalityQP
-from floatbase.qp.solution import Solution, with_equality_multipliers
+from floatbase.qp.solution import Solution
 
 _ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60 terms
 _COUNTS = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
@@ -121,7 +121,7 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
     mu[walk.rows] = np.maximum(walk.multipliers, 0.0)
     taken = len(search.iterations) + len(walk.iterations)
     return ActiveSetRun(
-        solution=with_equality_multipliers(qp, space(walk.x), mu, "active_set", taken),
+        solution=Solution(qp, space(walk.x), mu, "active_set", taken),
         iterations=tuple(_in_x(step, space, qp.objective(space.b)) for step in walk.iterations),
         phase_one=tuple(_in_x(step, space, 0.0) for step in search.iterations),
         working=tuple(qp.inequality_names[i] for i in walk.rows),

@@ -20,6 +20,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -109,9 +111,10 @@ class QP(Value):
         G, h = self.G @ Z, self.h - self.G @ x0
         G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_lengths] = 0.0
         h[np.abs(h) <= _ROUNDING * (np.abs(self.G) @ np.abs(x0) + np.abs(self.h))] = 0.0
-        return InequalityQP(
-            H, g, self.A[:0] @ Z, self.b[:0], G, h, inequality_names=self.inequality_names, row_lengths=self.row_lengths
-        )
+        return InequalityQP._of_known(
+            H=0.5 * (H + H.T), g=g, A=np.zeros((0, g.size)), b=self.b[:0], G=G, h=h, row_lengths=self.row_lengths,
+            equality_names=(), inequality_names=self.inequality_names, blocks=MappingProxyType({}),
+        )  # fmt: skip
 
     @cached_property
     def row_lengths(self) -> Array:
@@ -134,6 +137,14 @@ class InequalityQP(QP):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "row_lengths", checked("row_lengths", self.row_lengths, (len(self.G),)))
+
+    @classmethod
+    def _of_known(cls, **values: Any) -> InequalityQP:
+        """One whose values are known to fit, and are not checked again."""
+        qp = object.__new__(cls)
+        for name, value in values.items():
+            object.__setattr__(qp, name, read_only(value) if isinstance(value, np.ndarray) else value)
+        return qp
 
 
 def _without_rounding(value: Array, terms: float) -> Array:

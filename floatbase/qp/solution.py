@@ -39,7 +39,6 @@ class Solution(Value):
 
     qp: the problem.
     x: (n,), the minimiser.
-    equality_multipliers: ν, (m,).
     inequality_multipliers: μ ≥ 0, (l,).
     solver: name of the back end that answered.
     iterations: the solver's own count, 0 where it has none.
@@ -47,10 +46,20 @@ class Solution(Value):
 
     qp: QP
     x: Array
-    equality_multipliers: Array
     inequality_multipliers: Array
     solver: str
     iterations: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("x", "inequality_multipliers"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @cached_property
+    def equality_multipliers(self) -> Array:
+        """ν, shape (m,): follows from stationarity, by least squares."""
+        qp = self.qp
+        slope, size = qp.H @ self.x + qp.g + qp.G.T @ self.inequality_multipliers, row_lengths(qp.A)
+        return read_only(np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size)
 
     @cached_property
     def residuals(self) -> Residuals:
@@ -90,10 +99,3 @@ class Solution(Value):
         if not isinstance(block, str) or block not in self.qp.blocks:
             raise InputError(f"this problem has no block {block!r}; its blocks are {list(self.qp.blocks)}.")
         return self.x[self.qp.blocks[block]]
-
-
-def with_equality_multipliers(qp: QP, x: Array, mu: Array, solver: str, iterations: int) -> Solution:
-    """The `Solution` with minimiser x and inequality multipliers mu; ν follows from stationarity, by least squares."""
-    slope, size = qp.H @ x + qp.g + qp.G.T @ mu, row_lengths(qp.A)
-    nu = np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size
-    return Solution(qp, read_only(x), read_only(nu), read_only(mu), solver, iterations)

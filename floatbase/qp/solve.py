@@ -20,7 +20,7 @@ from floatbase.qp.conflicts import (
     violation_allowed,
 )
 from floatbase.qp.problem import QP
-from floatbase.qp.solution import Solution, with_equality_multipliers
+from floatbase.qp.solution import Solution
 
 _CLARABEL = (1e-12, 1e-10, 1e-8)  # tolerances to ask Clarabel for; now and then it makes no progress on the way to the first
 _CONVEX = 1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
@@ -88,14 +88,14 @@ def _daqp(qp: QP) -> Solution | None:
     if flag not in (1, 2):  # infeasible, it says, or it cycled or took too many iterations; its numbers may be of any size
         return None
     polished = _polished(qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / size)
-    return None if polished is None else with_equality_multipliers(qp, *polished, "daqp", int(info["iterations"]))
+    return None if polished is None else Solution(qp, *polished, "daqp", int(info["iterations"]))
 
 
 def _active_set(qp: QP) -> Solution:
     """The method of `active_set.py` from a cold start, its answer polished."""
     found, space = active_set(qp).solution, qp.equality_space
     polished = _polished(qp, space.A.T @ (found.x - space.b), found.inequality_multipliers)
-    return found if polished is None else with_equality_multipliers(qp, *polished, found.solver, found.iterations)
+    return found if polished is None else Solution(qp, *polished, found.solver, found.iterations)
 
 
 def _cvxpy(qp: QP) -> Solution | None:
@@ -129,7 +129,7 @@ def _cvxpy(qp: QP) -> Solution | None:
     if step.value is None:
         raise SolverError(f"Clarabel did not converge on {qp!r}: it ended with status {problem.status!r}.")
     mu = np.maximum(np.atleast_1d(inequalities[0].dual_value) * scale, 0.0) if inequalities else np.zeros(0)
-    return with_equality_multipliers(qp, origin + step.value, mu, "cvxpy", int(problem.solver_stats.num_iters or 0))
+    return Solution(qp, origin + step.value, mu, "cvxpy", int(problem.solver_stats.num_iters or 0))
 
 
 _BACK_ENDS: dict[str, Callable[[QP], Solution | None]] = {"daqp": _daqp, "cvxpy": _cvxpy, "active_set": _active_set}
@@ -147,7 +147,8 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
     inner, space, n = qp.reduced, qp.equality_space, len(y)
     active = np.flatnonzero(mu > 0.0)
     G = inner.G[active]
-    K = np.block([[inner.H, G.T], [G, np.zeros((len(G), len(G)))]])
+    K = np.zeros((n + len(G), n + len(G)))
+    K[:n, :n], K[:n, n:], K[n:, :n] = inner.H, G.T, G
     Z, H, rows = (np.asarray(part, dtype=np.longdouble) for part in (space.A, qp.H, qp.G[active]))
     found = np.concatenate([y, mu[active]]).astype(np.longdouble)
     for _ in range(2):

@@ -139,17 +139,17 @@ class Robot(Value):
         """Whether the base is free to move: nv = d + 6 rather than d."""
         return has_free_base(self.model)
 
-    @property
+    @cached_property
     def nq(self) -> int:
         """Length of q."""
         return int(self.model.nq)
 
-    @property
+    @cached_property
     def nv(self) -> int:
         """Length of v, of q̈ and of each row of J: d + 6 for a floating base, d for a fixed one."""
         return int(self.model.nv)
 
-    @property
+    @cached_property
     def d(self) -> int:
         """Number of actuated joints: the length of τ."""
         return self.nv - (6 if self.is_floating else 0)

@@ -4,9 +4,13 @@ from floatbase.simulation.build import Ground
 from floatbase.simulation.conversion import Conversion
 from floatbase.simulation.live import SEEN, Live, advice
 from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.push_rose import PushRose, push_rose
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, rollout
+from floatbase.simulation.sweep import sweep
+from floatbase.simulation.table import Table
 
 __all__ = [
-    "SEEN", "Actuators", "Controller", "Conversion", "Ground", "Live", "Push", "Rollout", "Simulation", "advice", "rollout",
+    "SEEN", "Actuators", "Controller", "Conversion", "Ground", "Live", "Push", "PushRose", "Rollout", "Simulation", "Table",
+    "advice", "push_rose", "rollout", "sweep",
 ]  # fmt: skip

@@ -35,14 +35,15 @@ class Conversion:
     def q(self, qpos: Array) -> Array:
         """Our q, shape (nq,), for MuJoCo's qpos."""
         q = qpos[self._q_from]
-        q[self._cos], q[self._cos + 1] = np.cos(q[self._cos]), np.sin(q[self._cos + 1])
+        if self._cos.size:
+            q[self._cos], q[self._cos + 1] = np.cos(q[self._cos]), np.sin(q[self._cos + 1])
         return q
 
     def v(self, qpos: Array, qvel: Array) -> Array:
         """Our v, shape (nv,), for MuJoCo's qpos and qvel."""
         v = qvel[self._v_from]
         if self._floating:
-            v[:3] = rotation_matrix(qpos[3:7]).T @ qvel[:3]
+            v[:3] = rotation_matrix(qpos[3:7]).T.dot(qvel[:3])
         return v
 
     def joints(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
@@ -63,5 +64,5 @@ class Conversion:
 def rotation_matrix(wxyz: npt.ArrayLike) -> Array:
     """Rotation matrix, shape (3, 3), of a unit quaternion w x y z."""
     R = np.empty(9)
-    mujoco.mju_quat2Mat(R, np.array(wxyz))
+    mujoco.mju_quat2Mat(R, wxyz)
     return R.reshape(3, 3)

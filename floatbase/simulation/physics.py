@@ -6,7 +6,7 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import mujoco
 import numpy as np
@@ -102,15 +102,27 @@ class Simulation(Fixed):
         self._convert = Conversion(robot, self.model)
         self._motors = np.array([self.model.actuator(name).id for name in robot.joint_names], dtype=int)
         self._balls = np.array([self.model.geom(name).id for name in self.point_names], dtype=int)
-        self._point_of_geom = np.zeros(self.model.ngeom, dtype=int)
-        self._point_of_geom[self._balls] = np.arange(len(self._balls))
+        self._contact_frame: Array | None = None  # known from the first contact on
+        self._up = self.ground.normal.tolist()
         self._below = self.model.geom_size[self._balls, :1] * self.ground.normal
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
+        self._watch()
         self.reset()
         self._made = True
 
     def __copy__(self) -> Self:
         return copy.deepcopy(self)  # two robots with the same data would move each other
+
+    def _watch(self) -> None:
+        """Views into MuJoCo's memory of what every tick looks at: to ask MuJoCo for them takes longer than to look."""
+        data = self.data
+        self._qpos, self._qvel, self._warnings = data.qpos, data.qvel, data.warning.number[_FATAL:]
+        self._base_position, self._base_vertical = data.xpos[self._base], data.xmat[self._base, 2::3]  # origin and z axis
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy has MuJoCo's data of its own."""
+        vars(self).update(state)
+        self._watch()
 
     @property
     def point_names(self) -> tuple[str, ...]:
@@ -125,17 +137,17 @@ class Simulation(Fixed):
     @property
     def q(self) -> Array:
         """Configuration in the package's convention, shape (nq,)."""
-        return self._convert.q(self.data.qpos)
+        return self._convert.q(self._qpos)
 
     @property
     def v(self) -> Array:
         """Velocity in the package's convention, shape (nv,)."""
-        return self._convert.v(self.data.qpos, self.data.qvel)
+        return self._convert.v(self._qpos, self._qvel)
 
     @property
     def joints(self) -> tuple[Array, Array]:
         """Angles, rad (or m), and velocities of the actuated joints, shape (d,) each, as `Actuators` take them."""
-        return self._convert.joints(self.data.qpos, self.data.qvel)
+        return self._convert.joints(self._qpos, self._qvel)
 
     @property
     def state(self) -> State:
@@ -145,8 +157,8 @@ class Simulation(Fixed):
     @property
     def diverged(self) -> bool:
         """Whether positions, velocities, accelerations or torques became infinite, NaN or larger than MuJoCo takes."""
-        qpos, qvel = self.data.qpos, self.data.qvel  # MuJoCo itself finds out only in the next step
-        return not isfinite(qpos @ qpos + qvel @ qvel) or bool(self.data.warning.number[_FATAL:].any())
+        # MuJoCo itself finds out only in the next step; a velocity that is not finite has made a position that is none
+        return not isfinite(self._qpos.dot(self._qpos)) or any(self._warnings.tolist())
 
     @property
     def fallen(self) -> bool:
@@ -154,7 +166,7 @@ class Simulation(Fixed):
         if not self.robot.is_floating:
             return False
         sunk = self._start_height - self._base_height() > (1.0 - _FALLEN_HEIGHT) * self._stature
-        return sunk or float(self._base_vertical() @ self._start_vertical) < _FALLEN_COSINE
+        return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < _FALLEN_COSINE
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing upright on the ground's plane by default, at time 0."""
@@ -162,12 +174,12 @@ class Simulation(Fixed):
         if state.robot != self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:], self.data.qvel[:] = self._convert.to_mujoco(state.q, state.v)
+        self._qpos[:], self._qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
         self._start_height = self._stature = self._base_height()
-        self._start_vertical = self._base_vertical()
+        self._start_vertical = self._base_vertical.tolist()
         if self._stature <= _LEAST_STATURE:  # it lies: a fall is measured by the way to the centre of mass
-            self._stature = float(np.linalg.norm(state.com - self.data.xpos[self._base]))
+            self._stature = float(np.linalg.norm(state.com - self._base_position))
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
@@ -185,20 +197,49 @@ class Simulation(Fixed):
 
     def torques(self) -> Array:
         """Torques that the motors gave during the last step, within their limits, shape (d,), N·m."""
-        return self.data.actuator_force[self._motors]
+        return self._torques_of(self.data.actuator_force)
+
+    def _torques_of(self, actuator_force: Array) -> Array:
+        """`torques` for MuJoCo's forces of all its actuators, shape (…, d)."""
+        return actuator_force[..., self._motors]
 
     def contact_forces(self) -> Array:
         """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world, ordered as `point_names`."""
-        forces, wrench, contact = np.zeros((len(self._balls), 3)), np.zeros(6), self.data.contact
-        for i, (_, ball) in enumerate(contact.geom):  # from the plane to the ball
-            mujoco.mj_contactForce(self.model, self.data, i, wrench)
-            forces[self._point_of_geom[ball]] = wrench[:3]
-        # one plane, so one frame for all contacts: its rows are normal and tangents
-        return forces @ contact.frame[0].reshape(3, 3) if len(contact) else forces
+        geoms, numbers = self._raw_contacts()
+        return self._forces_of(geoms[None], numbers[None])[0]
+
+    def _raw_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
+        """What MuJoCo has of the n contacts now: their geoms, shape (n, 2), and forces in their frame, shape (3 n,), N."""
+        data = self.data
+        contact, numbers, limits = data.contact, data.efc_force, data.nl
+        if limits:  # behind the joints at their limits come the contacts
+            numbers = numbers[limits:]
+        geoms = contact.geom  # from the plane to a ball
+        if numbers.size != 3 * len(geoms):  # a ball that only just touches has none, another cone than ours has others
+            numbers = np.zeros((len(geoms), 6))
+            for i, wrench in enumerate(numbers):
+                mujoco.mj_contactForce(self.model, data, i, wrench)
+            numbers = numbers[:, :3].ravel()
+        if self._contact_frame is None and len(geoms):  # one plane, so one frame for all contacts at all times
+            self._contact_frame = contact.frame[0].reshape(3, 3).copy()
+        return geoms, numbers
+
+    def _forces_of(self, geoms: npt.NDArray[np.int32], numbers: Array) -> Array:
+        """`contact_forces` of N instants, shape (N, n_points, 3), N, from their `_raw_contacts`, with geom 0 for none."""
+        n, balls = len(geoms), geoms[:, :, 1]
+        forces = np.zeros((n, self.model.ngeom, 3))
+        if self._contact_frame is not None:  # its rows are normal and tangents
+            world = numbers.reshape(-1, 3) @ self._contact_frame
+            forces[np.arange(n)[:, None], balls] = world.reshape(n, -1, 3)
+        return forces[:, self._balls]
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the lowest point of each ball along the ground's normal."""
-        return self.data.geom_xpos[self._balls] - self._below
+        return self._lowest_points(self.data.geom_xpos)
+
+    def _lowest_points(self, geom_positions: Array) -> Array:
+        """`contact_positions` for MuJoCo's positions of all its geoms, shape (…, geoms, 3), m."""
+        return geom_positions[..., self._balls, :] - self._below
 
     def pushed_body(self, push: Push) -> int:
         """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted to the ground."""
@@ -230,11 +271,12 @@ class Simulation(Fixed):
 
     def _base_height(self) -> float:
         """Height of the base's origin over the ground, m."""
-        return float(self.ground.normal @ self.data.xpos[self._base])
-
-    def _base_vertical(self) -> Array:
-        """The base's z axis, shape (3,), world."""
-        return self.data.xmat[self._base, 2::3].copy()
+        return _dot(self._up, self._base_position.tolist())
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    """aᵀ b of three numbers each; numpy's own takes three times as long."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -86,8 +86,10 @@ class Rollout(Value):
     @cached_property
     def com(self) -> Array:
         """Centre of mass at each row, shape (n, 3), m, world."""
-        model, data = self.robot.model, self.robot.model.createData()
-        return read_only(np.reshape([pin.centerOfMass(model, data, q).copy() for q in self.q], (-1, 3)))
+        model, data, com = self.robot.model, self.robot.model.createData(), np.empty((len(self), 3))
+        for row, q in zip(com, self.q, strict=True):
+            row[:] = pin.centerOfMass(model, data, q)
+        return read_only(com)
 
     def slip(self) -> Array:
         """How far each contact point strayed from where it was first, shape (points,), m."""
@@ -104,29 +106,49 @@ class Rollout(Value):
 
 
 class Recorder:
-    """Collects the rows of a rollout of at most `ticks` ticks that begins in a stance: `before` and `during` each tick."""
+    """Collects the rows of a rollout that begins in a stance: `before`, `after_step` and `complete` in each tick.
 
-    def __init__(self, sim: Simulation, stance: Contacts, ticks: int):
-        self._sim, self._first, self._n = sim, stance, 0
+    ticks: at most so many rows. substeps: timesteps in each.
+    """
+
+    def __init__(self, sim: Simulation, stance: Contacts, ticks: int, substeps: int):
+        self._sim, self._first, self._substeps, self._n = sim, stance, substeps, 0
         d, points = sim.robot.d, len(sim.point_names)
-        sizes = {"time": (), "q": (sim.robot.nq,), "v": (sim.robot.nv,), "tau": (d,), "tau_desired": (d,)}
-        self._rows = {name: np.empty((ticks, *size)) for name, size in sizes.items()}
-        self._forces, self._positions = np.empty((ticks, points, 3)), np.empty((ticks, points, 3))  # of the physics' points
+        self._time, self._q, self._v = np.empty(ticks), np.empty((ticks, sim.robot.nq)), np.empty((ticks, sim.robot.nv))
+        self._tau_desired = np.empty((ticks, d))
+        # MuJoCo's own numbers, which `finished` turns into ours, all rows at once
+        self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force  # views of its memory
+        self._geoms, self._steps = np.empty((ticks, sim.model.ngeom, 3)), 0
+        self._actuators = np.empty((ticks * substeps, sim.model.nu))
+        self._touching = np.zeros((ticks * substeps, points, 2), dtype=np.int32)
+        self._forces = np.zeros((ticks * substeps, 3 * points))
         self._stances: list[Contacts] = []
-        self._plans: list[Array | None] = []
+        self._plans = np.empty((ticks, stance.k))
+        self._with_plan: list[int] = []  # the rows of those
 
-    def before(self, q: Array, v: Array) -> None:
-        """Keep clock, state and feet before a tick. They count when `during` completes the row."""
+    def before(self, t: float, q: Array, v: Array) -> None:
+        """Keep clock, state and feet before a tick. They count when `complete` does."""
         n = self._n
-        self._rows["time"][n], self._rows["q"][n], self._rows["v"][n] = self._sim.time, q, v
-        self._positions[n] = self._sim.contact_positions()
+        self._time[n], self._q[n], self._v[n], self._geoms[n] = t, q, v, self._geom_positions
 
-    def during(self, tau: Array, tau_desired: Array, forces: Array, stance: Contacts, planned: Array | None) -> None:
-        """Complete the row: torques as in `Rollout`, the physics' forces (points, 3), planned ones (k,) at the stance."""
+    def after_step(self) -> None:
+        """Keep what motors and ground did in a timestep of the tick."""
+        i, (geoms, forces) = self._steps, self._sim._raw_contacts()
+        self._actuators[i] = self._actuator_forces
+        self._touching[i, : len(geoms)], self._forces[i, : forces.size] = geoms, forces
+        self._steps += 1
+
+    def complete(self, tau_desired: Array, stance: Contacts, planned: Array | None) -> None:
+        """Complete the row: the controller's torques (d,), N·m, its stance, and the forces (k,), N, it planned there."""
         n = self._n
-        self._rows["tau"][n], self._rows["tau_desired"][n], self._forces[n] = tau, tau_desired, forces
+        self._tau_desired[n] = tau_desired
         self._stances.append(stance)
-        self._plans.append(planned)
+        if planned is not None:
+            more = planned.size - self._plans.shape[1]
+            if more > 0:  # a larger stance than any before
+                self._plans = np.pad(self._plans, ((0, 0), (0, more)))
+            self._plans[n, : planned.size] = planned
+            self._with_plan.append(n)
         self._n += 1
 
     def finished(self, pushes: tuple[Push, ...], outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
@@ -144,7 +166,11 @@ class Recorder:
         return Rollout(
             self._sim.robot,
             contacts,
-            **{name: read_only(rows[: self._n]) for name, rows in self._rows.items()},
+            time=self._kept(self._time),
+            q=self._kept(self._q),
+            v=self._kept(self._v),
+            tau=self._mean(self._sim._torques_of(self._actuators[: self._n * self._substeps])),
+            tau_desired=self._kept(self._tau_desired),
             planned=self._planned(contacts),
             measured=measured,
             foot_positions=positions,
@@ -154,15 +180,27 @@ class Recorder:
             stances=() if all(stance is contacts for stance in self._stances) else tuple(self._stances),
         )
 
+    def _kept(self, rows: Array) -> Array:
+        """The rows that are complete, without a copy."""
+        rows.setflags(write=False)
+        return rows[: self._n]
+
+    def _mean(self, steps: Array) -> Array:
+        """The means over the timesteps of each row, shape (n, …), of numbers at all timesteps."""
+        if self._substeps > 1:
+            steps = steps.reshape(self._n, self._substeps, *steps.shape[1:]).sum(axis=1) / self._substeps
+        return read_only(steps)
+
     def _planned(self, contacts: Contacts) -> Array:
         """Planned forces at the contacts, shape (n, k)."""
         forces, numbers = np.full((self._n, contacts.k), np.nan), np.arange(contacts.k)
-        stances = dict.fromkeys(self._stances)
-        entries = {stance: [i for name in stance.names for i in numbers[contacts.force_slice(name)]] for stance in stances}
-        for row, stance, planned in zip(forces, self._stances, self._plans, strict=True):
-            if planned is not None:
-                row[:] = 0.0
-                row[entries[stance]] = planned
+        rows: dict[Contacts, list[int]] = {stance: [] for stance in self._stances}
+        for i in self._with_plan:
+            rows[self._stances[i]].append(i)
+        for stance, present in rows.items():
+            entries = [i for name in stance.names for i in numbers[contacts.force_slice(name)]]
+            forces[present] = 0.0
+            forces[np.ix_(present, entries)] = self._plans[present, : stance.k]
         return read_only(forces)
 
     def _at_contacts(self, contacts: Contacts) -> tuple[Array, Array]:
@@ -170,7 +208,10 @@ class Recorder:
 
         A point contact in the middle of a flat foot takes the sum of its corners' forces and the mean of their positions.
         """
-        n, feet = self._n, self._sim.feet
+        sim, n, feet = self._sim, self._n, self._sim.feet
+        steps = slice(n * self._substeps)
+        measured = self._mean(sim._forces_of(self._touching[steps], self._forces[steps]))
+        lowest = sim._lowest_points(self._geoms[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             forces, positions = np.full((n, contact.k), np.nan), np.full((n, len(contact.point_names), 3), np.nan)
@@ -178,10 +219,10 @@ class Recorder:
                 part = feet.force_slice(contact.name)
                 points = slice(part.start // 3, part.stop // 3)
                 if contact.point_names == feet[contact.name].point_names:
-                    forces, positions = self._forces[:n, points].reshape(n, contact.k), self._positions[:n, points]
+                    forces, positions = measured[:, points].reshape(n, contact.k), lowest[:, points]
                 elif len(contact.point_names) == 1:
-                    forces = self._forces[:n, points].sum(axis=1)
-                    positions = self._positions[:n, points].mean(axis=1, keepdims=True)
+                    forces = measured[:, points].sum(axis=1)
+                    positions = lowest[:, points].mean(axis=1, keepdims=True)
             all_forces.append(forces)
             all_positions.append(positions)
         return read_only(np.concatenate(all_forces, axis=1)), read_only(np.concatenate(all_positions, axis=1))

@@ -9,13 +9,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, function, of_kind, plain_numbers, positive, said
+from floatbase._arrays import LARGEST, Array, checked, function, of_kind, plain_numbers, positive, read_only, said
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.physics import Push, Simulation, acting, pushes_of
 from floatbase.simulation.record import Recorder, Rollout
 
-_MOST_TICKS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
+_MOST_STEPS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
 _PERIOD_ERROR = 1e-6  # part of a period by which a time may miss a whole number of them: how people round
 _TIME_ERROR = 1e-9  # part of the time by which it may: the rounding of many periods
 
@@ -73,27 +73,27 @@ def rollout(
     period = sim.timestep if control_period is None else control_period
     substeps = _multiple("control_period", period, "the simulation's timestep", sim.timestep)
     ticks = _multiple("duration", duration, "the control period", substeps * sim.timestep)
-    if ticks > _MOST_TICKS:
-        raise InputError(f"duration {duration:g} s has {ticks} control periods; at most {_MOST_TICKS} fit in one record.")
+    if ticks * substeps > _MOST_STEPS:
+        raise InputError(f"duration {duration:g} s has {ticks * substeps} timesteps; at most {_MOST_STEPS} fit in one record.")
     idle = _idle(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     if idle:
         warnings.warn(idle, SimulationWarning, stacklevel=2)
-    record = Recorder(sim, _stance(sim, controller), ticks)
+    record = Recorder(sim, _stance(sim, controller), ticks, substeps)
     for _ in range(ticks):
-        q, v = sim.q, sim.v
-        record.before(q, v)
+        t, q, v = sim.time, sim.q, sim.v
+        record.before(t, q, v)
         try:
-            command = controller(q, v, sim.time)
+            command = controller(q, v, t)
         except FloatbaseError as failure:
             return record.finished(pushes, "controller failed", failure)
         stance = _stance(sim, controller)
         try:
             desired = _desired(sim, command)
             planned = _planned(command, stance)
-            tau, forces = _act(sim, desired, substeps, pushes, actuators)
+            _act(sim, desired, substeps, pushes, actuators, record)
         except _NotFinite as failure:
             return record.finished(pushes, "controller failed", failure)
-        record.during(tau, desired, forces, stance, planned)
+        record.complete(desired, stance, planned)
         if sim.diverged:
             return record.finished(pushes, "diverged")
         if sim.fallen:
@@ -175,17 +175,22 @@ def _stance(sim: Simulation, controller: Controller) -> Contacts:
 
 
 def _act(
-    sim: Simulation, desired: Array, substeps: int, pushes: tuple[Push, ...], actuators: Actuators | None
-) -> tuple[Array, Array]:
-    """Go on for a control period: the means of the torques given and of the contact forces."""
-    applied, forces, tau = np.zeros(sim.robot.d), np.zeros((len(sim.point_names), 3)), desired
+    sim: Simulation,
+    desired: Array,
+    substeps: int,
+    pushes: tuple[Push, ...],
+    actuators: Actuators | None,
+    record: Recorder,
+) -> None:
+    """Go on for a control period under the desired torques, shape (d,), N·m."""
+    if actuators is not None:
+        desired = read_only(desired)  # they must not write into the controller's own
+    tau = desired
     for _ in range(substeps):
         if actuators is not None:
             tau = _torques(sim, "the actuators' torques", actuators.step(desired, *sim.joints, sim.timestep))
         sim.advance(tau, pushes)
-        applied += sim.torques()
-        forces += sim.contact_forces()
-    return applied / substeps, forces / substeps
+        record.after_step()
 
 
 def _desired(sim: Simulation, command: Any) -> Array:
@@ -199,23 +204,26 @@ def _desired(sim: Simulation, command: Any) -> Array:
 
 
 def _torques(sim: Simulation, name: str, tau: Any) -> Array:
-    """Torques as a read-only array, shape (d,). Raises `_NotFinite`, or `InputError` for another shape."""
+    """Torques as an array, shape (d,). Raises `_NotFinite`, or `InputError` for another shape."""
+    if type(tau) is np.ndarray and tau.dtype.char == "d" and tau.shape == (sim.robot.d,) and np.vdot(tau, tau) <= LARGEST:
+        return tau  # as most of them are
     try:
         return checked(name, tau, (sim.robot.d,), "N·m")
     except InputError:
         entries = np.array(tau, dtype=object)
         if entries.shape != (sim.robot.d,):
             raise
-        i = [plain_numbers(x) is not None and np.isfinite(float(x)) for x in entries].index(False)
+        i = [plain_numbers(x) is not None and abs(float(x)) <= LARGEST for x in entries].index(False)
         raise _NotFinite(f"{name} hold {entries[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
 
 
 def _planned(command: Any, stance: Contacts) -> Array | None:
-    """A copy of a command's forces, shape (k,), N, world, or None where it has none."""
+    """A command's forces, shape (k,), N, world, or None where it has none."""
     forces = getattr(command, "forces", None)
     if forces is None:
         return None
-    planned = plain_numbers(forces)
+    plain = type(forces) is np.ndarray and forces.dtype.char == "d"  # float64, as most of them are
+    planned = forces if plain else plain_numbers(forces)
     if planned is None:
         raise InputError(f"the controller planned forces that are no numbers: {said(forces)}.")
     if planned.shape != (stance.k,):

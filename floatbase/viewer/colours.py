@@ -47,6 +47,9 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("cone", ALARM, "friction cone: force outside"),
     ("idle cone", IDLE, "friction cone: no force"),
     ("support", SUPPORT, "support region"),
+    ("rose", MEASURED, "largest push survived"),
+    ("capture", CALM, "theory: capture point"),
+    ("steady", WARNING, "theory: steady push"),
     ("ghost", GHOST, GHOST_NAME),
 )
 

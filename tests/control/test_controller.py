@@ -297,7 +297,7 @@ def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict(name: str
 def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
     state = judges.load("go2").random_state(0)
     found = solve(judges.controller_of("go2").qp(state))
-    wrong = Solution(found.qp, found.x + 0.01, found.equality_multipliers, found.inequality_multipliers + 0.1, "wrong")
+    wrong = Solution(found.qp, found.x + 0.01, found.inequality_multipliers + 0.1, "wrong")
     r = wrong.residuals
     assert min(r.stationarity, r.equality, r.inequality, r.complementarity) > 1e-4
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import judges
@@ -107,8 +107,15 @@ def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver: str) ->
 SQUARE = QP(np.eye(2), [-3.0, 0.0], [[0.0, 1.0]], [1.0], [[1.0, 0.0], [-1.0, 0.0]], [1.0, 4.0])
 
 
+@dataclass(frozen=True, eq=False)
+class ByHand(Solution):
+    """An answer whose ν is given too."""
+
+    equality_multipliers: np.ndarray = field(kw_only=True)
+
+
 def answer(x: list[float], nu: float, mu: list[float]) -> Residuals:
-    return Solution(SQUARE, np.array(x), np.array([nu]), np.array(mu), "by hand").residuals
+    return ByHand(SQUARE, np.array(x), np.array(mu), "by hand", equality_multipliers=np.array([nu])).residuals
 
 
 def test_an_optimum_found_by_hand_leaves_nothing() -> None:

@@ -302,6 +302,25 @@ def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone() -
     assert np.allclose(sim.contact_forces().sum(axis=0), change, atol=0.01 * sim.robot.weight)
 
 
+def test_feet_near_the_ground_get_no_force() -> None:
+    """MuJoCo lists a contact without a force for each ball that is nearer to the ground than its gap."""
+    sim = fb.Simulation(judges.load("go2"))
+    sim.model.geom_gap[:] = 0.05
+    state = sim.robot.standing()
+    tilt = np.concatenate([[0.0, 0.0, 0.0, 0.05, 0.0, 0.0], np.zeros(12)])
+    sim.reset(state.replace(q=state.integrate(tilt)))
+    assert sim.data.ncon == 4
+    wrench, expected = np.zeros(6), np.zeros((4, 3))
+    for i, geom in enumerate(sim.data.contact.geom[:, 1]):
+        mujoco.mj_contactForce(sim.model, sim.data, i, wrench)
+        frame = sim.data.contact.frame[i].reshape(3, 3)
+        expected[sim.point_names.index(sim.model.geom(geom).name)] = frame.T @ wrench[:3]
+    pressed = expected[:, 2] > 1.0
+    assert 0 < pressed.sum() < 4
+    assert not np.any(sim.contact_forces()[~pressed])
+    assert np.allclose(sim.contact_forces(), expected, rtol=1e-12)
+
+
 def test_a_copy_of_a_simulation_falls_as_the_simulation_does() -> None:
     sim = copy.deepcopy(fb.Simulation(judges.load("go2")))
     for _ in range(1500):

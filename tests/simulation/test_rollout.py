@@ -129,6 +129,16 @@ def test_actuators_with_nan_torques_end_the_record_too(sim: fb.Simulation) -> No
     assert "the actuators' torques hold" in str(record.error)
 
 
+def test_actuators_cannot_write_into_the_torques_of_the_controller(sim: fb.Simulation) -> None:
+    class Careless:
+        def step(self, tau: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+            tau[:] = 0.0
+            return tau
+
+    with pytest.raises(ValueError, match="read-only"):
+        fb.rollout(sim, limp, 0.01, actuators=Careless())
+
+
 def test_torques_of_a_wrong_length_are_a_mistake_and_raised(sim: fb.Simulation) -> None:
     with pytest.raises(FloatbaseError, match=r"the controller's torques has shape \(3,\); it must have shape \(12,\)"):
         fb.rollout(sim, lambda q, v, t: Torques(np.full(3, np.nan)), 0.1)

@@ -12,18 +12,18 @@ from dataclasses import replace
 from functools import lru_cache
 from math import prod
 from threading import Timer
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from floatbase._arrays import Array
-from floatbase.control.tick.tables import CONTACT_KINDS, TASK_KINDS, dynamics_of, tables_of
+from floatbase.control.problem import Problem, assemble_qp, residual_of
+from floatbase.control.tick.own import Given, Own
+from floatbase.control.tick.tables import dynamics_of, tables_of
 from floatbase.errors import InputError
-from floatbase.objectives import Task, nearest_rotation
-from floatbase.robots import Robot, check_unit_lengths
-
-if TYPE_CHECKING:
-    from floatbase.control.problem import Problem
+from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, TorqueTask, nearest_rotation
+from floatbase.qp import QP
+from floatbase.robots import Robot, State, check_unit_lengths
 
 # joints whose axes stand still in their own frame
 _JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
@@ -53,12 +53,6 @@ def obstacle(problem: Problem, solver: str) -> str:
     """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP back end."""
     if solver != "daqp":
         return f"solver {solver!r} was requested, and the compiled tick has its own"
-    for contact in problem.contacts:
-        if type(contact) not in CONTACT_KINDS:
-            return f"contact {contact.name!r} is a {type(contact).__name__}; the compiled tick takes points and flat feet"
-    for task in problem.tasks:
-        if type(task) not in TASK_KINDS:
-            return f"task {task.name!r} is a {type(task).__name__}; the compiled tick takes the tasks of the package"
     try:
         from floatbase.control.tick import jit, tick  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
@@ -85,11 +79,12 @@ class Compiled:
     """The compiled tick of one problem, for which `obstacle` is "".
 
     A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the readable path must decide, else
-    the array of numbers that `tick.tick` fills, how many rows are active, and the targets at t.
+    the array of numbers that `tick.tick` fills, how many rows are active, and what else the tick was given.
 
     qdd, tau, forces: where these are among the numbers.
-    arguments: what `tick.tick` takes after q, v and the targets, but for the answer and the parts to run.
-    targets: as in `costs.TaskTable`, zeros for those that move.
+    unknown: tasks of which the tables cannot tell whether they fit: those of one's own, moving ones, and postures.
+    arguments: what `tick.tick` takes after q, v and `Given.numbers`, but for the answer and the parts to run.
+    given: as it is without a state, zeros for what moves and nothing of one's own.
     workspace: real and whole numbers, memory of the tick.
 
     Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
@@ -100,25 +95,35 @@ class Compiled:
 
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics = problem, dynamics_of(robot)
-        *tables, self.targets, self._moving = tables_of(problem)
+        *tables, targets, self._moving = tables_of(problem)
+        self.own, moving = Own(problem, self.dynamics), {target.task for target in self._moving}
+        still = (CoMTask, OrientationTask, FrameTask, ForceTask, TorqueTask)
+        self.unknown = [task for i, task in enumerate(problem.tasks) if i in moving or type(task) not in still]
+        self.given, self.n_targets = self.own.nothing(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        n_floats, n_ints = tick.workspace_sizes(tables[0])
-        self.workspace = np.empty(n_floats), np.empty(n_ints, np.int64)  # of one tick at a time: the dynamics' lock sees to it
-        self.arguments = *self.dynamics.views, *tables, *self.workspace
-        self._tick, self._parts = tick.tick, tick.PARTS
+        self._sizes, self._tables, self._tick, self._parts = tick.workspace_sizes, tables, tick.tick, tick.PARTS
+        self._changes, self._rows = bool(self._moving) or self.own.changes, -1
+        self._make_workspace(0)
 
-    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, Array] | None:
+    def _make_workspace(self, rows: int) -> None:
+        """Memory for one tick at a time, the dynamics' lock sees to it, whose tasks of one's own have so many rows."""
+        if rows > self._rows:
+            n_floats, n_ints = self._sizes(self._tables[0], rows)
+            self.workspace, self._rows = (np.empty(n_floats), np.empty(n_ints, np.int64)), rows
+            self.arguments = *self.dynamics.views, *self._tables, *self.workspace
+
+    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, Given] | None:
         if q.shape != self._q_shape or v.shape != self._v_shape:
             return None
-        targets = self._targets_at(t) if self._moving else self.targets
-        if targets is None:
+        given = self.given_at(q, v, t) if self._changes else self.given
+        if given is None:
             return None
         dynamics, answer = self.dynamics, self.empty_answer()
         with dynamics.lock:
             dynamics.update(q, v)
-            n_active = self._tick(q, v, targets, *self.arguments, answer, self._parts)
-        return (answer, n_active, targets) if n_active >= 0 else None
+            n_active = self._tick(q, v, given.numbers, *self.arguments, answer, self._parts)
+        return (answer, n_active, given) if n_active >= 0 else None
 
     def warm_up(self) -> str:
         """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it.
@@ -131,7 +136,7 @@ class Compiled:
             try:
                 with self.dynamics.lock:
                     self.dynamics.update(q, v)
-                    self._tick(q, v, self.targets, *self.arguments, self.empty_answer(), self._parts)
+                    self._tick(q, v, self.given.numbers, *self.arguments, self.empty_answer(), self._parts)
             except Exception as error:  # whatever numba raises, the readable path does without; no code of the user's runs
                 return f"numba could not compile the tick ({type(error).__name__}: {error})"
         return ""
@@ -140,36 +145,56 @@ class Compiled:
         """An array for the numbers of one tick."""
         return np.empty(self.forces.stop + 2 * self._n_multipliers)
 
-    def tasks(self, targets: Array) -> tuple[Task, ...]:
-        """The tasks with the targets of one tick, as a call returned them: functions may return others when called again."""
+    def qp(self, q: Array, v: Array, t: float, given: Given) -> QP:
+        """The readable QP of a tick, with what its functions returned then: called again, they may return something else."""
         values: dict[int, dict[str, Any]] = {}
-        for task, first, shape, name, _ in self._moving:
-            values.setdefault(task, {})[name] = targets[first : first + prod(shape)].reshape(shape)
-        return tuple(replace(cast(Any, task), **values.get(i, {})) for i, task in enumerate(self._problem.tasks))
+        for at, first, shape, name, _ in self._moving:
+            values.setdefault(at, {})[name] = given.numbers[first : first + prod(shape)].reshape(shape)
+        eom, costs = self.own.equations(State(self._problem.robot, q, v), t, given), []
+        for i, task in enumerate(self._problem.tasks):
+            still = replace(cast(Any, task), **values[i]) if i in values else task
+            costs.append(
+                (task.block, *(given.residuals[i] if i in given.residuals else (task.weight, residual_of(still, eom, t))))
+            )
+        return assemble_qp(eom, costs, self._problem.limits, given.normal_forces, given.inequalities)
 
-    def multipliers(self, numbers: Array, n_active: int) -> Array:
+    def multipliers(self, numbers: Array, n_active: int, given: Given) -> Array:
         """Multipliers of all inequality rows of the readable QP, from what a call returned."""
-        limits, n_points = self._problem.limits, self._problem.contacts.n_points
+        limits, contacts = self._problem.limits, self._problem.contacts
         limited = np.isfinite(limits.torque_limits)  # the readable QP has rows for these joints only
-        has_row = np.concatenate([np.full(n_points * (limits.facets + 1), True), limited, limited])
+        friction = np.full(contacts.n_points * (limits.facets + 1), True)
+        own = np.full(sum(len(G) for G, _ in given.inequalities), True)
+        has_row = np.concatenate([friction, limits.bounded_points(contacts), limited, limited, own])
         mu, active = numbers[self.forces.stop :].reshape(2, -1)[:, :n_active]
         multipliers = np.zeros(has_row.size)
         multipliers[active.astype(np.int64)] = np.maximum(mu, 0.0)
         return multipliers[has_row]
 
-    def _targets_at(self, t: float) -> Array | None:
-        """All targets at time t, in an array of their own, as other threads may run ticks too. None for a bad target."""
-        targets, robot = self.targets.copy(), self._problem.robot
+    def given_at(self, q: Array, v: Array, t: float) -> Given | None:
+        """What the tick is given at time t, in arrays of its own, as other threads may run ticks too.
+
+        None where something is wrong with it: the readable path finds the same, and says so.
+        """
+        try:
+            targets = self._targets_at(t) if self._moving else self.given.numbers[: self.n_targets]
+            given = self.own.given(targets, q, v, t)
+        except Exception:  # code of the user's, which may raise anything
+            return None
+        if given.rows > self._rows:
+            with self.dynamics.lock:
+                self._make_workspace(given.rows)
+        return given
+
+    def _targets_at(self, t: float) -> Array:
+        """All targets at time t. Raises `InputError` for a bad one."""
+        targets, robot = self.given.numbers[: self.n_targets].copy(), self._problem.robot
         for _, first, shape, name, function in self._moving:
-            try:
-                value: Array = np.asarray(function(t), dtype=np.float64)
-                if value.shape != shape:
-                    return None
-                if name == "rotation":
-                    value = nearest_rotation(name, value)
-                if name == "q":
-                    check_unit_lengths(robot.model, name, value, first=2 if robot.is_floating else 1)
-            except (TypeError, ValueError, InputError):
-                return None
+            value: Array = np.asarray(function(t), dtype=np.float64)
+            if value.shape != shape:
+                raise InputError(f"{name} has shape {value.shape}; it must have shape {shape}.")
+            if name == "rotation":
+                value = nearest_rotation(name, value)
+            if name == "q":
+                check_unit_lengths(robot.model, name, value, first=2 if robot.is_floating else 1)
             targets[first : first + value.size] = value.ravel()
         return targets

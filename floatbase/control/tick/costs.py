@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.tick.elimination import Space, add_product
+from floatbase.control.tick.elimination import Space, add_entry, add_product
 from floatbase.control.tick.jit import jit
 from floatbase.control.tick.kinematics import Bodies, body_jacobian, centre_of_mass, frame_pose, point_velocity
 from floatbase.control.tick.memory import clear, take_matrix, take_vector
-from floatbase.control.tick.tables import COM, FORCE, FRAME, ORIENTATION, POSTURE, TORQUE
+from floatbase.control.tick.tables import COM, FORCE, FORCES, FRAME, ORIENTATION, POSTURE, QDD, TAU, TORQUE
 from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
 
 
@@ -21,6 +21,9 @@ class TaskTable(NamedTuple):
     gains: Any  # (N, 3), weight, kp, kd
     frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
     targets: Any  # of all tasks, one after the other: position or rotation row by row, velocity, acceleration
+    first: Any  # where tasks of one's own start among them, one after the other: block, m, weight, A (m, n), b (m,)
+    own: Any  # how many these are
+    rows: Any  # the sum of their m
 
 
 class Cost(NamedTuple):
@@ -123,8 +126,41 @@ def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Space, base, works
                 desired = -kp * e_joint[j] - kd * e_dot_joint[j] if kind == POSTURE else tasks.targets[at + j]
                 weights[first + j] += w
                 weighted[first + j] += w * desired
+    used = own_costs(used, tasks, space, nv, R)
     used = single_entry_costs(used, weights, weighted, space, cost)
     return 4 * ((used + 3) // 4)
+
+
+@jit
+def own_rows(given, at, own, nv, k, d):
+    """How many rows the `own` tasks of one's own have that start at `at` in `given`, and where they end."""
+    rows = 0
+    for _ in range(own):
+        block, m = int(given[at]), int(given[at + 1])
+        at, rows = at + 3 + m * (1 + (nv if block == QDD else (k if block == FORCES else d))), rows + m
+    return rows, at
+
+
+@jit
+def own_costs(used, tasks: TaskTable, space: Space, nv, R):
+    """Add (weight / 2) ‖A x + b‖² of all tasks of one's own to R. Returns how many rows are in use then."""
+    given, at, V, T = tasks.targets, tasks.first, space.V, space.T
+    k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
+    for _ in range(tasks.own):
+        block, m, root = int(given[at]), int(given[at + 1]), np.sqrt(given[at + 2])
+        size, at = nv if block == QDD else (k if block == FORCES else d), at + 3
+        for r in range(m):
+            for i in range(size):
+                entry = root * given[at + r * size + i]
+                if entry != 0.0 and block != TAU:
+                    add_entry(entry, V, space.beta_of, i if block == QDD else nv + i, R, used)
+                elif entry != 0.0:
+                    for c in range(nb + 1):
+                        R[used, c] += entry * T[i, c]
+            R[used, nb] += root * given[at + m * size + r]
+            used += 1
+        at += m * (size + 1)
+    return used
 
 
 @jit

@@ -271,7 +271,7 @@ def wrong_signed_row(mu, q):
 
 
 @jit
-def dual_search(cost: Cost, limits: Inequalities, space: Space, workspace, numbers, mu, beta):
+def dual_search(cost: Cost, limits: Inequalities, space: Space, nv, workspace, numbers, mu, beta):
     """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why there is no answer.
 
     numbers, mu, beta: (nb,) receive the numbers and multipliers of the active rows, and the optimum.
@@ -279,12 +279,12 @@ def dual_search(cost: Cost, limits: Inequalities, space: Space, workspace, numbe
     Newton's method refines the end of the search. Where that shows that it was not the optimum, as a multiplier has the wrong
     sign or a row is violated, the search goes on.
     """
-    nb, d, k = beta.size, limits.torque_limits.size, 3 * (limits.lengths.size // (limits.facets + 1))
+    nb, d, k = beta.size, limits.torque_limits.size, space.V.shape[0] - nv
     H, slope, L = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb), take_matrix(workspace, nb, nb)
     W, U, rows = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
     step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
-    forces, tau = take_vector(workspace, k), take_vector(workspace, d)
+    forces, tau, qdd = take_vector(workspace, k), take_vector(workspace, d), take_vector(workspace, nv)
     active = ActiveSet(numbers, mu, bounds, rows, W, U)
     hessian(cost, H, slope)
     if not cholesky(H, L):
@@ -292,7 +292,7 @@ def dual_search(cost: Cost, limits: Inequalities, space: Space, workspace, numbe
     minimum(L, slope, beta)
     q, refined, moved, number, has_factors = 0, 0, 0.0, 0, False
     for _ in range(100 + 10 * nb):
-        number = violated_row(limits, space, beta, forces, tau)
+        number = violated_row(limits, space, beta, forces, tau, qdd)
         if number < 0:
             if refined == NEWTON_STEPS:
                 break
@@ -311,7 +311,7 @@ def dual_search(cost: Cost, limits: Inequalities, space: Space, workspace, numbe
             inverse(L, W)
             clear(U)
             has_factors = True
-        bound = row_in_beta(number, limits, space, row)
+        bound = row_in_beta(number, limits, space, nv, row)
         q = enforce(number, row, bound, q, step, z, r, active, beta)
         if q < 0:
             return q

@@ -1,27 +1,38 @@
 """The inequalities of (27)(28), G β ≤ h, which are written out only for the rows that β violates.
 
-Rows are numbered: F facets and the normal force of each of P points, then d upper torque limits, then d lower ones.
+Rows are numbered: F facets and the least normal force of each of P points, then their P largest normal forces, d upper torque
+limits, d lower ones, and the rows of one's own. What every problem needs is compiled into the search (`jit_forced`), what few
+need is not: left to itself, the compiler takes in neither, and a tick with many active rows takes 6 % longer.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from floatbase.control.tick.elimination import Space
 from floatbase.control.tick.jit import jit, jit_forced
 from floatbase.control.tick.memory import clear
+from floatbase.control.tick.tables import FORCES, QDD
 from floatbase.control.tick.vectors import dot, minus, row_part, times
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
 
 class Inequalities(NamedTuple):
-    """The inequalities on forces and torques."""
+    """The inequalities on accelerations, forces and torques."""
 
-    cones: Any  # (P (F + 1), 3), rows of G for the force of each point: F facets, then -normal
-    lengths: Any  # (P (F + 1),), of those rows
+    cones: (
+        Any  # (P (F + 1), 5), F facets, then -normal of each point: row of G for its force, length, where in λ its force starts
+    )
     facets: Any  # F
+    points: Any  # P
     torque_limits: Any  # (d,), N·m
-    least_normal: Any  # N, least normal force of each point
+    given: Any  # what `own.Own` packed
+    bounds: Any  # where in it P least and P largest normal forces start, N
+    first: Any  # where rows of one's own start, one group after the other: block, number m of rows, G (m, n), h (m,)
+    groups: Any  # how many groups there are
+    late: Any  # whether there are any of these, or a largest normal force
 
 
 @jit
@@ -65,55 +76,129 @@ def worst_facet(limits: Inequalities, first, f):
     return found, worst
 
 
-@jit
+@jit_forced
 def violated_force_row(limits: Inequalities, forces):
     """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they violate none."""
-    lengths, worst, found = limits.lengths, FEASIBILITY_TOLERANCE, -1
-    for i in range(forces.size // 3):
-        first, f = i * (limits.facets + 1), (forces[3 * i], forces[3 * i + 1], forces[3 * i + 2])
+    cones, worst, found = limits.cones, FEASIBILITY_TOLERANCE, -1
+    n_rows = limits.facets + 1
+    for i in range(limits.points):
+        first, at = i * n_rows, int(cones[i * n_rows, 4])
+        f = forces[at], forces[at + 1], forces[at + 2]
         row, excess = worst_facet(limits, first, f)
-        if row >= 0 and excess > worst * lengths[row]:
-            worst, found = excess / lengths[row], row
+        if row >= 0 and excess > worst * cones[row, 3]:
+            worst, found = excess / cones[row, 3], row
         row = first + limits.facets
-        excess = dot(row_part(limits.cones, row, 0), f) + limits.least_normal
-        if excess > worst * lengths[row]:
-            worst, found = excess / lengths[row], row
+        excess = dot(row_part(cones, row, 0), f) + limits.given[limits.bounds + i]
+        if excess > worst * cones[row, 3]:
+            worst, found = excess / cones[row, 3], row
     return found
 
 
-@jit
-def violated_row(limits: Inequalities, space: Space, beta, forces, tau):
-    """The number of a row of (27)(28) that β (nb,) violates, -1 for none; forces (k,), tau (d,): memory.
+@jit_forced
+def force_rows_of(limits: Inequalities):
+    """How many rows there are on forces."""
+    return limits.cones.shape[0] + limits.points
 
-    Torques are computed only where all forces are feasible, since they cost more.
+
+@jit
+def violated_late_row(limits: Inequalities, space: Space, beta, forces, tau, qdd):
+    """`violated_row` for largest normal forces and rows of one's own, measured on rows of unit length.
+
+    forces, tau: (k,), (d,), those at β. qdd: (nv,), memory.
+    """
+    worst, found, known, cones = FEASIBILITY_TOLERANCE, -1, False, limits.cones
+    for i in range(limits.points):
+        row = i * (limits.facets + 1) + limits.facets
+        start = int(cones[row, 4])
+        along = -dot(row_part(cones, row, 0), (forces[start], forces[start + 1], forces[start + 2]))
+        excess = along - limits.given[limits.bounds + limits.points + i]
+        if excess > worst * cones[row, 3]:
+            worst, found = excess / cones[row, 3], cones.shape[0] + i
+    at, number, given = limits.first, force_rows_of(limits) + 2 * tau.size, limits.given
+    for _ in range(limits.groups):
+        block, m = int(given[at]), int(given[at + 1])
+        if block == QDD and not known:
+            affine_value(space.V, beta, 0, qdd.size, qdd)
+            known = True
+        x = qdd if block == QDD else (forces if block == FORCES else tau)
+        for i in range(m):
+            excess, square = -given[at + 2 + m * x.size + i], 0.0
+            for c in range(x.size):
+                entry = given[at + 2 + i * x.size + c]
+                excess += entry * x[c]
+                square += entry * entry
+            length = np.sqrt(square) if square > 0.0 else 1.0
+            if excess > worst * length:
+                worst, found = excess / length, number + i
+        at, number = at + 2 + m * (x.size + 1), number + m
+    return found
+
+
+@jit_forced
+def violated_row(limits: Inequalities, space: Space, beta, forces, tau, qdd):
+    """The number of a row of (27)(28) that β (nb,) violates, -1 for none; forces (k,), tau (d,), qdd (nv,): memory.
+
+    Torques are computed only where all forces are feasible, since they cost more; what few problems have comes last.
     """
     forces_of(space, beta, forces)
     found = violated_force_row(limits, forces)
     if found >= 0:
         return found
     affine_value(space.T, beta, 0, tau.size, tau)
-    worst, n_force_rows = FEASIBILITY_TOLERANCE, limits.lengths.size
+    worst, n_force_rows = FEASIBILITY_TOLERANCE, force_rows_of(limits)
     for j in range(tau.size):
         excess = abs(tau[j]) - limits.torque_limits[j]
         if excess > worst:
             worst, found = excess, n_force_rows + (j if tau[j] > 0.0 else tau.size + j)
+    if found < 0 and limits.late:
+        return violated_late_row(limits, space, beta, forces, tau, qdd)
     return found
 
 
 @jit
-def row_in_beta(number, limits: Inequalities, space: Space, out):
+def own_row_in_beta(number, limits: Inequalities, space: Space, nv, out):
+    """`row_in_beta` for the rows of one's own, by their own number."""
+    V, T, given, at = space.V, space.T, limits.given, limits.first
+    k, nb = V.shape[0] - nv, V.shape[1] - 1
+    clear(out)
+    while True:
+        block, m = int(given[at]), int(given[at + 1])
+        size = nv if block == QDD else (k if block == FORCES else T.shape[0])
+        if number < m:
+            break
+        at, number = at + 2 + m * (size + 1), number - m
+    bound = given[at + 2 + m * size + number]
+    for i in range(size):
+        entry = given[at + 2 + number * size + i]
+        if entry != 0.0:
+            row = V[i] if block == QDD else (V[nv + i] if block == FORCES else T[i])
+            for c in range(nb):
+                out[c] += entry * row[c]
+            bound -= entry * row[nb]
+    return bound
+
+
+@jit_forced
+def row_in_beta(number, limits: Inequalities, space: Space, nv, out):
     """A row of (27)(28) by its number: out (nb,) = its row of G. Returns its bound in h."""
     V, T, cones = space.V, space.T, limits.cones
-    nb, d, force_rows = V.shape[1] - 1, T.shape[0], cones.shape[0]
+    nb, d, cone_rows, force_rows = V.shape[1] - 1, T.shape[0], cones.shape[0], force_rows_of(limits)
+    if number >= force_rows + 2 * d:
+        return own_row_in_beta(number - force_rows - 2 * d, limits, space, nv, out)
     clear(out)
     if number < force_rows:
-        n_rows = limits.facets + 1
-        first = V.shape[0] - 3 * (force_rows // n_rows) + 3 * (number // n_rows)
-        bound = -limits.least_normal if number % n_rows == limits.facets else 0.0
+        n_rows, row, sign, bound = limits.facets + 1, number, 1.0, 0.0
+        if number >= cone_rows:  # the largest normal force: the row of the least one, turned round
+            row, sign = (number - cone_rows) * n_rows + limits.facets, -1.0
+            bound = limits.given[limits.bounds + limits.points + number - cone_rows]
+        elif number % n_rows == limits.facets:
+            bound = -limits.given[limits.bounds + number // n_rows]
+        first = nv + int(cones[row, 4])
         for r in range(3):
+            factor = sign * cones[row, r]
             for c in range(nb):
-                out[c] += cones[number, r] * V[first + r, c]
-            bound -= cones[number, r] * V[first + r, nb]
+                out[c] += factor * V[first + r, c]
+            bound -= factor * V[first + r, nb]
         return bound
     joint = (number - force_rows) % d
     sign = 1.0 if number - force_rows < d else -1.0

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from floatbase.control.tick.jit import jit
 from floatbase.control.tick.memory import clear
-from floatbase.control.tick.tables import POINT
+from floatbase.control.tick.tables import OWN, POINT
 from floatbase.control.tick.vectors import column_part, cross, minus, plus, rotate, rotation_in, row_part, times
 
 
@@ -28,9 +28,12 @@ class Bodies(NamedTuple):
 class ContactTable(NamedTuple):
     """C contacts with P points."""
 
-    table: Any  # (C, 4), joint, kind, first point, number of points
+    table: Any  # (C, 6), joint, kind, first point, number of points, of motion rows, of entries of λ
     frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
     points: Any  # (P, 3), centre of the ball, or corners, in the frame
+    given: Any  # what `own.Own` packed
+    first: Any  # where the own contacts' A, b and J start in it, one contact after the other
+    points_only: Any  # whether all are point contacts, whose A and J are the same
 
 
 @jit
@@ -102,21 +105,38 @@ def centre_of_mass(bodies: Bodies):
 
 
 @jit
+def copy_rows(numbers, first, rows, columns, out, row):
+    """Copy a table (rows, columns) that starts at `first` in `numbers` into rows of out (·, columns). Returns where it ends."""
+    for i in range(rows):
+        for c in range(columns):
+            out[row + i, c] = numbers[first + i * columns + c]
+    return first + rows * columns
+
+
+@jit
 def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
-    """(4)(5) A (m, nv) and b (m,) of all contacts, and the Jacobian J (k, nv) of their points, the same array where m = k."""
-    row = 0
+    """(4)(5) A (m, nv) and b (m,) of all contacts, and J (k, nv) of (4), the same array where `points_only`."""
+    row, force, nv, given, at = 0, 0, A.shape[1], contacts.given, contacts.first
     clear(A)
     clear(J)
     for i in range(contacts.table.shape[0]):
         joint, kind, first, count = contacts.table[i, 0], contacts.table[i, 1], contacts.table[i, 2], contacts.table[i, 3]
+        m, k = contacts.table[i, 4], contacts.table[i, 5]
+        if kind == OWN:
+            at = copy_rows(given, at, m, nv, A, row)
+            for r in range(m):
+                b[row + r] = given[at + r]
+            at = copy_rows(given, at + m, k, nv, J, force)
+            row, force = row + m, force + k
+            continue
         R, p = frame_pose(bodies, joint, contacts.frames, i)
         normal, radius = row_part(contacts.frames, i, 12), contacts.frames[i, 15]
         for j in range(first, first + count):
             point = minus(plus(p, rotate(R, row_part(contacts.points, j, 0))), times(radius, normal))
-            body_jacobian(bodies, joint, True, point, J, 3 * j)
+            body_jacobian(bodies, joint, True, point, J, force + 3 * (j - first))
             if kind == POINT:
                 p = point
-        if A.shape[0] != J.shape[0]:  # there are flat feet, of three corners or more
+        if not contacts.points_only:
             body_jacobian(bodies, joint, True, p, A, row)
         _, drift = point_velocity(bodies, joint, p)
         if kind == POINT:  # the ball rolls: its lowest point moves on the ball
@@ -126,4 +146,4 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
             body_jacobian(bodies, joint, False, p, A, row + 3)
             b[row + 3], b[row + 4], b[row + 5] = times(-1.0, row_part(bodies.drift, joint, 3))
         b[row], b[row + 1], b[row + 2] = times(-1.0, drift)
-        row += 3 if kind == POINT else 6
+        row, force = row + m, force + k

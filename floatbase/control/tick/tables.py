@@ -6,6 +6,7 @@ What belongs to one robot or one contact is made once, so that a controller with
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable
 from functools import lru_cache
 from threading import Lock
@@ -17,7 +18,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._arrays import Array
-from floatbase.dynamics import FlatFootContact, PointContact
+from floatbase.dynamics import Contact, FlatFootContact, PointContact
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, PostureTask, Task, TorqueTask
 from floatbase.robots import Robot
@@ -29,8 +30,11 @@ COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
 TASK_KINDS: dict[type, int] = {
     CoMTask: COM, OrientationTask: ORIENTATION, FrameTask: FRAME, PostureTask: POSTURE, ForceTask: FORCE, TorqueTask: TORQUE
 }  # fmt: skip
-POINT, FLAT = range(2)
+POINT, FLAT, OWN = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
+QDD, TAU, FORCES = range(3)
+BLOCKS = {"qdd": QDD, "tau": TAU, "forces": FORCES}
+_SPARE = 4  # Pinocchio's results that are kept for the next tick: as many as threads are likely to tick at once
 _POSE = 12  # numbers of a pose: rotation column by column, then position
 Indices: TypeAlias = npt.NDArray[np.int64]
 
@@ -41,12 +45,16 @@ class Dynamics:
     views: M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12); overwritten by every `update`.
     tree, links: as in `kinematics.Bodies`.
     lock: held from `update` until the views have been read.
+    spare: memory for the results of `moment.TickState`, for making it takes longer than a tick.
+    still: zeros (nv,), an acceleration.
     """
 
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
 
     def __init__(self, robot: Robot):
         self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
+        self.spare: deque[pin.Data] = deque(maxlen=_SPARE)
+        self.still = np.zeros(robot.nv)
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE), (8 * _POSE, 8))
@@ -91,59 +99,93 @@ class Target(NamedTuple):
 
 
 def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Target]]:
-    """A problem of the package's own contacts and tasks: what `tick.unpack` takes, and the targets that move, zeros among them.
+    """A problem as what `tick.unpack` takes, with its targets, zeros for those that move, and the moving ones.
 
     Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
     """
     contacts, frames, points, cones = _contact_tables(problem)
+    cones[:, 4] = np.repeat(problem.contacts.point_entries[::3], problem.limits.facets + 1)
     tasks, gains, poses, targets, moving = _task_tables(problem)
-    dynamics, limits, m = dynamics_of(problem.robot), problem.limits, sum(len(on.row_names) for on in problem.contacts)
-    sizes = (len(dynamics.tree), len(contacts), len(points), m, limits.facets + 1, len(tasks), len(limits.torque_limits))
-    lengths, bounds = np.linalg.norm(cones, axis=1), (limits.torque_limits, limits.min_normal_force)
-    real = (0.0, dynamics.links, frames, points, gains, poses, cones, lengths, *bounds)  # a workspace counts in its first entry
+    dynamics, limits, on = dynamics_of(problem.robot), problem.limits, problem.contacts
+    sizes = (
+        len(dynamics.tree),
+        len(contacts),
+        len(points),
+        contacts[:, 4].sum(),
+        limits.facets + 1,
+        len(tasks),
+        problem.robot.d,
+    )
+    own, alike = contacts[contacts[:, 1] == OWN], np.all(contacts[:, 1] == POINT)
+    n_own = sum(m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in own[:, 4:])
+    late = bool(limits.rows) or np.any(limits.bounded_points(on))
+    varying = (on.k, targets.size, n_own, len(problem.tasks) - len(tasks), len(limits.rows), alike, late)
+    # a workspace counts in its first entry
+    real = (0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits)
     indices = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
-    return np.array(sizes, np.int64), indices, np.concatenate([np.ravel(table) for table in real]), targets, moving
+    return np.array((*sizes, *varying), np.int64), indices, np.concatenate([np.ravel(table) for table in real]), targets, moving
 
 
 def _contact_tables(problem: Problem) -> tuple[Any, ...]:
-    """Contacts (C, 4), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P (F + 1), 3)."""
+    """Contacts (C, 6), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P (F + 1), 5)."""
     limits = problem.limits
-    found = [_contact_numbers(problem.robot, cast(Any, contact), limits.facets, limits.inside) for contact in problem.contacts]
+    found = [_contact_numbers(problem.robot, contact, limits.facets, limits.inside) for contact in problem.contacts]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
-    tables = np.array(table, np.int64).reshape(-1, 4)
+    tables = np.array(table, np.int64).reshape(-1, 6)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
     return tables, *(
-        np.concatenate([np.zeros((0, width)), *parts]) for width, parts in ((_POSE + 4, frames), (3, points), (3, cones))
+        np.concatenate([np.zeros((0, width)), *parts]) for width, parts in ((_POSE + 4, frames), (3, points), (5, cones))
     )
 
 
+def _contact_numbers(robot: Robot, contact: Contact, facets: int, inside: bool) -> tuple[tuple[int, ...], Array, Array, Array]:
+    """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
+    if type(contact) in CONTACT_KINDS:
+        return _known_contact(robot, cast(Any, contact), facets, inside)
+    n = len(contact.point_names)
+    row = (0, OWN, 0, n, len(contact.row_names), contact.k)
+    return row, np.zeros((1, _POSE + 4)), np.zeros((n, 3)), _cones(contact, facets, inside)
+
+
 @lru_cache(maxsize=256)
-def _contact_numbers(
+def _known_contact(
     robot: Robot, contact: PointContact | FlatFootContact, facets: int, inside: bool
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
-    """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 3)."""
     joint, pose = _frame(robot, contact.frame)
-    polyhedron = FrictionPolyhedron(contact.normal, contact.mu, facets, inside)
-    rows = np.vstack([polyhedron.rows, -polyhedron.normal])
     radius, points = (contact.radius, contact.centre) if isinstance(contact, PointContact) else (0.0, contact.corners)
     points = np.array(points).reshape(-1, 3)
-    row = (joint, CONTACT_KINDS[type(contact)], 0, len(points))
-    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, np.tile(rows, (len(points), 1))
+    row = (joint, CONTACT_KINDS[type(contact)], 0, len(points), len(contact.row_names), contact.k)
+    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, _cones(contact, facets, inside)
+
+
+def _cones(contact: Contact, facets: int, inside: bool) -> Array:
+    """Facets and -normal of each point of a contact with their lengths, and a zero, (p (F + 1), 5)."""
+    if not contact.point_names:
+        return np.zeros((0, 5))
+    polyhedron = FrictionPolyhedron(contact.normal, contact.mu, facets, inside)
+    rows = np.vstack([polyhedron.rows, -polyhedron.normal])
+    cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])
+    return np.tile(cones, (len(contact.point_names), 1))
 
 
 def _task_tables(problem: Problem) -> tuple[Any, ...]:
-    """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, and those that move."""
-    n, robot = len(problem.tasks), problem.robot
+    """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, and those that move.
+
+    Those of the package: where one of another kind stands among them does not matter.
+    """
+    known = [i for i, task in enumerate(problem.tasks) if type(task) in TASK_KINDS]
+    n, robot = len(known), problem.robot
     table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE))
     targets, first, moving = [np.zeros(0)], 0, []
-    for i, task in enumerate(problem.tasks):
+    for i, which in enumerate(known):
+        task = problem.tasks[which]
         joint, poses[i] = _frame(robot, task.frame) if isinstance(task, OrientationTask | FrameTask) else (0, np.zeros(_POSE))
         table[i] = TASK_KINDS[type(task)], joint, first
         gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)
         for name, shape in _target_shapes(task, robot, problem.contacts.k).items():
             value, target = getattr(task, name), np.zeros(shape)
             if callable(value):
-                moving.append(Target(i, first, shape, name, value))
+                moving.append(Target(which, first, shape, name, value))
             elif np.shape(value) == shape:
                 target = np.asarray(value)
             elif value is not None:

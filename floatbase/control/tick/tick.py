@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from floatbase.control.tick.costs import Cost, TaskTable, task_costs
+from floatbase.control.tick.costs import Cost, TaskTable, own_rows, task_costs
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
 from floatbase.control.tick.elimination import DEPENDENT_ROW, LOST_ROW, Space, eliminate, independent_rows, parametrise, torques
 from floatbase.control.tick.inequalities import Inequalities, affine_value
@@ -31,42 +31,51 @@ FAR = 1e8  # m/s², N·m or N: an entry of the answer beyond this is hardly dete
 
 
 @jit_inline
-def unpack(sizes, indices, numbers, targets):
-    """Tree, links, contacts, tasks and limits as `tables.tables_of` laid them out.
+def unpack(nv, sizes, indices, numbers, given):
+    """Tree, links, contacts, tasks and limits as `tables.tables_of` and `own.Own` laid them out.
 
-    sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints.
+    sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets, numbers of
+        contacts of one's own, tasks of one's own, groups of rows of one's own; 1 or 0: whether all contacts are points, and
+        `Inequalities.late`.
     indices, numbers: whole and real numbers of all tables, one table after the other, as in a workspace.
-    targets: as in `TaskTable`.
+    given: as for `tick`.
     """
-    n, n_contacts, n_points, n_rows, n_tasks, d = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5], sizes[6]
+    n, n_contacts, n_points, n_rows, n_tasks, d, k = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5], sizes[6], sizes[7]
     indices[0], numbers[0] = 1, 1
-    tree, links, contact_table = take_matrix(indices, n, 5), take_matrix(numbers, n, 4), take_matrix(indices, n_contacts, 4)
-    contacts = ContactTable(contact_table, take_matrix(numbers, n_contacts, 16), take_matrix(numbers, n_points, 3))
+    tree, links, contact_table = take_matrix(indices, n, 5), take_matrix(numbers, n, 4), take_matrix(indices, n_contacts, 6)
+    frames, points = take_matrix(numbers, n_contacts, 16), take_matrix(numbers, n_points, 3)
+    bounds, own = sizes[8], sizes[8] + 2 * n_points
+    contacts = ContactTable(contact_table, frames, points, given, own, sizes[12] == 1)
     task_table, gains = take_matrix(indices, n_tasks, 3), take_matrix(numbers, n_tasks, 3)
-    tasks = TaskTable(task_table, gains, take_matrix(numbers, n_tasks, 12), targets)
-    cones, lengths = take_matrix(numbers, n_points * n_rows, 3), take_vector(numbers, n_points * n_rows)
-    torque_limits, least_normal = take_vector(numbers, d), take_vector(numbers, 1)[0]
-    return tree, links, contacts, tasks, Inequalities(cones, lengths, n_rows - 1, torque_limits, least_normal)
+    first = own + sizes[9]
+    rows, last = own_rows(given, first, sizes[10], nv, k, d)
+    tasks = TaskTable(task_table, gains, take_matrix(numbers, n_tasks, 12), given, first, sizes[10], rows)
+    cones, torque_limits = take_matrix(numbers, n_points * n_rows, 5), take_vector(numbers, d)
+    limits = Inequalities(cones, n_rows - 1, n_points, torque_limits, given, bounds, last, sizes[11], sizes[13] == 1)
+    return tree, links, contacts, tasks, limits
 
 
-def workspace_sizes(sizes):
-    """How many real and how many whole numbers a tick needs; sizes: as for `unpack`."""
-    n_joints, _, n_points, m, _, n_tasks, d = (int(size) for size in sizes)
-    base, k = 6, 3 * n_points
+def workspace_sizes(sizes, own_rows):
+    """How many real and how many whole numbers a tick needs.
+
+    sizes: as for `unpack`. own_rows: number of rows of all tasks of one's own.
+    """
+    n_joints, _, _, m, _, n_tasks, d, k = (int(size) for size in sizes[:8])
+    base = 6
     nv = d + base
     n = nv + k  # and no more β than that
     contact = 12 * n_joints + (k + m) * nv + m
     elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
     space = (n + d) * (n + 1)
-    cost = (3 * n_tasks + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
-    search = (n + 1) ** 2 + 4 * n * n + 7 * n + k + d
+    cost = (3 * n_tasks + own_rows + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
+    search = (n + 1) ** 2 + 4 * n * n + 7 * n + k + d + nv
     return 1 + contact + elimination + space + cost + search, 1 + (m + base) + 3 * n
 
 
 @jit
-def inputs_valid(q, v, targets, tree):
+def inputs_valid(q, v, given, tree):
     """Whether all numbers are finite, and quaternions and (cos, sin) in q have length 1; tree: as in `Bodies`."""
-    if not (all_finite(q) and all_finite(v) and all_finite(targets)):
+    if not (all_finite(q) and all_finite(v) and all_finite(given)):
         return False
     for i in range(1, tree.shape[0]):
         if tree[i, 4] > tree[i, 2]:
@@ -96,27 +105,29 @@ def write_answer(space: Space, beta, active, n_active, nv, answer):
 def make_tick(digest):
     """The function `tick`, to be compiled; digest: of this folder."""
 
-    def tick(q, v, targets, M, h, J, Ag, oMi, sizes, indices, numbers, floats, ints, answer, parts):
+    def tick(q, v, given, M, h, J, Ag, oMi, sizes, indices, numbers, floats, ints, answer, parts):
         """(26)(27) Torques, accelerations and forces of one state. Returns how many rows are active, or why there is no answer.
 
         q, v: (nq,), (nv,), the state.
-        targets, sizes, indices, numbers: as for `unpack`; few arrays, since each costs.
+        given: what changes from tick to tick, as `own.Own` packs it: targets, least and largest normal force of each point,
+            then contacts, tasks and rows of one's own.
+        sizes, indices, numbers: as for `unpack`; few arrays, since each costs.
         M, h, J, Ag, oMi: the views of `tables.Dynamics` for q and v.
         floats, ints: workspaces of `workspace_sizes` numbers.
         answer: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each.
         parts: how many of PARTS to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
-        tree, links, contacts, tasks, limits = unpack(sizes, indices, numbers, targets)
-        nv, d, k, m = v.size, limits.torque_limits.size, 3 * contacts.points.shape[0], sizes[3]
+        nv, m, d, k = v.size, sizes[3], sizes[6], sizes[7]
         base, n = nv - d, nv + k
-        if not inputs_valid(q, v, targets, tree):
+        tree, links, contacts, tasks, limits = unpack(nv, sizes, indices, numbers, given)
+        if not inputs_valid(q, v, given, tree):
             return INVALID
         floats[0], ints[0] = 1, 1
         bodies = Bodies(tree, links, oMi, J, Ag, take_matrix(floats, tree.shape[0], 6), take_matrix(floats, tree.shape[0], 6))
         forward_velocities(bodies, v)
         J_points, b = take_matrix(floats, k, nv), take_vector(floats, m)
-        A = J_points if m == k else take_matrix(floats, m, nv)
+        A = J_points if contacts.points_only else take_matrix(floats, m, nv)
         contact_rows(bodies, contacts, A, b, J_points)
         if parts == 1:
             return STOPPED
@@ -138,7 +149,7 @@ def make_tick(digest):
         torques(space.V, space.beta_of, M_rows, h, J_points, base, space.T)
         if parts == 2:
             return STOPPED
-        R = take_matrix(floats, 3 * tasks.table.shape[0] + 2 * d + k + 3, nb + 1)
+        R = take_matrix(floats, 3 * tasks.table.shape[0] + tasks.rows + 2 * d + k + 3, nb + 1)
         diagonal, linear = take_vector(floats, nb), take_vector(floats, nb)
         used = task_costs(q, v, bodies, tasks, space, base, floats, Cost(R, diagonal, linear))
         if used < 0:
@@ -146,7 +157,7 @@ def make_tick(digest):
         if parts == 3:
             return STOPPED
         beta, active, mu = take_vector(floats, nb), take_vector(ints, nb), answer[n + d : n + d + nb]
-        n_active = dual_search(Cost(R[:used], diagonal, linear), limits, space, floats, active, mu, beta)
+        n_active = dual_search(Cost(R[:used], diagonal, linear), limits, space, nv, floats, active, mu, beta)
         if n_active < 0:
             return n_active
         return n_active if write_answer(space, beta, active, n_active, nv, answer) else INACCURATE

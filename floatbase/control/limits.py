@@ -1,0 +1,202 @@
+"""The inequalities of (27) without a state: friction, normal forces, torque limits, and rows of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, Value, checked, of_kind, plain_numbers, positive, read_only, said, text, texts
+from floatbase.dynamics import Block, Contacts, EquationsOfMotion
+from floatbase.errors import InputError, unknown_name
+from floatbase.friction import FrictionPolyhedron
+from floatbase.qp import RowLabel
+from floatbase.robots import Robot, torque_limits_of
+
+BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
+NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
+RowsAt: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows(Value):
+    """Inequality rows of one's own, G x ≤ h, on one block x of (q̈, τ, λ).
+
+    name: in messages; of the row, where there is one, else of "name 0", "name 1", …
+    block: "qdd", "tau" or "forces".
+    rows: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives them; n is the size of the block. The
+        unit is that of the rows: N for forces, m/s² or rad/s² for accelerations.
+    owners: one text for each row instead of its number, such as the names of joints.
+
+    Bounds on joints' accelerations, with E = np.eye(robot.nv)[6:]: `Rows("acceleration", "qdd", (E, np.full(robot.d, 50.0)))`.
+    Raises `InputError` for another block; `at` does so for shapes that do not fit.
+    """
+
+    name: str
+    block: Block
+    rows: RowsAt | Callable[[EquationsOfMotion, float], RowsAt]
+    owners: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        text("name of the rows", self.name)
+        if text("block of the rows", self.block) not in BLOCKS:
+            raise InputError(f'rows {self.name!r} have block {said(self.block)}; it must be "qdd", "tau" or "forces".')
+        object.__setattr__(self, "owners", texts(f"owners of {self.name}", self.owners))
+        if not callable(self.rows) or isinstance(self.rows, type):
+            object.__setattr__(self, "rows", self._checked(self.rows, None))
+
+    def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
+        """G, shape (m, n), and h, shape (m,), at a state and a time t in s, checked."""
+        n = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[self.block]
+        if not callable(self.rows) and np.shape(self.rows[0])[1] == n:  # checked when they were made, but for that
+            return cast("tuple[Array, Array]", self.rows)
+        return self._checked(self.rows(eom, t) if callable(self.rows) else self.rows, n)
+
+    def labels(self, m: int) -> tuple[RowLabel, ...]:
+        """A label for each of m rows. Raises `InputError` where there is another number of owners."""
+        if self.owners and len(self.owners) != m:
+            raise InputError(f"rows {self.name!r} have {len(self.owners)} owners and {m} rows; give one for each row.")
+        if self.owners:
+            return tuple(RowLabel(f"{self.name} {owner}", self.name, owner) for owner in self.owners)
+        return tuple(RowLabel(f"{self.name} {i}" if m > 1 else self.name, "rows", self.name, i) for i in range(m))
+
+    def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
+        if not isinstance(given, tuple | list) or len(given) != 2:
+            raise InputError(f"rows {self.name!r} must be G and h, as in (G, h), not {said(given)}.")
+        G = checked(f"G of {self.name}", given[0], (None, n))
+        return G, checked(f"h of {self.name}", given[1], (len(G),))
+
+
+@dataclass(frozen=True, eq=False)
+class Limits(Value):
+    """The inequalities of (27).
+
+    torque_limits: shape (d,), N·m, +inf where there is none.
+    facets: number of facets of the friction polyhedron (28) of every contact point.
+    inside: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
+    min_normal_force, max_normal_force: N, bounds of normal · f at every contact point: one number for all, or a mapping from
+        the name of a contact to a number or a function of the time t in s; 0 and none where it has none.
+    rows: rows of one's own.
+
+    Raises `InputError` for values that do not fit.
+    """
+
+    torque_limits: Array
+    facets: int = 4
+    inside: bool = True
+    min_normal_force: NormalForces = 0.0
+    max_normal_force: NormalForces | None = None
+    rows: Sequence[Rows] = ()
+
+    def __post_init__(self) -> None:
+        limits = plain_numbers(self.torque_limits)
+        object.__setattr__(self, "torque_limits", torque_limits_of(1 if limits is None else limits.size, self.torque_limits))
+        object.__setattr__(self, "min_normal_force", _kept("min_normal_force", self.min_normal_force))
+        object.__setattr__(
+            self, "max_normal_force", _kept("max_normal_force", {} if self.max_normal_force is None else self.max_normal_force)
+        )
+        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets, self.inside)
+        for name in ("facets", "inside"):
+            object.__setattr__(self, name, getattr(polyhedron, name))
+        if isinstance(self.rows, Rows) or not isinstance(self.rows, Sequence):
+            raise InputError(f"rows must be a list of Rows, not {said(self.rows)}.")
+        example = "floatbase.control.Rows(name, block, (G, h))"
+        object.__setattr__(self, "rows", tuple(of_kind("each of rows", rows, Rows, example) for rows in self.rows))
+
+    @cached_property
+    def move(self) -> bool:
+        """Whether a normal force is bounded by a function of time."""
+        given = (bound for bound in (self.min_normal_force, self.max_normal_force) if isinstance(bound, Mapping))
+        return any(callable(value) for bound in given for value in bound.values())
+
+    def normal_forces(self, contacts: Contacts, t: float = 0.0) -> tuple[Array, Array]:
+        """Least and largest normal force, N, of each point at time t in s, shapes (P,); inf where none is the largest.
+
+        Raises `UnknownNameError` for the name of no contact, and `InputError` for a function's value that is no force.
+        """
+        if not self.move:
+            return _still_normal_forces(contacts, self)
+        return _at("min_normal_force", self.min_normal_force, contacts, t, 0.0), self._largest(contacts, t)
+
+    def _largest(self, contacts: Contacts, t: float) -> Array:
+        assert self.max_normal_force is not None  # as it was made
+        return _at("max_normal_force", self.max_normal_force, contacts, t, np.inf)
+
+    def bounded_points(self, contacts: Contacts) -> npt.NDArray[np.bool_]:
+        """Which points have a largest normal force, shape (P,)."""
+        given = self.max_normal_force
+        names = given if isinstance(given, Mapping) else contacts.names
+        return np.array([contact.name in names for contact in contacts for _ in contact.point_names], dtype=np.bool_)
+
+
+def _kept(name: str, given: NormalForces) -> NormalForces:
+    """A checked copy of what bounds normal forces."""
+    if not isinstance(given, Mapping):
+        return positive(name, given, "N", allow_zero=True)
+    return {
+        contact: value if callable(value) else positive(f"{name} of {contact}", value, "N", allow_zero=True)
+        for contact, value in given.items()
+    }
+
+
+def _at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float) -> Array:
+    """Bounds of normal forces at time t, (P,)."""
+    if not isinstance(given, Mapping):
+        return np.full(contacts.n_points, given)
+    for contact in given:
+        if contact not in contacts.names:
+            raise unknown_name(f"contact in {name}", contact, contacts.names)
+    found = []
+    for each in contacts:
+        value = given.get(each.name, otherwise)
+        if callable(value):
+            value = positive(f"{name} of {each.name}", value(t), "N", allow_zero=True)
+        found += [value] * len(each.point_names)
+    return np.array(found, dtype=np.float64)
+
+
+# what does not depend on the state is built once for each contacts, robot and limits (all immutable)
+@lru_cache(maxsize=64)
+def _still_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
+    least = _at("min_normal_force", limits.min_normal_force, contacts, 0.0, 0.0)
+    return read_only(least), read_only(limits._largest(contacts, 0.0))
+
+
+@lru_cache(maxsize=64)
+def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[RowLabel, ...]]:
+    """G of friction facets and least normal force of every point, then of the largest normal forces, and the rows' names."""
+    per_point = limits.facets + 1
+    names: list[RowLabel] = []
+    G = np.zeros((per_point * contacts.n_points, contacts.k))
+    for i, point in enumerate(contacts.point_names):
+        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
+        G[per_point * i : per_point * (i + 1), contacts.point_entries[3 * i : 3 * i + 3]] = np.vstack([cone.rows, -cone.normal])
+        names += [RowLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
+        names.append(RowLabel(f"{point} normal force", "normal force", point))
+    bounded = np.flatnonzero(limits.bounded_points(contacts))
+    names += [
+        RowLabel(f"{contacts.point_names[i]} largest normal force", "largest normal force", contacts.point_names[i])
+        for i in bounded
+    ]
+    return read_only(np.vstack([G, -G[limits.facets :: per_point][bounded]])), tuple(names)
+
+
+def force_bounds(contacts: Contacts, limits: Limits, least: Array, largest: Array) -> Array:
+    """h of `force_rows` for the least and largest normal force of every point, (P,)."""
+    h = np.zeros((contacts.n_points, limits.facets + 1))
+    h[:, -1] = -least
+    return np.concatenate([h.ravel(), largest[limits.bounded_points(contacts)]])
+
+
+@lru_cache(maxsize=64)
+def torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
+    """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h, and the names of the rows."""
+    limited = np.flatnonzero(np.isfinite(limits.torque_limits))
+    rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
+    sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]
+    names = tuple(RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side, joint in sides)
+    return read_only(np.vstack([rows, -rows])), read_only(np.tile(bound, 2)), names

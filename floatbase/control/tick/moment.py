@@ -1,0 +1,97 @@
+"""One moment of the compiled tick, as tasks, constraints and rows of one's own see it: only what they ask for is computed."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import pinocchio as pin
+
+from floatbase._arrays import Array, read_only
+from floatbase.control.tick.tables import Dynamics
+from floatbase.dynamics import Contacts, EquationsOfMotion
+from floatbase.robots import State
+
+
+class TickState(State):
+    """The state of a tick, which checks nothing, since the tick does, and borrows the memory of Pinocchio's results.
+
+    It gives that memory back when nothing refers to it any more: whoever keeps a state keeps what it says.
+
+    dynamics: of the robot.
+    q, v: (nq,), (nv,), which nobody else may write to.
+    """
+
+    def __init__(self, dynamics: Dynamics, q: Array, v: Array):
+        q, v = q.view(), v.view()
+        q.flags.writeable = v.flags.writeable = False
+        self.__dict__.update(robot=dynamics.robot, q=q, v=v, _spare=dynamics.spare, _still=dynamics.still)
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        """What `State` computes, but for M and h, with which whoever asks for positions or Jacobians need not wait."""
+        model, spare = self.robot.model, self.__dict__["_spare"]
+        try:
+            data = spare.pop()
+        except IndexError:
+            data = model.createData()
+        pin.forwardKinematics(model, data, self.q, self.v, self.__dict__["_still"])
+        pin.centerOfMass(model, data, pin.KinematicLevel.ACCELERATION, False)
+        pin.jacobianCenterOfMass(model, data, False)
+        pin.computeJointJacobians(model, data)
+        pin.updateFramePlacements(model, data)
+        return data
+
+    @cached_property
+    def M(self) -> Array:
+        """As `State.M`."""
+        pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD)
+        return read_only(self._data.M)
+
+    @cached_property
+    def h(self) -> Array:
+        """As `State.h`."""
+        return read_only(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
+
+    def __del__(self) -> None:
+        if "_data" in self.__dict__:
+            self.__dict__["_spare"].append(self.__dict__["_data"])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return State, (self.robot, self.q, self.v)
+
+
+class TickEquations(EquationsOfMotion):
+    """(7) in a tick: `equations_of_motion(state, contacts, t)`, of which M, h, J, A and b are made when they are asked for."""
+
+    def __init__(self, state: TickState, contacts: Contacts, t: float):
+        self.__dict__.update(state=state, contacts=contacts, S=state.robot.S, _t=t)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("M", "h"):
+            return getattr(self.state, name)
+        if name == "J":
+            self.__dict__["J"] = self.contacts.jacobian(self.state, self.__dict__["_t"])
+        elif name in ("A", "b"):
+            self.__dict__["A"], self.__dict__["b"] = self.contacts.constraint(self.state, self.__dict__["_t"])
+        else:
+            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
+        return self.__dict__[name]
+
+    @property
+    def nv(self) -> int:
+        """Length of q̈."""
+        return self.robot.nv
+
+    @property
+    def d(self) -> int:
+        """Length of τ."""
+        return self.robot.d
+
+    @property
+    def k(self) -> int:
+        """Length of λ."""
+        return self.contacts.k
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return EquationsOfMotion, (self.state, self.contacts, self.M, self.h, self.S, self.J, self.A, self.b)

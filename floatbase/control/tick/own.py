@@ -1,0 +1,106 @@
+"""What a tick is given beside the state: moving targets, and the numbers of tasks, constraints and rows of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Array, read_only
+from floatbase.affine import Affine
+from floatbase.control.problem import Problem, residual_of
+from floatbase.control.tick.moment import TickEquations, TickState
+from floatbase.control.tick.tables import BLOCKS, CONTACT_KINDS, TASK_KINDS, Dynamics
+from floatbase.dynamics import Contact, EquationsOfMotion, LinearConstraint, equations_of_motion
+from floatbase.errors import InputError
+from floatbase.robots import State
+
+NO_LIMIT = 1e300  # N, for inf among numbers that must be finite
+
+
+class Given(NamedTuple):
+    """What one tick is given."""
+
+    numbers: Array  # targets, least and largest normal force of each point, then own contacts, tasks and rows
+    rows: int = 0  # of all tasks of one's own
+    contacts: tuple[tuple[Array, Array, Array], ...] = ()  # A, b and J of each own contact
+    residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType(
+        {}
+    )  # weight and residual of tasks of one's own, by their number
+    normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))  # least and largest of each point, (P,)
+    inequalities: tuple[tuple[Array, Array], ...] = ()  # G and h of rows of one's own
+
+
+class Own:
+    """What a problem has of its owner's making: objects that the tables of the tick do not know.
+
+    any: whether there is something. changes: whether it, or a bound of a normal force, must be asked for at every tick.
+    """
+
+    def __init__(self, problem: Problem, dynamics: Dynamics):
+        self._problem, self._dynamics, self._limits = problem, dynamics, problem.limits
+        self._tasks = [(i, task, BLOCKS[task.block]) for i, task in enumerate(problem.tasks) if type(task) not in TASK_KINDS]
+        self._contacts = [contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS]
+        self.any = bool(self._tasks or self._contacts or self._limits.rows)
+        self.changes = self.any or self._limits.move
+        self._bounds = _finite(self._limits.normal_forces(problem.contacts))
+
+    def nothing(self, targets: Array) -> Given:
+        """Targets, what still bounds of normal forces are, and otherwise as many zeros as a tick without a state needs."""
+        contacts, nv = self._problem.contacts, self._problem.robot.nv
+        bounds = self._limits.normal_forces(contacts)
+        own = sum(len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts)
+        nothing = np.zeros(own + 3 * len(self._tasks) + 2 * len(self._limits.rows))
+        return Given(np.concatenate([targets, *self._bounds, nothing]), normal_forces=bounds)
+
+    def given(self, targets: Array, q: Array, v: Array, t: float) -> Given:
+        """What a tick is given at a state. Raises `InputError`, or what functions of the owner's raise."""
+        problem, limits = self._problem, self._limits
+        bounds = limits.normal_forces(problem.contacts, t)
+        parts: list[npt.ArrayLike] = [targets, *(_finite(bounds) if limits.move else self._bounds)]
+        if not self.any:
+            return Given(np.concatenate(parts), normal_forces=bounds)
+        eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)
+        contacts = tuple(_motion(contact, eom.state, t) for contact in self._contacts)
+        for A, b, J in contacts:
+            parts += [A.ravel(), b, J.ravel()]
+        residuals, rows = {}, 0
+        for i, task, block in self._tasks:
+            residual, weight = residual_of(task, eom, t), float(task.weight)
+            if not weight >= 0.0:
+                raise InputError(f"weight of {task.name} is {weight:g}; it must be ≥ 0.")
+            residuals[i] = weight, residual
+            rows += residual.n_out
+            parts += [(block, residual.n_out, weight), residual.A.ravel(), residual.b]
+        inequalities = tuple(each.at(eom, t) for each in limits.rows)
+        for each, (G, h) in zip(limits.rows, inequalities, strict=True):
+            each.labels(len(h))
+            parts += [(BLOCKS[each.block], len(h)), G.ravel(), h]
+        return Given(np.concatenate(parts), rows, contacts, residuals, bounds, inequalities)
+
+    def equations(self, state: State, t: float, given: Given) -> EquationsOfMotion:
+        """(7) with what the own contacts said in a tick."""
+        contacts = self._problem.contacts
+        if not self._contacts:
+            return equations_of_motion(state, contacts, t)
+        own = iter(given.contacts)
+        rows = [_motion(contact, state, t) if type(contact) in CONTACT_KINDS else next(own) for contact in contacts]
+        A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))
+        return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)
+
+
+def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
+    return bounds[0], np.minimum(bounds[1], NO_LIMIT)
+
+
+def _motion(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
+    """A, b and J of a contact. Raises `InputError` where they do not have the shapes that the contact says."""
+    A, b = contact.constraint(state, t)
+    J = A if isinstance(contact, LinearConstraint) else contact.jacobian(state, t)  # asks its function once
+    m, nv = len(contact.row_names), state.robot.nv
+    if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
+        raise InputError(f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}.")
+    return A, b, J

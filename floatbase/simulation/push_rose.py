@@ -1,0 +1,232 @@
+"""`push_rose`: the largest push that a controller survives in each direction, and what theory says beside it."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from math import ceil
+from typing import Any
+
+import cloudpickle
+import numpy as np
+
+from floatbase._arrays import Array, Value, checked, positive, read_only
+from floatbase.dynamics import Contacts
+from floatbase.errors import InputError, SimulationError
+from floatbase.friction import wrench_set
+from floatbase.robots import State
+from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.rollout import Controller, rollout
+from floatbase.simulation.sweep import sweep
+
+_FEWEST = 3  # directions: fewer are no closed line
+_FACETS = 16  # of the polyhedra in the friction cones: they leave out 2 % of them
+_MOST = 100.0  # of the robot's weight: a push that is survived beyond it is not carried by the ground
+_LEVEL = 1e-9  # least cosine between direction and an edge's normal: less is an edge along the direction, never met
+
+
+@dataclass(frozen=True, eq=False)
+class PushRose(Value):
+    """The largest push that was survived in each of n directions, and theory's curves beside it. All pushes are in N.
+
+    directions: (n,) rad, of the pushes, in the world's horizontal plane, from x towards y.
+    pushes: (n,) N, survived; a push that is `step` larger was not.
+    step: N, the resolution.
+    duration: s, of each push.
+    frame: the frame that was pushed.
+    state, contacts: the robot and its stance, when the push began in an undisturbed stand.
+
+    `floatbase.viewer.roses` plots it, and draws it on the ground below the robot.
+    """
+
+    directions: Array
+    pushes: Array
+    step: float
+    duration: float
+    frame: str
+    state: State
+    contacts: Contacts
+
+    def __post_init__(self) -> None:
+        directions = checked("directions", self.directions, (None,), "rad")
+        object.__setattr__(self, "directions", directions)
+        object.__setattr__(self, "pushes", checked("pushes", self.pushes, directions.shape, "N"))
+
+    @cached_property
+    def unit_vectors(self) -> Array:
+        """The directions as horizontal vectors, shape (n, 3), world."""
+        return _unit_vectors(self.directions)
+
+    @cached_property
+    def steady(self) -> Array:
+        """(20)(21)(28) The largest push that the stance bears for ever without moving, shape (n,), N.
+
+        The contact forces must carry the weight and hold against the push, all inside their friction cones: `WrenchSet.reach`.
+        """
+        wrenches = wrench_set(self.state, self.contacts, facets=_FACETS)
+        lever = self.state.frame_pose(self.frame).translation - wrenches.about
+        carried = np.array([0.0, 0.0, wrenches.weight, 0.0, 0.0, 0.0])
+        return read_only([wrenches.reach(-np.concatenate([d, np.cross(lever, d)]), carried) for d in self.unit_vectors])
+
+    @cached_property
+    def capture(self) -> Array:
+        """The push that moves the capture point to the border of the support region, shape (n,), N.
+
+        The linear inverted pendulum of height h: ω = √(g/h), and an impulse J moves the capture point, which is below a
+        centre of mass at rest, by J / (m ω). As long as it is in the support region, a robot can stop without a step; what
+        it does with its angular momentum, and with its height, is left out. The ground is level.
+        """
+        robot, com = self.state.robot, self.state.com
+        height = com[2] - self.contacts.positions(self.state)[:, 2].mean()
+        omega = np.sqrt(robot.gravity / height)
+        region = wrench_set(self.state, self.contacts).support_region()
+        return read_only(_border(region, com[:2], self.unit_vectors[:, :2]) * robot.mass * omega / self.duration)
+
+    def __repr__(self) -> str:
+        span = f"{self.pushes.min():g} to {self.pushes.max():g} N for {self.duration:g} s"
+        return f"PushRose({self.state.robot.name}, {len(self.directions)} directions, {span}, in steps of {self.step:g} N)"
+
+
+def push_rose(
+    controller: Controller | Callable[[], Any],
+    *,
+    directions: int = 16,
+    duration: float = 0.1,
+    frame: str = "base",
+    start: float = 0.2,
+    watch: float = 1.5,
+    most: float | None = None,
+    step: float = 5.0,
+    workers: int | None = None,
+    cluster: Any = None,
+    progress: bool = True,
+) -> PushRose:
+    """The largest horizontal push that a controller survives on the physics, in each of several directions, by bisection.
+
+    A push is survived when `rollout` comes to its end: the robot has not fallen, nothing diverged, no controller failed.
+    Each push has a simulation and a controller of its own, so that none remembers the one before. Bisection takes for
+    granted that whoever survives a push survives every smaller one in that direction; it does not look for gaps.
+
+    controller: one that has a `robot`, as `fb.WholeBodyController`, and stands on level ground with friction 1; or a function
+        without parameters that makes one, or makes a pair (simulation, controller): each push starts in that simulation.
+    directions: how many, evenly spaced from the world's x axis.
+    duration: s, of the push.
+    frame: name of the frame at whose origin it acts.
+    start: s, before the push: the robot settles.
+    watch: s, after the push: a slow fall must happen within it.
+    most: N, the first push tried, by default the robot's weight; it is doubled while it is survived.
+    step: N, the resolution: pushes are multiples of it.
+    workers, cluster, progress: as for `fb.sweep`; a direction is a point.
+
+    Raises `InputError` for numbers that do not fit, and for a robot that is bolted to the ground; `SimulationError` where the
+    robot falls without a push, and where it survives a hundred times its weight.
+    """
+    if isinstance(directions, bool) or not isinstance(directions, int | np.integer) or directions < _FEWEST:
+        raise InputError(f"directions is {directions!r}; it must be a whole number ≥ {_FEWEST}.")
+    make = _maker(controller)
+    sim, one = make()
+    robot, contacts = sim.robot, getattr(one, "contacts", None)
+    if not robot.is_floating:
+        raise InputError(f"{robot.name} is bolted to the ground and cannot fall: it has no push rose.")
+    robot.frame_id(frame)
+    settings = {
+        "start": positive("start", start, "s", allow_zero=True),
+        "duration": positive("duration", duration, "s"),
+        "watch": positive("watch", watch, "s"),
+        "step": positive("step", step, "N"),
+    }
+    first = ceil(positive("most", robot.weight if most is None else most, "N") / step)
+
+    def largest_push(direction: float) -> float:  # the bar shows this name
+        return _largest(direction, make, frame, first, **settings)
+
+    angles = 2.0 * np.pi * np.arange(directions) / directions
+    table = sweep(largest_push, {"direction": angles}, workers=workers, cluster=cluster, progress=progress)
+    for row in table.errors:
+        raise SimulationError(f"the push towards {np.rad2deg(row['direction']):.0f}° ended with {row['error']}")
+    return PushRose(
+        read_only(angles), read_only(table["result"]), settings["step"], settings["duration"], frame, sim.state,
+        contacts if isinstance(contacts, Contacts) else sim.feet,
+    )  # fmt: skip
+
+
+def _maker(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
+    """A function that makes a simulation and a controller, from what `push_rose` was given; it can be sent to a worker."""
+    if not callable(controller):
+        raise InputError(f"push_rose needs a controller, or a function that makes one, not {controller!r}.")
+    if not hasattr(controller, "robot"):
+        return partial(_pair, controller)
+    try:
+        return partial(_pair, partial(pickle.loads, cloudpickle.dumps(controller)))
+    except Exception as error:
+        raise InputError(
+            f"this controller cannot be copied for each push ({type(error).__name__}: {error}): give a function without "
+            "parameters that makes it."
+        ) from error
+
+
+def _pair(make: Callable[[], Any]) -> tuple[Simulation, Any]:
+    """What a function makes, a controller or (simulation, controller), as a pair."""
+    made = make()
+    if isinstance(made, tuple) and len(made) == 2 and isinstance(made[0], Simulation):
+        return made
+    if not callable(made) or not hasattr(made, "robot"):
+        raise InputError(
+            f"the function must make a controller that has a robot, or a pair (simulation, controller), not {made!r}."
+        )
+    return Simulation(made.robot), made
+
+
+def _largest(
+    direction: float,
+    make: Callable[[], tuple[Simulation, Any]],
+    frame: str,
+    first: int,
+    start: float,
+    duration: float,
+    watch: float,
+    step: float,
+) -> float:
+    """The largest multiple of `step`, N, that is survived as a push in a direction, rad; `first` is the first one tried."""
+
+    def survives(steps: int) -> bool:
+        sim, controller = make()
+        push = Push(steps * step * _unit_vectors(direction), sim.time + start, duration, frame)
+        ticks = ceil((start + duration + watch) / sim.timestep)
+        return rollout(sim, controller, ticks * sim.timestep, [push]).outcome == "completed"
+
+    survived, fatal = 0, first
+    while survives(fatal):
+        survived, fatal = fatal, 2 * fatal
+        if fatal * step > _MOST * make()[0].robot.weight:
+            raise SimulationError(
+                f"a push of {survived * step:g} N is survived, and the doubled one is too large to be sensible."
+            )
+    while fatal - survived > 1:
+        middle = (survived + fatal) // 2
+        survived, fatal = (middle, fatal) if survives(middle) else (survived, middle)
+    if survived == 0 and not survives(0):
+        raise SimulationError("the robot falls without a push.")
+    return survived * step
+
+
+def _unit_vectors(directions: Any) -> Array:
+    """Horizontal unit vectors, shape (…, 3), for directions, rad."""
+    return read_only(np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1))
+
+
+def _border(polygon: Array, inside: Array, directions: Array) -> Array:
+    """How far it is from a point to the border of a convex polygon, shape (n,), m; 0 for a point that is not inside.
+
+    polygon: (k, 2), m, counter-clockwise. inside: (2,), m, the point. directions: (n, 2), unit.
+    """
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    slack = np.sum(normals * (polygon - inside), axis=1)
+    if len(polygon) < 3 or np.any(slack < 0.0):
+        return np.zeros(len(directions))
+    towards = directions @ normals.T
+    return np.asarray(np.min(np.where(towards > _LEVEL, slack / np.maximum(towards, _LEVEL), np.inf), axis=1))

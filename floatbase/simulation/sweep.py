@@ -1,0 +1,319 @@
+"""`sweep`: a function at every point of a grid, in processes on this machine or on a Dask cluster."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import os
+import pickle
+import threading
+import time
+import traceback
+import uuid
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import closing, contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cloudpickle
+import loky
+from tqdm.auto import tqdm
+
+from floatbase.errors import InputError, SimulationError
+from floatbase.simulation.table import RESERVED, Row, Store, Table, plain
+
+_IDLE = 60.0  # s after which a worker without work ends; the next sweep within them saves its start
+_LOOK = 1.0  # s between a worker's looks whether the program that started it is still there
+_AHEAD = 2  # points handed out for each worker: one that it is at, and the next
+_COMING = 32  # threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
+_CONNECTING = 10.0  # s that a Dask scheduler may take to answer
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1")
+
+
+def sweep(
+    function: Callable[..., Any],
+    grid: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
+    *,
+    setup: Callable[[], Any] | None = None,
+    to: str | Path | None = None,
+    workers: int | None = None,
+    cluster: Any = None,
+    progress: bool = True,
+) -> Table:
+    """Call a function at every point of a grid, in several processes, and collect what it returns in a table.
+
+        def setup():                                         # heavy things, made once in each process
+            robot = fb.load("go2")
+            controller = fb.WholeBodyController(robot, fb.Contacts.points(robot, mu=0.7), fb.standing_tasks(robot.standing()))
+            return fb.Simulation(robot), controller
+
+        def push(made, force, angle):
+            sim, controller = made
+            sim.reset()
+            run = fb.rollout(sim, controller, 0.6, [fb.Push([force * np.cos(angle), force * np.sin(angle), 0.0])])
+            return {"outcome": run.outcome, "moved": run.com[-1] - run.com[0]}
+
+        grid = {"force": [50.0, 100.0, 150.0], "angle": np.linspace(0.0, np.pi, 7)}
+        table = fb.sweep(push, grid, setup=setup, to="pushes.jsonl")
+
+    function: takes the parameters by their names, after what `setup` returned where there is one. It returns a dict, a column
+        for each name, or one value, the column "result": numbers, texts, booleans, lists and numpy arrays. An exception makes
+        the row's "error", and the sweep goes on.
+    grid: name -> values, for all combinations, the last name the fastest; or a list of dicts, one for each point.
+    setup: called once in each process (on Dask in each thread), for what is heavy or cannot be sent.
+    to: path of a file that keeps each row as it comes. The same sweep into the same file goes on where it was ended, however
+        it was; two points for each worker are lost at most. The function is known by its name: after changing what it does,
+        give another file. A file of another function or grid is refused. `Table.read` reads a file.
+    workers: how many processes, by default as many as the machine has cores for this program. Each uses one thread for
+        linear algebra, so that the rows are the same, bit for bit, whatever their number.
+    cluster: a `dask.distributed.Client`, or the address of a scheduler, to work there: pip install "floatbase[cluster]".
+    progress: whether to show a bar.
+
+    Functions, lambdas and classes of a notebook or script can be used: they are sent by value. What is imported must be
+    importable by the workers.
+    Raises `InputError` for a grid that does not fit the function, for an answer that cannot be stored, for a file of
+    something else; `SimulationError` when a process or the cluster breaks down; and what `setup` raises. What is in the
+    file stays there, after an interrupt too.
+    """
+    points = _points(grid)
+    plain_points = [{name: plain(f"parameter {name}", value) for name, value in point.items()} for point in points]
+    name = _name(function, to)
+    _check(function, setup, points)
+    if cluster is not None and workers is not None:
+        raise InputError("workers counts processes on this machine; a cluster has its own. Leave one of the two out.")
+    workers = _workers(workers)
+    job = _job(function, setup)
+    with closing(Store(to, name, plain_points)) as store:
+        open_points = [i for i in range(len(points)) if i not in store.rows]
+        failed = sum(row["error"] is not None for row in store.rows.values())
+        bar = tqdm(total=len(points), initial=len(store.rows), desc=name, unit="point", disable=not progress)
+        with bar, _engine(workers, cluster, bool(open_points)) as engine:
+            for i, answer in _answers(engine, job, points, open_points):
+                store.add(i, plain_points[i] | answer)
+                failed += answer["error"] is not None
+                if failed:
+                    bar.set_postfix(failed=failed, refresh=False)
+                bar.update()
+        return Table(tuple(store.rows[i] for i in range(len(points))))
+
+
+class _Job(NamedTuple):
+    """What a worker needs for all points: `payload` is function and setup, pickled, and `token` says of which sweep."""
+
+    token: str
+    payload: bytes
+
+
+def _points(grid: Any) -> list[Row]:
+    """The parameters of every point."""
+    if isinstance(grid, Mapping):
+        axes = {}
+        for name, values in grid.items():
+            if isinstance(values, str) or not isinstance(values, Iterable):
+                raise InputError(f"the grid's {name!r} must be a list of values, not {values!r}; for one value, [{values!r}].")
+            axes[name] = list(values)
+            if not axes[name]:
+                raise InputError(f"the grid's {name!r} has no values, so the grid has no points.")
+        points = [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())] if axes else []
+    elif isinstance(grid, Iterable) and not isinstance(grid, str):
+        points = list(grid)
+        for point in points:
+            if not isinstance(point, Mapping):
+                raise InputError(f"a grid that is a list holds a dict for each point, name -> value; it has {point!r}.")
+        points = [dict(point) for point in points]
+    else:
+        raise InputError(f"the grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}.")
+    if not points:
+        raise InputError("the grid has no points.")
+    for name in dict.fromkeys(name for point in points for name in point):
+        if not isinstance(name, str) or name in RESERVED:
+            raise InputError(f"a parameter cannot be called {name!r}; {' and '.join(RESERVED)} are the table's own names.")
+    return points
+
+
+def _name(function: Any, to: Any) -> str:
+    """What the function is called in the file and beside the bar."""
+    if not callable(function):
+        raise InputError(f"sweep needs a function first, not {function!r}.")
+    name = getattr(function, "__qualname__", None)
+    if to is not None and (name is None or name.endswith("<lambda>")):
+        raise InputError(
+            f"a file knows its function by its name, and {function!r} has none: write it as a def, and its constants as "
+            "parameters of the grid."
+        )
+    return type(function).__name__ if name is None else name.rpartition("<locals>.")[2]
+
+
+def _check(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
+    """Raise `InputError` for parameters that the function does not take, and for a setup that is no function."""
+    if setup is not None and not callable(setup):
+        raise InputError(f"setup must be a function without parameters, not {setup!r}.")
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return  # compiled functions hide their parameters
+    made = () if setup is None else (None,)
+    for names in dict.fromkeys(tuple(point) for point in points):
+        try:
+            signature.bind(*made, **dict.fromkeys(names))
+        except TypeError as error:
+            before = "what setup returns, then " if made else ""
+            name = getattr(function, "__name__", function)
+            raise InputError(f"the grid gives {before}{', '.join(names)}; {name} takes {signature}: {error}.") from None
+
+
+def _workers(workers: Any) -> int:
+    if workers is None:
+        return int(loky.cpu_count())
+    if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
+        raise InputError(f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one on each core.")
+    return int(workers)
+
+
+def _job(function: Any, setup: Any) -> _Job:
+    try:
+        return _Job(uuid.uuid4().hex, cloudpickle.dumps((function, setup)))
+    except Exception as error:
+        raise InputError(
+            f"the function cannot be sent to other processes ({type(error).__name__}: {error}). Make what it uses in a "
+            "function, and hand that in as setup."
+        ) from error
+
+
+class _Engine(NamedTuple):
+    """Who computes: an executor, and how many points it is given at a time; no others are lost when the program is killed."""
+
+    executor: Executor
+    window: int
+
+
+@contextmanager
+def _engine(workers: int, cluster: Any, needed: bool) -> Iterator[_Engine | None]:
+    """Processes on this machine or the cluster's; what is not done when an exception comes is dropped."""
+    if not needed:
+        yield None
+    elif cluster is None:
+        executor = loky.get_reusable_executor(
+            workers, timeout=_IDLE, initializer=_end_with, initargs=(os.getpid(),), env=_ONE_THREAD
+        )
+        try:
+            yield _Engine(executor, _AHEAD * workers)
+        except BaseException:
+            executor.shutdown(kill_workers=True)
+            raise
+    else:
+        with _client(cluster) as client:
+            executor = client.get_executor(pure=False)
+            try:
+                yield _Engine(executor, _AHEAD * max(sum(client.nthreads().values()), _COMING))
+            finally:
+                executor.shutdown(wait=False)
+
+
+@contextmanager
+def _client(cluster: Any) -> Iterator[Any]:
+    """The Dask client that was handed in, or one for an address."""
+    try:
+        from distributed import Client
+        from distributed.comm import parse_host_port
+    except ImportError:
+        raise InputError('a cluster needs Dask: pip install "floatbase[cluster]".') from None
+    if isinstance(cluster, Client):
+        if cluster.status != "running":
+            raise InputError(f"the Dask client is {cluster.status}; make a new one.")
+        yield cluster
+        return
+    if not isinstance(cluster, str):
+        raise InputError(f"cluster must be a dask.distributed.Client or a scheduler's address, not {cluster!r}.")
+    try:
+        parse_host_port(cluster)
+        client = Client(cluster, timeout=_CONNECTING, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no Dask scheduler answers at {cluster} ({error}). An address looks like tcp://127.0.0.1:8786; "
+            "`dask scheduler` prints its own."
+        ) from None
+    with client:
+        yield client
+
+
+def _answers(engine: _Engine | None, job: _Job, points: list[Row], open_points: list[int]) -> Iterator[tuple[int, Row]]:
+    """Number and answer of each open point, as they come."""
+    if engine is None:
+        return
+    waiting = iter(open_points)
+    numbers: dict[Future[Row | Exception], int] = {}
+    try:
+        while True:
+            for i in itertools.islice(waiting, engine.window - len(numbers)):
+                numbers[engine.executor.submit(_answer, job, points[i])] = i
+            if not numbers:
+                return
+            for future in wait(numbers, return_when=FIRST_COMPLETED).done:
+                answer = future.result()
+                if isinstance(answer, Exception):
+                    raise answer
+                yield numbers.pop(future), answer
+    except BrokenExecutor as error:
+        raise SimulationError(
+            "a worker process ended in the middle of a point: out of memory, which fewer workers help, or a crash in "
+            "compiled code."
+        ) from error
+
+
+_parent: int | None = None  # in a process of this machine: the program that started it
+_here = threading.local()  # of a worker's thread: function and token of the sweep that it works for
+
+
+def _answer(job: _Job, point: Row) -> Row | Exception:
+    """In a worker: the row's results, or the exception that ends the sweep; raised here, Dask would log it for each point."""
+    _end_without_parent()
+    try:
+        return _results(job, point)
+    except Exception as error:
+        if not isinstance(error, InputError):
+            error.add_note(f"in a worker:\n{traceback.format_exc()}")
+        return error
+
+
+def _results(job: _Job, point: Row) -> Row:
+    """What the function returned at a point, in plain values, and "error"."""
+    if getattr(_here, "token", None) != job.token:
+        try:
+            function, setup = pickle.loads(job.payload)
+        except (ImportError, AttributeError) as error:
+            raise InputError(
+                f"a worker cannot load the function: {error}. The workers must be able to import the module that it is "
+                "from. Functions of a notebook or a script are sent whole, but for those that lru_cache wraps: use setup."
+            ) from error
+        _here.function = function if setup is None else partial(function, setup())
+        _here.token = job.token
+    try:
+        answer = _here.function(**point)
+    except Exception as error:
+        return {"error": f"{type(error).__name__}: {error}"}
+    results = answer if isinstance(answer, Mapping) else {"result": answer}
+    for name in results:
+        if not isinstance(name, str) or name in RESERVED or name in point:
+            raise InputError(f"the function's result {name!r} must be called otherwise: a text that names no parameter.")
+    return {name: plain(f"the function's result {name!r}", value) for name, value in results.items()} | {"error": None}
+
+
+def _end_with(parent: int) -> None:
+    """In a worker: end when the program that started it is gone. One that was killed tells nobody."""
+    global _parent
+    _parent = parent
+
+    def look() -> None:
+        while True:
+            time.sleep(_LOOK)
+            _end_without_parent()
+
+    threading.Thread(target=look, daemon=True).start()
+
+
+def _end_without_parent() -> None:
+    if _parent is not None and os.getppid() != _parent:
+        os._exit(1)

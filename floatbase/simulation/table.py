@@ -1,0 +1,229 @@
+"""`Table`: what a sweep found, row by row; `Store` keeps it in a file that outlives the sweep."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import Value
+from floatbase.errors import InputError, unknown_name
+
+RESERVED = ("point", "error")  # names of the store's own
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Table(Value):
+    """Rows with named columns: one row for each point of a sweep's grid, in the grid's order.
+
+    rows: name -> value, for each point: its parameters, then what the function returned, then "error": None, or type and
+        message of the exception that ended this point. Values are numbers, texts, booleans, lists and None.
+
+    `table["force"]` is a column as an array, `table.to_pandas()` a DataFrame.
+    """
+
+    rows: tuple[Row, ...]
+
+    @classmethod
+    def read(cls, path: str | Path) -> Table:
+        """The table in the file of a sweep, also while the sweep goes on: the points that are done. `InputError` for others."""
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+        rows = _rows_of(path, content)
+        return cls(tuple(rows[i] for i in sorted(rows)))
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns: parameters, results, "error"."""
+        names = dict.fromkeys(name for row in self.rows for name in row if name != "error")
+        return (*names, "error")
+
+    @property
+    def errors(self) -> tuple[Row, ...]:
+        """The rows whose point failed."""
+        return tuple(row for row in self.rows if row["error"] is not None)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, column: str) -> npt.NDArray[Any]:
+        """A column as a read-only array; where a row has no number there is NaN, where it has nothing else None."""
+        if not isinstance(column, str) or column not in self.columns:
+            raise unknown_name("column", column, self.columns)
+        values = [row.get(column) for row in self.rows]
+        if any(_is_number(value) for value in values):
+            values = [np.nan if value is None else value for value in values]
+        try:
+            array = np.array(values)
+        except ValueError:  # lists of different lengths
+            array = np.empty(0, dtype=object)
+        if array.dtype.kind not in "biuf":  # texts stay Python's own, and so does a mixture
+            array = np.empty(len(values), dtype=object)
+            for i, value in enumerate(values):
+                array[i] = value
+        array.flags.writeable = False
+        return array
+
+    def to_pandas(self) -> Any:
+        """The table as a `pandas.DataFrame`. Raises `InputError` where pandas is not installed."""
+        try:
+            import pandas
+        except ImportError:
+            raise InputError('a DataFrame needs pandas: pip install pandas. Without it, table["name"] is a column.') from None
+        return pandas.DataFrame(list(self.rows), columns=list(self.columns))
+
+    def __repr__(self) -> str:
+        failed = f"; {len(self.errors)} failed, the first with {self.errors[0]['error']}" if self.errors else ""
+        return f"Table({len(self)} rows: {', '.join(self.columns)}{failed})"
+
+
+class Store:
+    """The rows of a sweep, number of the point -> row; with a path, also in a file, to which they are added as they come.
+
+    The file is JSON Lines: first a line that says what is swept, then a line for each point that is done. It is locked while
+    the store is open. A last line that was not written to its end is cut off.
+
+    path: of the file; None keeps nothing.
+    name: of the function.
+    points: parameters of all points, in plain values.
+    Raises `InputError` for a file that holds something else, or that another sweep is writing to.
+    """
+
+    def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
+        self.rows: dict[int, Row] = {}
+        self._path, self._points, self._file = path, points, -1
+        if path is None:
+            return
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written to: {error.strerror}.") from None
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._take_up(path, _head(name, points))
+        except BlockingIOError:
+            self.close()
+            raise InputError(f"another sweep is writing to {path}; wait for its end, or give another file.") from None
+        except BaseException:
+            self.close()
+            raise
+
+    def add(self, i: int, row: Row) -> None:
+        """Keep the row of point i. A row is written at once and whole: what ends the program loses no earlier one."""
+        line = json.dumps({"point": i, **row})
+        self.rows[i] = json.loads(line)
+        del self.rows[i]["point"]
+        if self._file >= 0:
+            self._write(line)
+
+    def close(self) -> None:
+        """Close the file, and free it for others."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+    def _take_up(self, path: str | Path, head: Row) -> None:
+        """Read what the file holds, after checking that it is of this sweep; begin it where it is empty."""
+        content = Path(path).read_bytes()
+        whole = content[: content.rfind(b"\n") + 1]
+        if not whole and json.dumps(head).encode().startswith(content):
+            os.ftruncate(self._file, 0)
+            self._write(json.dumps(head))
+            return
+        found = _head_of(path, content)
+        for key, what in (("sweep", "the function"), ("parameters", "the parameters"), ("points", "the number of points")):
+            if found[key] != head[key]:
+                raise _other(path, f"of {what} {_said(found[key])}, this sweep has {_said(head[key])}")
+        if found["grid"] != head["grid"]:
+            raise _other(path, "of the same parameters at other values")
+        self.rows = _rows_of(path, whole)
+        for i, row in self.rows.items():
+            point = self._points[i] if 0 <= i < len(self._points) else {}
+            if not point or _text({name: row.get(name) for name in point}) != _text(point):
+                raise _other(path, f"where point {i} has other parameters: it was changed by hand")
+        os.ftruncate(self._file, len(whole))
+
+    def _write(self, line: str) -> None:
+        data = line.encode() + b"\n"
+        if os.write(self._file, data) != len(data):
+            raise OSError(f"{self._path}: the disc is full. Make room and sweep again: what is done is kept.")
+
+
+def plain(what: str, value: Any) -> Any:
+    """A value as JSON gives it back: numbers, texts, booleans, None, lists and dicts of them; numpy's become Python's.
+
+    Raises `InputError` with `what`, a name, for anything else.
+    """
+    try:
+        return json.loads(json.dumps(value, default=_from_numpy))
+    except (TypeError, ValueError) as error:
+        kinds = "numbers, texts, booleans, None, and lists, dicts or numpy arrays of them"
+        raise InputError(f"{what} cannot be stored: {error}. A table holds {kinds}.") from None
+
+
+def _from_numpy(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"it holds a value of type {type(value).__name__}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _head(name: str, points: Sequence[Row]) -> Row:
+    """The first line of a file: what is swept."""
+    parameters = list(dict.fromkeys(name for point in points for name in point))
+    digest = hashlib.sha256("\n".join(_text(point) for point in points).encode()).hexdigest()
+    return {"sweep": name, "parameters": parameters, "points": len(points), "grid": digest[:16]}
+
+
+def _head_of(path: str | Path, content: bytes) -> Row:
+    """The first line of a file of a sweep."""
+    try:
+        found = json.loads(content.split(b"\n", 1)[0])
+        if set(found) == set(_head("", [])):
+            return dict(found)
+    except (ValueError, TypeError):
+        pass
+    raise _other(path, "of no sweep")
+
+
+def _rows_of(path: str | Path, content: bytes) -> dict[int, Row]:
+    """Number of the point -> row, of all whole lines of a file of a sweep."""
+    _head_of(path, content)
+    rows: dict[int, Row] = {}
+    for number, line in enumerate(content.split(b"\n")[1:-1], start=2):
+        try:
+            row = json.loads(line)
+            rows[int(row.pop("point"))] = row
+        except (ValueError, TypeError, KeyError, AttributeError):
+            advice = "Remove it, and sweep again."
+            raise InputError(f"line {number} of {path} is no row of a sweep: {line[:80]!r}. {advice}") from None
+    return rows
+
+
+def _text(row: Row) -> str:
+    return json.dumps(row)
+
+
+def _said(value: Any) -> str:
+    return ", ".join(value) if isinstance(value, list) else str(value)
+
+
+def _other(path: str | Path, what: str) -> InputError:
+    return InputError(f"{path} is a file {what}; it is left as it is. Give another file, or remove this one.")

@@ -1,0 +1,486 @@
+"""Tasks, constraints and rows of one's own: the same answers on both paths, and the words for what is wrong with them."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.control import Rows
+from floatbase.control.tick import Compiled
+from floatbase.dynamics import EquationsOfMotion, LinearConstraint, PointContact, RollingWheel
+from floatbase.errors import InfeasibleError, InputError, UnknownNameError
+from floatbase.qp import solve
+from floatbase.robots import Robot, State
+
+AGREEMENT = 1e-8  # part of the strongest motor's limit between two ways to the same torques
+
+
+@dataclass
+class MyCoM:
+    """What `fb.CoMTask` is, as a user writes it."""
+
+    target: np.ndarray
+    weight: float = 10.0
+    name: str = "my centre of mass"
+    block: ClassVar[str] = "qdd"
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        s = eom.state
+        desired = -100.0 * (s.com - self.target) - 20.0 * s.com_velocity
+        return fb.Affine(s.com_jacobian, s.com_drift - desired)
+
+
+@dataclass
+class MyHand:
+    """What `fb.FrameTask` is, as a user writes it; the target moves with 0.1 m/s."""
+
+    frame: str
+    target: np.ndarray
+    weight: float = 7.0
+    name: str = "my hand"
+    block: ClassVar[str] = "qdd"
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        s = eom.state
+        e = s.point(self.frame) - self.target - [0.1 * t, 0.0, 0.0]
+        e_dot = s.frame_velocity(self.frame)[:3] - [0.1, 0.0, 0.0]
+        return fb.Affine(s.frame_jacobian(self.frame)[:3], s.frame_drift(self.frame)[:3] + 400.0 * e + 40.0 * e_dot)
+
+
+@dataclass
+class MyEffort:
+    """Forces and torques that share a load: rows on λ, or on τ, with a matrix that couples their entries."""
+
+    block: str
+    weight: float = 1e-3
+
+    @property
+    def name(self) -> str:
+        return f"my {self.block}"
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        n = eom.k if self.block == "forces" else eom.d
+        return fb.Affine(np.eye(n) - np.ones((n, n)) / n, 0.1 * np.arange(n))
+
+
+HANDS = {"go2": "FL_foot", "solo12": "FL_FOOT", "talos": "gripper_left_base_link"}
+
+
+def stance(robot: Robot) -> fb.Contacts:
+    """The feet that stand, without the one that serves as a hand."""
+    contacts = judges.stance(robot)
+    return contacts.without(HANDS[robot.name]) if HANDS[robot.name] in contacts.names else contacts
+
+
+def differ(one: fb.WholeBodyController, other: fb.WholeBodyController, state: State, t: float = 0.0) -> float:
+    """Largest torque between two controllers, part of the strongest motor's limit; both must find a state infeasible."""
+    try:
+        expected = other(state.q, state.v, t)
+    except InfeasibleError as error:
+        with pytest.raises(InfeasibleError) as caught:
+            one(state.q, state.v, t)
+        assert caught.value.rows == error.rows
+        return 0.0
+    found = one(state.q, state.v, t)
+    assert found.path == one.path, "the compiled tick left this state to the readable path"
+    limits = state.robot.torque_limits
+    return float(np.max(np.abs(found.tau - expected.tau)) / np.max(limits[np.isfinite(limits)]))
+
+
+def pair(robot: Robot, contacts: fb.Contacts, tasks: list[object], **options: object) -> list[fb.WholeBodyController]:
+    return [fb.WholeBodyController(robot, contacts, tasks, path=path, **options) for path in ("compiled", "readable")]
+
+
+def cases(name: str, n: int) -> list[State]:
+    """Near standing, and far away, where friction and torque limits hold most of them."""
+    return [state for spread in (0.02, 0.1, 0.3) for state in judges.states(name, n, spread)]
+
+
+# tasks ---------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: str) -> None:
+    robot = judges.load(name)
+    at, frame, contacts = robot.standing(), HANDS[robot.name], stance(robot)
+    hand = at.point(frame) + [0.0, 0.0, 0.05]
+    others = [*fb.standing_tasks(at)[1:], fb.ForceTask(weight=1e-4)]
+    own = [MyCoM(at.com), others[0], MyHand(frame, hand), *others[1:]]
+    moving = fb.FrameTask(frame, lambda t: hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], weight=7.0)
+    known = fb.WholeBodyController(robot, contacts, [fb.CoMTask(at.com), moving, *others], path="compiled")
+    compiled, readable = pair(robot, contacts, own)
+    active = 0
+    for i, state in enumerate(cases(name, 8)):
+        assert differ(compiled, readable, state, 0.1 * i) < AGREEMENT
+        assert differ(compiled, known, state, 0.1 * i) < AGREEMENT
+        active += len(known(state.q, state.v).active)
+    assert active > 8, "nothing was saturated: these states try nothing"
+
+
+def test_tasks_of_ones_own_on_torques_and_forces() -> None:
+    robot = judges.load("go2")
+    tasks = [*fb.standing_tasks(robot.standing()), MyEffort("forces"), MyEffort("tau"), fb.ForceTask(), fb.TorqueTask()]
+    both = pair(robot, judges.stance(robot), tasks)
+    assert max(differ(*both, state) for state in cases("go2", 6)) < AGREEMENT
+
+
+@dataclass
+class Looks:
+    """A task that keeps what it saw, and may have any number of rows."""
+
+    seen: list[EquationsOfMotion]
+    rows: int = 2
+    weight: float = 1.0
+    name: str = "looks"
+    block: ClassVar[str] = "qdd"
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+        self.seen.append(eom)
+        return fb.Affine(np.ones((self.rows, eom.nv)), np.zeros(self.rows))
+
+
+@pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
+def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_later(name: str) -> None:
+    robot = judges.load(name)
+    seen: list[EquationsOfMotion] = []
+    contacts, frame = judges.stance(robot), robot.model.frames[robot.model.nframes - 1].name
+    controller = fb.WholeBodyController(robot, contacts, [*fb.standing_tasks(robot.standing()), Looks(seen)], path="compiled")
+    states = judges.states(name, 5)  # more than the spare memory of a robot
+    seen.clear()
+    for state in states:
+        controller(state.q, state.v)
+    assert len(seen) == len(states)
+    for eom, state in zip(seen, states, strict=True):
+        expected = fb.equations_of_motion(state, contacts)
+        copies = (pickle.loads(pickle.dumps(eom)), copy.copy(eom)) if eom is seen[0] else ()
+        for other in (eom, *copies):
+            for part in ("com", "com_velocity", "com_jacobian", "com_drift", "M", "h", "joint_transforms"):
+                found = getattr(other.state, part)
+                assert np.allclose(found, getattr(state, part), rtol=1e-10, atol=1e-10), part
+                assert not found.flags.writeable
+            for part in ("M", "h", "S", "J", "A", "b"):
+                assert np.allclose(getattr(other, part), getattr(expected, part), rtol=1e-10, atol=1e-10), part
+            for ask in ("frame_jacobian", "frame_velocity", "frame_drift", "point"):
+                assert np.allclose(getattr(other.state, ask)(frame), getattr(state, ask)(frame), rtol=1e-10, atol=1e-10), ask
+            assert (other.nv, other.d, other.k) == (expected.nv, expected.d, expected.k)
+            assert other.state.frame_pose(frame).isApprox(state.frame_pose(frame))
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = seen[0].nothing
+    with pytest.raises(AttributeError):
+        seen[0].M = np.eye(robot.nv)
+
+
+def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
+    robot = judges.load("go2")
+    task = Looks([], rows=0)
+    compiled, readable = pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task])
+    for task.rows in (0, 3, 1, 400, 2):
+        assert differ(compiled, readable, robot.random_state(task.rows, 0.1)) < AGREEMENT
+
+
+def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -> None:
+    robot = judges.load("go2")
+    task, slider = MyCoM(np.array(robot.standing().com)), {"pull": 1.0, "bound": 40.0}
+    drive = LinearConstraint("drive", 1, lambda state, t: (np.eye(18)[6:7], np.array([slider["pull"]])))
+    rows = Rows("push", "forces", lambda eom, t: (np.eye(eom.k)[2:3], [slider["bound"]]))
+    options = {"rows": [rows], "max_normal_force": {"FL_foot": lambda t: slider["bound"]}}
+    contacts = judges.stance(robot).without("FR_foot") + fb.Contacts([drive])
+    controller, _ = pair(robot, contacts, [task, *fb.standing_tasks(robot.standing())], **options)
+    command = controller(robot.standing().q, np.zeros(18))
+    assert command.path == "compiled"
+    slider.update(pull=50.0, bound=7.0)
+    task.target, task.weight = task.target + 1.0, 3.0
+    solution = command.solution
+    assert max(solution.residuals.stationarity, solution.residuals.equality, solution.residuals.inequality) < 1e-7
+    assert np.allclose(solution["tau"], command.tau)
+
+
+def test_threads_may_share_a_controller_with_tasks_of_their_own_and_a_task_may_ask_another_controller() -> None:
+    robot, states = judges.load("go2"), judges.states("go2", 40, 0.1)
+    inner = judges.controller_of("go2", path="compiled")
+
+    class Nested(MyCoM):
+        def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
+            found = super().residual(eom, t)
+            inner(eom.state.replace(v=np.zeros(18)).q, np.zeros(18))  # which runs a tick of the same robot
+            return found
+
+    tasks = [Nested(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
+    controller, _ = pair(robot, judges.stance(robot), tasks)
+    expected = [controller(state.q, state.v).tau for state in states]
+
+    def wrong(shift: int) -> list[int]:
+        order = (np.arange(200) + shift) % len(states)
+        return [i for i in order if not np.array_equal(controller(states[i].q, states[i].v).tau, expected[i])]
+
+    with ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(wrong, (0, 13, 27))) == [[], [], []]
+
+
+class _Wrong:
+    """A task that is right at t = 0 and wrong in one way later."""
+
+    name, weight, block = "odd", 1.0, "qdd"
+
+    def __init__(self, later: Callable[[], object]):
+        self.later = later
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> object:
+        return self.later() if t else fb.Affine(np.eye(18), np.zeros(18))
+
+
+def _fail() -> object:
+    raise RuntimeError("the sensor is gone")
+
+
+@pytest.mark.parametrize(
+    ("later", "text"),
+    [
+        (lambda: np.eye(18), r"the residual of 'odd' must be A x \+ b of its block x as fb.Affine\(A, b\), not ndarray"),
+        (lambda: fb.Affine.identity(12), "the residual of 'odd' takes 12 numbers; its block 'qdd' has 18"),
+        (lambda: fb.Affine(np.full((1, 18), np.nan), [0.0]), r"task 'odd': A holds nan at index \[0, 0\]"),
+        (_fail, "the sensor is gone"),
+    ],
+)
+def test_a_task_that_goes_wrong_is_told_in_the_words_of_the_readable_path(later: Callable[[], object], text: str) -> None:
+    robot = judges.load("go2")
+    for controller in pair(robot, judges.stance(robot), [_Wrong(later)]):
+        assert controller(robot.standing().q, np.zeros(18)).path == controller.path
+        with pytest.raises((InputError, RuntimeError), match=text):
+            controller(robot.standing().q, np.zeros(18), 1.0)
+
+
+def test_nothing_is_compiled_when_tasks_contacts_or_rows_change() -> None:
+    from numba.core import event
+
+    robot = judges.load("go2")
+    controller = judges.controller_of("go2", path="compiled")
+    state, at = robot.random_state(1, 0.1), robot.standing()
+    feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot", "RR_foot"])
+    with event.install_recorder("numba:compile") as recorder:
+        for contacts in (feet, feet + fb.Contacts([LinearConstraint("hold", 2, lambda s, t: (np.eye(18)[6:8], np.zeros(2)))])):
+            for tasks in (fb.standing_tasks(at), [MyCoM(at.com)], [MyCoM(at.com), MyHand("FL_foot", at.point("FL_foot"))]):
+                for rows in ((), [Rows("push", "tau", (np.eye(12), np.full(12, 20.0)))]):
+                    limits = replace(controller.limits, rows=rows, max_normal_force={"FR_foot": 90.0})
+                    other = controller.replace(contacts=contacts, tasks=tasks, limits=limits)
+                    assert other(state.q, state.v).path == "compiled"
+    assert not recorder.buffer
+
+
+def test_ten_thousand_ticks_with_a_task_of_ones_own_take_no_more_memory_at_the_end() -> None:
+    psutil = pytest.importorskip("psutil")
+    robot = judges.load("go2")
+    tasks = [MyCoM(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
+    controller, states = pair(robot, judges.stance(robot), tasks)[0], judges.states("go2", 50, 0.1)
+
+    def resident(ticks: int) -> float:
+        for i in range(ticks):
+            controller(states[i % 50].q, states[i % 50].v)
+        return psutil.Process().memory_info().rss / 1e6
+
+    before = resident(2_000)
+    assert resident(10_000) - before < 2.0  # MB: one number that stays of each tick's arrays would be more
+    assert len(controller.compiled.dynamics.spare) <= 4
+
+
+# constraints ---------------------------------------------------------------------------------------------------------------
+
+
+def hold(robot: Robot, joints: list[int]) -> fb.Contacts:
+    """Some joints that accelerate as a function of time says, by rows of which no two have the same unit."""
+    rows = np.eye(robot.nv)[joints] * (1.0 + np.arange(len(joints)))[:, None]
+    return fb.Contacts([LinearConstraint("held", len(joints), lambda state, t: (rows, np.full(len(joints), np.sin(t))))])
+
+
+@pytest.mark.parametrize("name", ["go2", "talos"])
+def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> None:
+    robot = judges.load(name)
+    feet = judges.stance(robot)
+    for contacts in (feet + hold(robot, [7, 9]), hold(robot, [8]) + feet, hold(robot, [6, 7, 8])):
+        compiled, readable = pair(robot, contacts, list(fb.standing_tasks(robot.standing())))
+        for i, state in enumerate(cases(name, 3)):
+            assert differ(compiled, readable, state, 0.2 * i) < AGREEMENT
+            with np.errstate(all="ignore"):
+                try:
+                    command = compiled(state.q, state.v, 0.2 * i)
+                except InfeasibleError:
+                    continue
+            eom = fb.equations_of_motion(state, contacts, 0.2 * i)
+            assert max(np.max(np.abs(r)) for r in eom.residual(command.qdd, command.tau, command.forces)) < 1e-6
+
+
+def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones() -> None:
+    class MyPoint(PointContact):
+        """A subclass: of another kind, so the tick asks it as it asks a user's."""
+
+    robot = judges.load("go2")
+    feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot"])
+    own = [RollingWheel("FL_foot", [0.0, 1.0, 0.0], 0.022), MyPoint("RR_foot", radius=0.022)]
+    tasks = list(fb.standing_tasks(robot.standing()))
+    for contacts in (feet + fb.Contacts(own), fb.Contacts(own[::-1]) + feet):
+        both = pair(robot, contacts, tasks, min_normal_force=3.0)
+        assert max(differ(*both, state) for state in cases("go2", 5)) < AGREEMENT
+
+
+# rows ----------------------------------------------------------------------------------------------------------------------
+
+
+def own_rows(robot: Robot, contacts: fb.Contacts) -> list[Rows]:
+    """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with time."""
+    E, up = np.eye(robot.nv)[robot.nv - robot.d :], np.zeros((1, contacts.k))
+    up[0, contacts.point_entries[2::3]] = 1.0
+    turns = np.resize([1.0, -1.0], (1, robot.d))
+    sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
+    return [
+        Rows("acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides),
+        Rows("total force", "forces", (up, [1.05 * robot.weight])),
+        Rows(
+            "joined torques", "tau", lambda eom, t: (np.vstack([turns, -turns]), np.full(2, (0.01 - 0.002 * t) * robot.weight))
+        ),
+    ]
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12", "talos"])
+def test_rows_of_ones_own_hold_and_have_their_names_on_both_paths(name: str) -> None:
+    robot = judges.load(name)
+    contacts = judges.stance(robot)
+    rows = own_rows(robot, contacts)
+    compiled, readable = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=rows)
+    kinds: set[str] = set()
+    for i, state in enumerate(cases(name, 6)):
+        t = 0.1 * i
+        assert differ(compiled, readable, state, t) < AGREEMENT
+        try:
+            command, expected = compiled(state.q, state.v, t), readable(state.q, state.v, t)
+        except InfeasibleError:
+            continue
+        eom = fb.equations_of_motion(state, contacts)
+        for each in rows:
+            G, h = each.at(eom, t)
+            assert np.all(G @ command.solution[each.block] <= h + 1e-6)
+        if name != "talos":  # four corners share one wrench: rows can depend on one another
+            assert command.active == expected.active
+        kinds |= {row.kind for row in command.active} | {row.owner for row in command.active}
+    assert {"acceleration limit", "total force", "joined torques"} <= kinds
+
+
+def test_rows_of_ones_own_against_cvxpy() -> None:
+    robot = judges.load("go2")
+    contacts = judges.stance(robot)
+    controller = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=own_rows(robot, contacts))[0]
+    for state in judges.states("go2", 4, 0.1):
+        command, judge = controller(state.q, state.v), solve(controller.qp(state), "cvxpy")
+        assert command.path == "compiled"
+        assert np.max(np.abs(command.tau - judge["tau"])) < 1e-4 * np.max(robot.torque_limits)
+
+
+def test_rows_in_conflict_are_told_by_their_names() -> None:
+    robot = judges.load("go2")
+    light = Rows("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
+    for controller in pair(robot, judges.stance(robot), [], rows=[light], min_normal_force=10.0):
+        with pytest.raises(InfeasibleError, match="light feet") as caught:
+            controller(robot.standing().q, np.zeros(18))
+        row = next(row for row in caught.value.rows if row == "light feet")
+        assert (row.kind, row.owner, row.number) == ("rows", "light feet", 0)
+        assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
+
+
+# forces over time ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
+    robot = judges.load("go2")
+    share = 0.25 * robot.weight
+    windows = {
+        "min_normal_force": {"RR_foot": 12.0, "RL_foot": lambda t: 5.0 * t},
+        "max_normal_force": {"FL_foot": lambda t: share * (1.0 - t), "RR_foot": 2.0 * share},
+    }
+    contacts = judges.stance(robot)
+    both = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
+    for t in (0.0, 0.25, 0.5, 1.0):
+        command = both[0](robot.standing().q, np.zeros(18), t)
+        normal = dict(zip(contacts.point_names, command.forces.reshape(-1, 3)[:, 2], strict=True))
+        assert normal["FL_foot"] <= share * (1.0 - t) + 1e-6 and normal["RR_foot"] >= 12.0 - 1e-6
+        assert normal["RL_foot"] >= 5.0 * t - 1e-6
+        assert t == 0.0 or "FL_foot largest normal force" in command.active
+        assert command.active == both[1](robot.standing().q, np.zeros(18), t).active
+        assert max(differ(*both, state, t) for state in cases("go2", 3)) < AGREEMENT
+    row = next(row for row in command.active if row.endswith("largest normal force"))
+    assert (row.kind, row.owner) == ("largest normal force", "FL_foot")
+
+
+def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners() -> None:
+    robot = judges.load("talos")
+    contacts = fb.Contacts.flat_feet(robot)
+    windows = {"min_normal_force": {contacts.names[0]: 40.0}, "max_normal_force": 150.0}
+    both = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
+    normal = both[0](robot.standing().q, np.zeros(robot.nv)).forces[2::3]
+    assert np.all(normal[:4] >= 40.0 - 1e-6) and np.all(normal <= 150.0 + 1e-6)
+    assert max(differ(*both, state) for state in cases("talos", 3)) < AGREEMENT
+
+
+# words ---------------------------------------------------------------------------------------------------------------------
+
+
+def make(**options: object) -> Callable[[], object]:
+    robot = judges.load("go2")
+    return lambda: fb.WholeBodyController(robot, judges.stance(robot), [], **options)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "text"),
+    [
+        (make(max_normal_force=-1.0), InputError, "max_normal_force is -1; it must be ≥ 0 N"),
+        (make(max_normal_force={"FL_foot": -1.0}), InputError, "max_normal_force of FL_foot is -1; it must be ≥ 0 N"),
+        (make(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "unknown contact in min_normal_force 'FL_fot'; .*FL_foot"),
+        (make(min_normal_force={"FL_foot": lambda t: -1.0}), InputError, "min_normal_force of FL_foot is -1; it must be ≥ 0 N"),
+        (make(rows=Rows("r", "tau", (np.eye(12), np.ones(12)))), InputError, "rows must be a list of Rows, not a Rows"),
+        (make(rows=[np.eye(12)]), InputError, "each of rows must be a Rows, as floatbase.control.Rows"),
+        (lambda: Rows("r", "lambda", (np.eye(12), np.ones(12))), InputError, "rows 'r' have block 'lambda'; it must be"),
+        (lambda: Rows("r", "tau", np.eye(12)), InputError, r"rows 'r' must be G and h, as in \(G, h\), not an array"),
+        (
+            lambda: Rows("r", "tau", (np.eye(12), np.ones(3))),
+            InputError,
+            r"h of r has shape \(3,\); it must have shape \(12,\)",
+        ),
+        (make(rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]), InputError, r"G of r has shape \(3, 3\); .* \(any, 12\)"),
+        (make(rows=[Rows("r", "tau", lambda eom, t: 3.0)]), InputError, "rows 'r' must be G and h"),
+        (make(rows=[Rows("r", "tau", (np.eye(12), np.ones(12)), ["a"])]), InputError, "rows 'r' have 1 owners and 12 rows"),
+        (make(rows=2 * [Rows("r", "tau", (np.eye(12), np.ones(12)))]), InputError, "inequality name 'r 0' stands twice"),
+    ],
+)
+def test_bad_rows_and_bounds_are_told_what_would_be_right(call: Callable[[], object], kind: type[Exception], text: str) -> None:
+    with pytest.raises(kind, match=text):
+        call()
+
+
+def test_a_bound_that_goes_wrong_is_told_in_the_words_of_the_readable_path() -> None:
+    robot = judges.load("go2")
+    bound = {"FL_foot": lambda t: 50.0 if t < 1.0 else np.nan}
+    for controller in pair(robot, judges.stance(robot), [], max_normal_force=bound):
+        assert controller(robot.standing().q, np.zeros(18)).path == controller.path
+        with pytest.raises(InputError, match="max_normal_force of FL_foot is nan; it must be ≥ 0 N"):
+            controller(robot.standing().q, np.zeros(18), 1.0)
+
+
+def test_a_replaced_controller_is_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = judges.controller_of("go2", path="compiled")
+    assert isinstance(controller.compiled, Compiled)
+    with pytest.raises(InputError, match="the residual of 'odd' takes 12 numbers"):
+        odd = _Wrong(lambda: None)
+        monkeypatch.setattr(odd, "residual", lambda eom, t=0.0: fb.Affine.identity(12))
+        controller.replace(tasks=[odd])
+    with pytest.raises(InputError, match=r"G of r has shape \(3, 3\)"):
+        controller.replace(limits=replace(controller.limits, rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]))
+    with pytest.raises(UnknownNameError, match="unknown contact in max_normal_force 'FL_foot'"):
+        limits = replace(controller.limits, max_normal_force={"FL_foot": 1.0})
+        controller.replace(contacts=controller.contacts.without("FL_foot"), limits=limits)

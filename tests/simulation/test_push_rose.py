@@ -1,0 +1,101 @@
+"""The push rose: what bisection finds on the physics, its mirror, and theory's curves by other means."""
+
+from __future__ import annotations
+
+import judges
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import floatbase as fb
+from floatbase.errors import InputError, SimulationError
+from floatbase.simulation import PushRose
+from floatbase.viewer import roses
+
+STEP, WATCH = 25.0, 1.2
+QUICK = {"step": STEP, "watch": WATCH, "start": 0.1, "progress": False}
+
+
+@pytest.fixture(scope="module")
+def standing() -> fb.WholeBodyController:
+    robot = judges.load("go2")
+    return fb.WholeBodyController(robot, fb.Contacts.points(robot, 0.7), fb.standing_tasks(robot.standing()))
+
+
+@pytest.fixture(scope="module")
+def rose(standing: fb.WholeBodyController) -> PushRose:
+    return fb.push_rose(standing, directions=6, workers=2, **QUICK)
+
+
+def survives(controller: fb.WholeBodyController, angle: float, force: float) -> bool:
+    sim = fb.Simulation(controller.robot)
+    push = fb.Push([force * np.cos(angle), force * np.sin(angle), 0.0], start=0.1, duration=0.1)
+    return fb.rollout(sim, controller, 0.1 + 0.1 + WATCH, [push]).outcome == "completed"
+
+
+def test_the_rose_lies_between_survived_and_fatal_and_is_its_own_mirror(
+    rose: PushRose, standing: fb.WholeBodyController
+) -> None:
+    assert np.allclose(rose.directions, np.deg2rad([0, 60, 120, 180, 240, 300]))
+    left, right = rose.pushes[1:3], rose.pushes[:3:-1]
+    assert np.all(np.abs(left - right) <= STEP)  # go2 is symmetric
+    assert survives(standing, rose.directions[1], rose.pushes[1])
+    assert not survives(standing, rose.directions[1], rose.pushes[1] + STEP)
+    assert survives(standing, np.pi / 2, 170.0)
+    assert "6 directions" in repr(rose)
+
+
+def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(rose: PushRose) -> None:
+    state, robot = rose.state, rose.state.robot
+    feet, com = rose.contacts.positions(state), state.com
+    omega = np.sqrt(robot.gravity / (com[2] - feet[:, 2].mean()))
+    moved = com[:2] + (rose.capture * rose.duration / (robot.mass * omega))[:, None] * rose.unit_vectors[:, :2]
+    hull = ConvexHull(feet[:, :2])
+    beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
+    assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-6)  # m: every capture point is on the border
+
+    # (20)(21) a steady push F at height z tips the robot over an edge at a distance l when F z > m g l, if it does not slide
+    slack = -(com[:2] @ hull.equations[:, :2].T + hull.equations[:, 2])
+    base = state.frame_pose("base").translation
+    lever = (base[2] - feet[:, 2].mean()) * rose.unit_vectors[:, :2] @ hull.equations[:, :2].T
+    tips = np.min(np.where(lever > 0.0, robot.weight * slack / np.where(lever > 0.0, lever, 1.0), np.inf), axis=1)
+    assert np.all(tips < 0.7 * np.cos(np.pi / 16) * robot.weight)
+    assert np.allclose(rose.steady, tips, rtol=1e-3)  # the feet are level to a part of a millimetre
+    assert np.all(rose.steady < rose.pushes)  # a push that ends can be larger
+
+
+def test_the_rose_is_plotted_and_drawn_to_scale(rose: PushRose) -> None:
+    axis = roses.plot(rose)
+    measured = axis.get_lines()[0]
+    assert np.allclose(measured.get_ydata(), [*rose.pushes, rose.pushes[0]])
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
+        "largest push survived", "theory: capture point", "theory: steady push",
+    ]  # fmt: skip
+    plt.close(axis.figure)
+    with pytest.raises(InputError, match="polar axes"):
+        roses.plot(rose, plt.figure().add_subplot())
+    plt.close("all")
+    near, far = (roses.picture(rose, scale) for scale in (0.001, 0.002))
+    assert {path.split("/")[0] for path in near} == {"rose", "capture", "steady"}
+    assert {path.split("/")[0] for path in roses.picture(rose, theory=False)} == {"rose"}
+    assert near.keys() == far.keys() and "rose/ring 100 N" in near
+    assert all(np.allclose(near[path].matrix[:2, 3], rose.state.q[:2]) for path in near if "label" not in path)
+    ends = [picture["rose/label 100 N"].matrix[:2, 3] - rose.state.q[:2] for picture in (near, far)]
+    assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
+
+
+def test_factories_and_what_does_not_fit(standing: fb.WholeBodyController) -> None:
+    robot = standing.robot
+
+    for make, options, error, message in (
+        (standing, {"directions": 2}, InputError, "directions is 2; it must be a whole number ≥ 3"),
+        (standing, {"step": 0.0}, InputError, "step is 0; it must be > 0 N"),
+        (standing, {"frame": "bass"}, fb.FloatbaseError, "near names: base"),
+        (3, {}, InputError, "needs a controller"),
+        (lambda: 3, {}, InputError, "must make a controller that has a robot"),
+        (lambda: (fb.Simulation(robot), judges.limp), {"directions": 3, "workers": 1}, SimulationError, "falls without a push"),
+        (lambda: (fb.Simulation(fb.load("ur5")), judges.limp), {}, InputError, "ur5 is bolted to the ground"),
+    ):
+        with pytest.raises(error, match=message):
+            fb.push_rose(make, **QUICK | options)

@@ -1,0 +1,177 @@
+"""A sweep gives one table: whatever the number of workers, wherever they are, and however often it was killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.errors import InputError
+from floatbase.simulation import Table
+
+GRID = {"n": [1, 2, 3, 4, 5], "scale": np.array([0.1, 0.3])}
+# leaves a mark for every call, so that calls can be counted; it is run as a script, so its function is sent by value
+SCRIPT = """
+import os, sys, time
+import floatbase as fb
+
+def marked(i):
+    with open("calls", "a") as calls:
+        calls.write(f"{i}\\n")
+    time.sleep(0.02)
+    return i / 7
+
+print(fb.sweep(marked, {"i": list(range(60))}, to="marked.jsonl", workers=2, progress=False))
+"""
+
+
+def spectrum(n: int, scale: float) -> dict[str, Any]:
+    """Floats that depend on the last bits, an array, and an error of its own at two points."""
+    matrix = scale * np.vander(np.linspace(0.1, 1.7, 40), 40)[:, -20:]
+    if n == 3:
+        raise ValueError(f"no {n} here")
+    return {"values": np.linalg.svd(matrix)[1][:n], "sum": np.float32(matrix.sum()), "process": os.getpid()}
+
+
+def without_process(table: Table) -> list[Any]:
+    return [{name: value for name, value in row.items() if name != "process"} for row in table.rows]
+
+
+def test_the_table_is_the_same_for_one_worker_and_for_two() -> None:
+    one, two = (fb.sweep(spectrum, GRID, workers=w, progress=False) for w in (1, 2))
+    assert without_process(one) == without_process(two)
+    assert one.columns == ("n", "scale", "values", "sum", "process", "error")
+    assert list(one["n"]) == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5] and list(one["scale"][:2]) == [0.1, 0.3]
+    assert [row["error"] for row in one.errors] == 2 * ["ValueError: no 3 here"]
+    assert np.isnan(one["sum"][4:6]).all() and np.isfinite(np.delete(one["sum"], [4, 5])).all()
+    assert len(set(one["process"][[0, -1]])) == 1 and os.getpid() not in one["process"]
+    frame = two.to_pandas()
+    assert list(frame.columns) == list(two.columns) and frame.shape == (10, 6)
+    assert frame["error"].notna().sum() == 2 and frame["values"][9] == list(two["values"][9])
+
+
+def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
+    """Killed at a random moment: the points in flight are computed twice, and no others."""
+    after = np.random.default_rng(0).integers(2, 45)
+    (tmp_path / "script.py").write_text(SCRIPT)
+    command = [sys.executable, "script.py"]
+    rows = tmp_path / "marked.jsonl"
+    with subprocess.Popen(command, cwd=tmp_path) as running:
+        while running.poll() is None and (not rows.exists() or rows.read_bytes().count(b"\n") < after):
+            time.sleep(0.005)
+        running.kill()
+    assert after <= rows.read_bytes().count(b"\n") < 61
+    with rows.open("ab") as file:
+        file.write(b'{"point": 59, "i"')  # what a line is when the power goes
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert said == "Table(60 rows: i, result, error)\n"
+    table = Table.read(rows)
+    assert table.rows == tuple({"i": i, "result": i / 7, "error": None} for i in range(60))
+    assert rows.read_bytes().count(b"\n") == 61  # no point has two lines, nothing is left of the torn one
+    calls = (tmp_path / "calls").read_text().split()
+    assert set(calls) == {str(i) for i in range(60)}
+    assert len(calls) - 60 <= 2 * 2  # for each of two workers the point that it was at, and the next
+
+
+def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install floatbase[cluster]")
+
+    def power(made: float, n: int, scale: float) -> dict[str, Any]:
+        if n == 2:
+            raise ArithmeticError("two")
+        return {"value": (made * scale) ** n, "process": os.getpid()}
+
+    def setup() -> float:
+        return 1.1
+
+    here = fb.sweep(power, GRID, setup=setup, workers=1, progress=False)
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        workers = {worker.pid for worker in cluster.workers.values()}
+        by_address = fb.sweep(power, GRID, setup=setup, cluster=cluster.scheduler_address, progress=False)
+        with distributed.Client(cluster) as client:
+            by_client = fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
+            with pytest.raises(InputError, match="holds a value of type object"):
+                fb.sweep(lambda n: object(), {"n": [1, 2]}, cluster=client, progress=False)
+        with pytest.raises(InputError, match="the Dask client is closed"):
+            fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
+    assert without_process(here) == without_process(by_address) == without_process(by_client)
+    assert len(here.errors) == 2
+    found = {row["process"] for row in by_address.rows if row["error"] is None}
+    assert found <= workers and os.getpid() not in found
+
+
+def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
+
+    def square(x: float) -> float:
+        return x * x
+
+    def cube(x: float) -> float:
+        return x**3
+
+    first = fb.sweep(square, {"x": [1, 2.5]}, to=path, workers=1, progress=False)
+    kept = path.read_bytes()
+    for function, grid, message in (
+        (cube, {"x": [1, 2.5]}, "of the function square, this sweep has cube"),
+        (square, {"x": [1, 2.5, 3]}, "of the number of points 2, this sweep has 3"),
+        (square, {"x": [1, 2.6]}, "of the same parameters at other values"),
+    ):
+        with pytest.raises(InputError, match=message):
+            fb.sweep(function, grid, to=path, progress=False)
+    assert fb.sweep(square, {"x": [1, 2.5]}, to=path, progress=False).rows == first.rows == Table.read(path).rows
+    assert path.read_bytes() == kept
+    for content in ("a diary", "a diary\nof two lines\n", json.dumps({"point": 0}) + "\n"):
+        path.write_text(content)
+        with pytest.raises(InputError, match="a file of no sweep; it is left as it is"):
+            fb.sweep(square, {"x": [1, 2.5]}, to=path, progress=False)
+        assert path.read_text() == content
+    with pytest.raises(InputError, match="No such file"):
+        fb.sweep(square, {"x": [1]}, to=tmp_path / "nowhere" / "rows.jsonl", progress=False)
+    with pytest.raises(InputError, match="knows its function by its name"):
+        fb.sweep(lambda x: x, {"x": [1]}, to=path, progress=False)
+
+
+def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.CaptureFixture[str]) -> None:
+    def square(x: float) -> float:
+        return x * x
+
+    for function, grid, options, message in (
+        (3, {"x": [1]}, {}, "needs a function first, not 3"),
+        (square, {}, {}, "the grid has no points"),
+        (square, [], {}, "the grid has no points"),
+        (square, {"x": []}, {}, "'x' has no values"),
+        (square, {"x": 1.0}, {}, "'x' must be a list of values, not 1.0"),
+        (square, [{"x": 1}, 2], {}, "a dict for each point, name -> value; it has 2"),
+        (square, {"error": [1]}, {}, "cannot be called 'error'"),
+        (square, {"y": [1]}, {}, r"the grid gives y; square takes \(x: "),
+        (square, [{"x": 1}, {"x": 1, "y": 1}], {}, "the grid gives x, y; square takes"),
+        (square, {"x": [square]}, {}, "parameter x cannot be stored: it holds a value of type function"),
+        (square, {"x": [1]}, {"workers": 0}, "workers is 0; it must be a whole number of processes ≥ 1"),
+        (square, {"x": [1]}, {"workers": 1.5}, "workers is 1.5"),
+        (square, {"x": [1]}, {"workers": 1, "cluster": "tcp://127.0.0.1:1"}, "Leave one of the two out"),
+        (square, {"x": [1]}, {"setup": 3}, "setup must be a function"),
+    ):
+        with pytest.raises(InputError, match=message):
+            fb.sweep(function, grid, **options)
+    assert capfd.readouterr().err == ""
+
+
+def test_the_bar_counts_points_and_failures_and_can_be_switched_off(capfd: pytest.CaptureFixture[str]) -> None:
+    fb.sweep(lambda x: 1 / x, {"x": [0, 1]}, workers=1)
+    bar = capfd.readouterr().err
+    assert "2/2" in bar and "failed=1" in bar
+    with pytest.raises(InputError, match="the function's result 'x' must be called otherwise"):
+        fb.sweep(lambda x: {"x": x}, {"x": [0, 1]}, workers=1, progress=False)
+    with pytest.raises(ZeroDivisionError):
+        fb.sweep(lambda made, x: x, {"x": [0]}, setup=lambda: 1 / 0, workers=1, progress=False)
+    with pytest.raises(fb.FloatbaseError, match="a worker process ended in the middle of a point"):
+        fb.sweep(lambda x: os.kill(os.getpid(), 9), {"x": [0]}, workers=1, progress=False)
+    assert capfd.readouterr().err == ""
