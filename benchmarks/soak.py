@@ -1,6 +1,6 @@
 """What leaks, slows down or breaks after many times: one command, a table, and exit code 1 when something does.
 
-    python benchmarks/soak.py                       all of `SOAKS`, as many times as it says: 5 to 10 minutes
+    python benchmarks/soak.py                       all of `SOAKS`, as many times as it says: 10 to 20 minutes
     python benchmarks/soak.py ticks kills           some of them
     python benchmarks/soak.py viewers --times 20    so many times
 
@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import psutil
-from soak_learner import kills
+from soak_kills import kills, sweeps
 
 import floatbase as fb
 from floatbase.control import Rows
@@ -209,6 +209,7 @@ SOAKS: dict[str, tuple[Callable[[], Soak], int]] = {
     "viewer": (viewer, 100_000),
     "viewers": (viewers, 200),
     "kills": (kills, 200),
+    "sweeps": (sweeps, 200),
 }
 
 

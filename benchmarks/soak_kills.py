@@ -1,4 +1,4 @@
-"""A learner's files while the processes that write them are killed: a part of `python benchmarks/soak.py`."""
+"""Files while the processes that write them are killed, a learner's and a sweep's: a part of `python benchmarks/soak.py`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import json
 import os
 import random
 import signal
+import subprocess
+import sys
 import tempfile
 import time
 import traceback
@@ -17,7 +19,22 @@ from unittest.mock import patch
 
 from floatbase.lessons import progress
 from floatbase.lessons.publish import MINE, prepare
+from floatbase.simulation import Table
 
+POINTS = 200  # of the sweep that is killed: two workers need about a second for them
+IN_FLIGHT = 4  # points at most that a kill lets two workers compute again
+SWEEP = f"""
+import os, time
+import floatbase as fb
+
+def marked(i):
+    with open("calls", "a") as calls:
+        calls.write(f"{{i}}\\n")
+    time.sleep(0.01)
+    return i / 7
+
+fb.sweep(marked, {{"i": list(range({POINTS}))}}, to="rows.jsonl", workers=2, progress=False)
+"""
 LESSONS = 4
 CELLS = 100  # of a lesson: so many that a kill may fall into the writing of a file
 
@@ -48,6 +65,44 @@ def kills() -> Iterator[Callable[[], object]]:
             judge_tries(f"{number % 7}", dice)
 
         yield step
+
+
+def sweeps() -> Iterator[Callable[[], object]]:
+    """A sweep, killed at a random moment and started again until its table is whole; then another one begins."""
+    dice, lost = random.Random(0), 0
+    with tempfile.TemporaryDirectory(prefix="floatbase-soak-") as name:
+        rows, calls, script = Path(name, "rows.jsonl"), Path(name, "calls"), Path(name, "script.py")
+        script.write_text(SWEEP, encoding="utf-8")
+
+        def step() -> None:
+            nonlocal lost
+            before = whole_lines(rows)
+            with subprocess.Popen([sys.executable, script.name], cwd=name, stderr=subprocess.DEVNULL) as running:
+                with suppress(subprocess.TimeoutExpired):
+                    running.wait(dice.uniform(0.0, 4.0))
+                running.kill()
+            assert running.returncode in (0, -signal.SIGKILL), f"the sweep ended with {running.returncode}"
+            lines = whole_lines(rows)
+            assert lines[: len(before)] == before, "a kill changed rows that were there"
+            lost += running.returncode != 0
+            if running.returncode == 0:
+                table = Table.read(rows)
+                assert [row["result"] for row in table.rows] == [i / 7 for i in range(POINTS)], "the table is another one"
+                twice = len(calls.read_text().split()) - POINTS
+                assert twice <= IN_FLIGHT * lost, f"{twice} points were computed again after {lost} kills"
+                rows.unlink()
+                calls.unlink()
+                lost = 0
+
+        yield step
+
+
+def whole_lines(path: Path) -> list[bytes]:
+    """The lines of a file that come to their end, each of them JSON."""
+    lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else []
+    for line in lines:
+        json.loads(line)
+    return lines
 
 
 def write(path: Path, texts: list[str]) -> None:
