@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -137,10 +138,12 @@ def _kept(name: str, given: NormalForces) -> NormalForces:
     """A checked copy of what bounds normal forces."""
     if not isinstance(given, Mapping):
         return positive(name, given, "N", allow_zero=True)
-    return {
-        contact: value if callable(value) else positive(f"{name} of {contact}", value, "N", allow_zero=True)
-        for contact, value in given.items()
-    }
+    return MappingProxyType(
+        {
+            contact: value if callable(value) else positive(f"{name} of {contact}", value, "N", allow_zero=True)
+            for contact, value in given.items()
+        }
+    )
 
 
 def _at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float) -> Array:

@@ -36,7 +36,7 @@ class PushRose(Value):
     step: N, the resolution.
     duration: s, of each push.
     frame: the frame that was pushed.
-    state, contacts: the robot and its stance, when the push began in an undisturbed stand.
+    state, contacts: the robot and its stance, as the simulation began, before anything pushed.
 
     `floatbase.viewer.roses` plots it, and draws it on the ground below the robot.
     """
@@ -72,17 +72,20 @@ class PushRose(Value):
 
     @cached_property
     def capture(self) -> Array:
-        """The push that moves the capture point to the border of the support region, shape (n,), N.
+        """The push of `duration` T that ends with the capture point on the border of the support region, shape (n,), N.
 
-        The linear inverted pendulum of height h: ω = √(g/h), and an impulse J moves the capture point, which is below a
-        centre of mass at rest, by J / (m ω). As long as it is in the support region, a robot can stop without a step; what
-        it does with its angular momentum, and with its height, is left out. The ground is level.
+        The linear inverted pendulum of height h, ω = √(g/h), pushed at the centre of mass, at rest at first. As long as its
+        capture point ξ = x + ẋ/ω is in the support region, a robot can stop without a step. During the push F the best that
+        it can do is to stand on the border, at distance s: ξ̇ = ω (ξ - s) + F / (m ω), so F = m ω² s / (1 - exp(-ω T)). A
+        short push is an impulse F T = m ω s; a long one is steady, F h = m g s. What a robot does with its angular momentum,
+        and with its height, is left out. The ground is level.
         """
         robot, com = self.state.robot, self.state.com
         height = com[2] - self.contacts.positions(self.state)[:, 2].mean()
         omega = np.sqrt(robot.gravity / height)
         region = wrench_set(self.state, self.contacts).support_region()
-        return read_only(_border(region, com[:2], self.unit_vectors[:, :2]) * robot.mass * omega / self.duration)
+        border = _border(region, com[:2], self.unit_vectors[:, :2])
+        return read_only(border * robot.mass * omega**2 / -np.expm1(-omega * self.duration))
 
     def __repr__(self) -> str:
         span = f"{self.pushes.min():g} to {self.pushes.max():g} N for {self.duration:g} s"
@@ -222,11 +225,13 @@ def _border(polygon: Array, inside: Array, directions: Array) -> Array:
 
     polygon: (k, 2), m, counter-clockwise. inside: (2,), m, the point. directions: (n, 2), unit.
     """
+    if len(polygon) < 3:
+        return np.zeros(len(directions))
     edges = np.roll(polygon, -1, axis=0) - polygon
     normals = np.column_stack([edges[:, 1], -edges[:, 0]])
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     slack = np.sum(normals * (polygon - inside), axis=1)
-    if len(polygon) < 3 or np.any(slack < 0.0):
+    if np.any(slack < 0.0):
         return np.zeros(len(directions))
     towards = directions @ normals.T
     return np.asarray(np.min(np.where(towards > _LEVEL, slack / np.maximum(towards, _LEVEL), np.inf), axis=1))

@@ -252,7 +252,7 @@ def _answers(engine: _Engine | None, job: _Job, points: list[Row], open_points: 
             if not numbers:
                 return
             for future in wait(numbers, return_when=FIRST_COMPLETED).done:
-                answer = future.result()
+                answer = _came(future)
                 if isinstance(answer, Exception):
                     raise answer
                 yield numbers.pop(future), answer
@@ -261,6 +261,16 @@ def _answers(engine: _Engine | None, job: _Job, points: list[Row], open_points: 
             "a worker process ended in the middle of a point: out of memory, which fewer workers help, or a crash in "
             "compiled code."
         ) from error
+
+
+def _came(future: Future[Row | Exception]) -> Row | Exception:
+    """What `_answer` returned. It raises nothing itself: what is raised is the engine's."""
+    try:
+        return future.result()
+    except BrokenExecutor:
+        raise
+    except Exception as error:
+        raise SimulationError(f"the cluster broke down at a point ({type(error).__name__}: {error}).") from error
 
 
 _parent: int | None = None  # in a process of this machine: the program that started it

@@ -189,15 +189,23 @@ def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
 
 def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -> None:
     robot = judges.load("go2")
-    task, slider = MyCoM(np.array(robot.standing().com)), {"pull": 1.0, "bound": 40.0}
-    drive = LinearConstraint("drive", 1, lambda state, t: (np.eye(18)[6:7], np.array([slider["pull"]])))
+    task, slider, pull = MyCoM(np.array(robot.standing().com)), {"bound": 40.0}, np.ones(1)
+
+    class Drive(LinearConstraint):
+        """One that gives away the array that it works in."""
+
+        def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+            return np.eye(18)[6:7], pull
+
+    drive = Drive("drive", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
     rows = Rows("push", "forces", lambda eom, t: (np.eye(eom.k)[2:3], [slider["bound"]]))
     options = {"rows": [rows], "max_normal_force": {"FL_foot": lambda t: slider["bound"]}}
     contacts = judges.stance(robot).without("FR_foot") + fb.Contacts([drive])
     controller, _ = pair(robot, contacts, [task, *fb.standing_tasks(robot.standing())], **options)
     command = controller(robot.standing().q, np.zeros(18))
     assert command.path == "compiled"
-    slider.update(pull=50.0, bound=7.0)
+    slider.update(bound=7.0)
+    pull[:] = 50.0
     task.target, task.weight = task.target + 1.0, 3.0
     solution = command.solution
     assert max(solution.residuals.stationarity, solution.residuals.equality, solution.residuals.inequality) < 1e-7
@@ -288,7 +296,7 @@ def test_ten_thousand_ticks_with_a_task_of_ones_own_take_no_more_memory_at_the_e
         return psutil.Process().memory_info().rss / 1e6
 
     before = resident(2_000)
-    assert resident(10_000) - before < 2.0  # MB: one number that stays of each tick's arrays would be more
+    assert resident(10_000) - before < 2.0  # MB: one array that stays of each tick would be more
     assert len(controller.compiled.dynamics.spare) <= 4
 
 

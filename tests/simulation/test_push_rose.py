@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import judges
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.spatial import ConvexHull
 
 import floatbase as fb
@@ -49,11 +52,20 @@ def test_the_rose_lies_between_survived_and_fatal_and_is_its_own_mirror(
 def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(rose: PushRose) -> None:
     state, robot = rose.state, rose.state.robot
     feet, com = rose.contacts.positions(state), state.com
-    omega = np.sqrt(robot.gravity / (com[2] - feet[:, 2].mean()))
-    moved = com[:2] + (rose.capture * rose.duration / (robot.mass * omega))[:, None] * rose.unit_vectors[:, :2]
-    hull = ConvexHull(feet[:, :2])
-    beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
-    assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-6)  # m: every capture point is on the border
+    height, hull = com[2] - feet[:, 2].mean(), ConvexHull(feet[:, :2])
+    omega = np.sqrt(robot.gravity / height)
+    # an impulse moves the capture point to the border; a push for ever tips the robot over it
+    for duration, farther in ((1e-6, 1e-6 / (robot.mass * omega)), (1e2, height / robot.weight)):
+        moved = com[:2] + (replace(rose, duration=duration).capture * farther)[:, None] * rose.unit_vectors[:, :2]
+        beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
+        assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-5)  # m
+    # between them: the pendulum on the border, s away, pushed for a while, has its capture point there at the end
+    border = replace(rose, duration=1e2).capture * height / robot.weight
+    transition = expm(rose.duration * np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]]))
+    x = transition[:, 2:] * (rose.capture / robot.mass - omega**2 * border)
+    assert np.allclose(x[0] + x[1] / omega, border, rtol=1e-9)
+    one_foot = replace(rose, contacts=rose.contacts.without(*rose.contacts.names[1:]))
+    assert not one_foot.capture.any()
 
     # (20)(21) a steady push F at height z tips the robot over an edge at a distance l when F z > m g l, if it does not slide
     slack = -(com[:2] @ hull.equations[:, :2].T + hull.equations[:, 2])

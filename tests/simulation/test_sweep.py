@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.errors import InputError
+from floatbase.errors import InputError, SimulationError
 from floatbase.simulation import Table
 
 GRID = {"n": [1, 2, 3, 4, 5], "scale": np.array([0.1, 0.3])}
@@ -100,6 +100,9 @@ def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
             by_client = fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
             with pytest.raises(InputError, match="holds a value of type object"):
                 fb.sweep(lambda n: object(), {"n": [1, 2]}, cluster=client, progress=False)
+            cluster.scheduler.allowed_failures = 0  # else it tries three times more
+            with pytest.raises(SimulationError, match="the cluster broke down at a point"):
+                fb.sweep(lambda n: os._exit(1), {"n": [1]}, cluster=client, progress=False)
         with pytest.raises(InputError, match="the Dask client is closed"):
             fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
     assert without_process(here) == without_process(by_address) == without_process(by_client)

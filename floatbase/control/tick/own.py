@@ -98,8 +98,8 @@ def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
 
 def _motion(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
     """A, b and J of a contact. Raises `InputError` where they do not have the shapes that the contact says."""
-    A, b = contact.constraint(state, t)
-    J = A if isinstance(contact, LinearConstraint) else contact.jacobian(state, t)  # asks its function once
+    A, b = map(read_only, contact.constraint(state, t))  # it may write to its own arrays in the next tick
+    J = A if isinstance(contact, LinearConstraint) else read_only(contact.jacobian(state, t))  # asks its function once
     m, nv = len(contact.row_names), state.robot.nv
     if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
         raise InputError(f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}.")
