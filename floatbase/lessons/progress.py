@@ -42,15 +42,17 @@ def record(name: str, right: bool) -> None:
 
 
 def obstacle() -> str:
-    """Why tries cannot be kept, and what to do; "" where they can."""
+    """Why tries cannot be kept, and what to do; "" where they can. Makes no file."""
     return _append(b"")
 
 
 def _append(line: bytes) -> str:
-    """Write a line at the end of the file; what prevented it, or ""."""
+    """Write a line at the end of the file; what prevented it, or "". Without a line only whether one could be written."""
     advice = "Set FLOATBASE_HOME to a folder that you may write to"
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
+        if not line and not path().exists():
+            return "" if os.access(path().parent, os.W_OK) else f"Tries cannot be kept in {path().parent}. {advice}."
         file = os.open(path(), os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         try:
             os.write(file, line)
