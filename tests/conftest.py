@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -46,6 +47,14 @@ def pytest_configure(config: pytest.Config) -> None:
 def is_no_worker(config: pytest.Config) -> bool:
     """Whether this process is pytest itself, not a worker of pytest-xdist."""
     return not hasattr(config, "workerinput")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_idle_workers() -> Iterator[None]:
+    """End the processes of sweeps, which wait for the next sweep for a while."""
+    yield
+    if "loky" in sys.modules:
+        sys.modules["loky"].get_reusable_executor(reuse=True).shutdown(kill_workers=True)
 
 
 @pytest.hookimpl(trylast=True)

@@ -102,7 +102,7 @@ def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
                 fb.sweep(lambda n: object(), {"n": [1, 2]}, cluster=client, progress=False)
             cluster.scheduler.allowed_failures = 0  # else it tries three times more
             with pytest.raises(SimulationError, match="the cluster broke down at a point"):
-                fb.sweep(lambda n: os._exit(1), {"n": [1]}, cluster=client, progress=False)
+                fb.sweep(lambda n: os.kill(os.getpid(), 9), {"n": [1]}, cluster=client, progress=False)
         with pytest.raises(InputError, match="the Dask client is closed"):
             fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
     assert without_process(here) == without_process(by_address) == without_process(by_client)
