@@ -56,14 +56,14 @@ def picture(rose: PushRose, scale: float | None = None, theory: bool = True) -> 
         view.show(rose.state, rose.contacts, cones=False, extra=roses.picture(rose))
 
     rose: the record, as from `fb.push_rose`.
-    scale: length of a drawn push, m/N; None makes the rose about twice as wide as the stance.
+    scale: length of a drawn push, m/N; None makes its widest curve half as wide again as the stance.
     theory: as for `plot`.
     """
     positions = rose.contacts.positions(rose.state)
     centre = np.array([*rose.state.frame_pose(rose.frame).translation[:2], positions[:, 2].mean() + _LIFT])
     span = float(np.linalg.norm((positions - centre)[:, :2], axis=1).max())
     largest = max(float(values.max()) for _, values, _, _ in _curves(rose, theory))
-    scale = nice(2.0 * span / largest) if scale is None else positive("scale", scale, "m/N")
+    scale = 1.5 * span / largest if scale is None else positive("scale", scale, "m/N")
     items: Picture = {}
     for height, (kind, values, colour, _) in enumerate(reversed(_curves(rose, theory))):
         tips = scale * values[:, None] * rose.unit_vectors
