@@ -9,11 +9,12 @@ function startViewer() {
   const player = startPlayer(viewer);
   const camera = startCamera(viewer);
   const panel = startPanel(viewer);
+  const legend = startLegend(viewer, camera);
   const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
     set_title: (command) => { part("title").textContent = command.text; },
-    set_legend: (command) => { part("legend").replaceChildren(...command.items.map(legendLine)); },
+    set_legend: (command) => { legend.show(command.items); },
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
     set_theme: (command) => { document.body.className = command.name; },
     set_animation: (command) => { meshcat(command); player.load(command); },
@@ -50,11 +51,50 @@ function viewerOrText() {
   }
 }
 
-function legendLine([colour, text]) {
-  const line = document.createElement("div"), spot = document.createElement("i");
-  spot.style.background = colour;
-  line.append(spot, text);
-  return line;
+// The legend, at the lower left. Where it would cover what the camera looks at, it is folded into a button: pointing at it
+// or reaching it by the keyboard opens it, a click keeps it open, Escape closes it.
+function startLegend(viewer, camera) {
+  const legend = part("legend"), lines = part("lines"), button = legend.querySelector("button");
+  let kept = false;
+  const open = (now) => {
+    legend.classList.toggle("open", now);
+    button.setAttribute("aria-expanded", now);
+  };
+  function fold() {
+    legend.classList.remove("folded");  // to measure it as it stands open
+    const {right, top} = lines.getBoundingClientRect(), player = part("player").getBoundingClientRect();
+    const middle = {x: innerWidth / 2 - camera.aside(), y: innerHeight / 2};
+    const away = Math.hypot(Math.max(middle.x - right, 0), Math.max(top - middle.y, 0));
+    const crowded = away < middle.y  // the camera fits what it looks at into a ball as high as the picture
+      || top < part("title").getBoundingClientRect().bottom || (player.width > 0 && right > player.left);
+    legend.classList.toggle("folded", crowded && lines.childElementCount > 0);
+  }
+  const keep = (now) => { open(kept = now); };
+  legend.onpointerenter = ({pointerType}) => { if (pointerType == "mouse") open(true); };
+  legend.onpointerleave = () => open(kept);
+  legend.onkeydown = ({key}) => { if (key == "Escape") keep(false); };
+  button.onfocus = () => open(true);
+  button.onblur = () => open(kept);
+  button.onclick = () => keep(!kept);
+  const sizes = new ResizeObserver(fold);
+  for (const one of [part("meshcat-pane"), part("player"), viewer.gui.domElement]) sizes.observe(one);
+  return {
+    show(items) {
+      lines.replaceChildren(...items.map(([colour, text]) => {
+        const line = document.createElement("div");
+        line.append(spot(colour), text);
+        return line;
+      }));
+      button.firstChild.replaceChildren(...Array.from(new Set(items.map(([colour]) => colour)), spot));
+      fold();
+    },
+  };
+}
+
+function spot(colour) {
+  const made = document.createElement("i");
+  made.style.background = colour;
+  return made;
 }
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
@@ -65,6 +105,8 @@ function startCamera(viewer) {
     const node = followed.reduce((at, name) => at && at.children[name], viewer.scene_tree);
     return node ? node.object.getWorldPosition(new MeshCat.THREE.Vector3()) : null;
   };
+  // while the panel is open, the middle of the picture is left of it by so many pixels
+  const aside = () => room && !viewer.gui.closed ? viewer.gui.width / 2 : 0;
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
     if (followed.length) {
@@ -77,12 +119,13 @@ function startCamera(viewer) {
       last = now || last;  // a robot that is removed and drawn again elsewhere is followed there
     }
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-    if (room && !viewer.gui.closed) viewer.camera.setViewOffset(w, h, viewer.gui.width / 2, 0, w, h);
+    if (aside()) viewer.camera.setViewOffset(w, h, aside(), 0, w, h);
     else viewer.camera.clearViewOffset();
     render();
   };
   return {
-    makeRoom() { room = true; },  // while the panel is open, the middle of the picture is left of it
+    aside,
+    makeRoom() { room = true; },
     look(command) {
       viewer.camera.fov = command.fov;
       viewer.camera.position.fromArray(command.position);

@@ -20,7 +20,8 @@ from floatbase.viewer import wire
 
 _BODY = """
 <div><div id="meshcat-pane"></div></div>
-<div id="title"></div><div id="legend"></div>
+<div id="title"></div>
+<div id="legend"><div id="lines"></div><button aria-controls="lines" aria-expanded="false"><span></span>legend</button></div>
 <div id="notice">The viewer is closed, or its kernel was restarted: run its cell again. A page with the same address comes back
 by itself.</div>
 <div id="kept" title="This viewer is displayed again further down and live there.">kept picture ·

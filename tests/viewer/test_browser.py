@@ -6,11 +6,13 @@ from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import judges
 import numpy as np
 import pytest
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, catalogue, load
+from floatbase.simulation import Simulation, rollout
 from floatbase.viewer import ALARM, CALM, COM, MEASURED, WARNING, X_AXIS, Viewer, Window, wire
 
 from .looks import EYE, SMALL, WHERE, Screen, hue_pixels, picture, settle
@@ -136,6 +138,107 @@ def test_the_camera_moves_when_it_is_called_and_not_when_a_picture_is_drawn(page
     page.reload()
     settle(page, "left")
     np.testing.assert_allclose(page.evaluate(EYE), left, atol=1e-6)
+
+
+LINES = "getComputedStyle(document.getElementById('lines')).visibility == 'visible'"
+FOLDED = "document.getElementById('legend').classList.contains('folded')"
+BOX = """(selector) => {
+  const {left, top, right, bottom} = document.querySelector(selector).getBoundingClientRect();
+  return {left, top, right, bottom};
+}"""
+# how many of the robot's vertices lie behind the legend
+HIDDEN = """() => {
+  const {left, top, right, bottom} = document.getElementById("lines").getBoundingClientRect();
+  const at = new MeshCat.THREE.Vector3();
+  let n = 0, hidden = 0;
+  viewer.scene_tree.find(["meshcat", "robot"]).object.traverse(({geometry, matrixWorld}) => {
+    const points = geometry?.attributes.position;
+    for (let i = 0; i < (points?.count ?? 0); i++) {
+      at.fromBufferAttribute(points, i).applyMatrix4(matrixWorld).project(viewer.camera);
+      const x = (1 + at.x) * innerWidth / 2, y = (1 - at.y) * innerHeight / 2;
+      hidden += x > left && x < right && y > top && y < bottom;
+      n++;
+    }
+  });
+  return [n, hidden];
+}"""
+
+
+def test_a_legend_never_hides_the_robot_and_is_folded_where_it_would(
+    page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    viewer.show(standing, contacts, forces, forces, support=True, ghost=standing, title="legend")
+    page.goto(viewer.url)
+    settle(page, "legend")
+    beside, above = ((1000, 480, False), (1300, 240, False)), ((420, 360, True), (590, 360, True), (1300, 160, True))
+    for width, height, folded in (*beside, *above):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_function(f"{FOLDED} == {str(folded).lower()}")
+        settle(page)
+        picture(page, f"legend_{width}_{height}")
+        vertices, hidden = page.evaluate(HIDDEN)
+        assert vertices > 1000
+        assert folded or not hidden, (width, height)
+        assert hidden or width > 420  # there it would cover the robot, were it open
+    viewer.show(standing, contacts, com=False, cones=False, planned=forces, title="one line")
+    settle(page, "one line")
+    page.set_viewport_size({"width": 640, "height": 360})
+    page.wait_for_function(f"!{FOLDED} && {LINES}")  # a short one fits beside
+    assert page.evaluate(HIDDEN)[1] == 0
+    viewer.show(standing, com=False, title="nothing")
+    settle(page, "nothing")
+    page.set_viewport_size(SMALL)
+    assert not page.evaluate(FOLDED)  # no button for nothing
+
+
+@pytest.mark.parametrize("background", ["light", "dark"])
+def test_a_folded_legend_opens_by_mouse_and_by_keyboard(browser, go2: Robot, standing: State, background: str) -> None:
+    viewer = Viewer(go2, background=background)
+    viewer.show(standing, ghost=standing, title="folded")
+    page = browser.new_page(viewport=SMALL)
+    page.goto(viewer.url)
+    settle(page, "folded")
+    button = page.locator("#legend button")
+
+    def is_open() -> bool:
+        assert button.get_attribute("aria-expanded") == str(page.evaluate(LINES)).lower()
+        return page.evaluate(LINES)
+
+    assert button.is_visible() and not is_open()
+    button.hover()
+    assert is_open()
+    picture(page, f"legend_open_{background}")
+    page.mouse.move(400, 20)
+    assert not is_open()
+    button.click()
+    page.mouse.move(400, 20)
+    assert is_open()  # a click keeps it
+    button.click()
+    page.mouse.move(400, 20)
+    button.blur()
+    assert not is_open()
+    button.focus()
+    assert is_open()
+    page.keyboard.press("Escape")
+    assert not is_open()
+    page.keyboard.press("Enter")
+    button.blur()
+    assert is_open()
+    page.close()
+    viewer.close()
+
+
+def test_a_folded_legend_leaves_room_for_the_player_of_a_recording(browser, viewer: Viewer, tmp_path: Path) -> None:
+    viewer.play(rollout(Simulation(viewer.robot), judges.limp, 0.05))
+    page = browser.new_page()
+    page.goto(viewer.save(tmp_path / "record.html").as_uri())
+    for width in (340, 420, 700):
+        page.set_viewport_size({"width": width, "height": 300})
+        page.wait_for_function(f"window.viewer && viewer.num_messages_received > 0 && {FOLDED}")
+        button, player = (page.evaluate(BOX, name) for name in ("#legend button", "#player"))
+        assert button["right"] < player["left"] and player["right"] < width, width
+        picture(page, f"record_{width}")
+    page.close()
 
 
 NAMES = ('<img src=x onerror="hit = true">', "x<y & z > w", "&amp;", "__proto__", 'it\'s \\ "so" τ')
