@@ -1,7 +1,8 @@
 """The colours of all 3-D pictures and plots, RGB from 0 to 1, safe for the colour-blind (Okabe and Ito).
 
 Measured forces are dark blue, planned forces light blue. A friction cone is green when its force is inside, orange when the
-force reaches a facet or the surface, vermilion when it is outside, and a faint grey when there is no force.
+force reaches a facet or the surface, vermilion when it is outside, and a faint grey when there is no force. What is neither
+a force nor a cone, as a curve, a place or an entry of a matrix, is grey: greys differ in lightness, which everybody sees.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
 PATCH = _rgb("#444444")
+GREYS = (_rgb("#2B3440"), _rgb("#6F7885"), _rgb("#959EAA"))  # dark, middle, light; the middle one shows on any background
 
 X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from floatbase._arrays import Array, of_kind, plain_numbers, said
 from floatbase.errors import InputError
-from floatbase.viewer.colours import ALARM, COM, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
+from floatbase.viewer.colours import ALARM, GREYS, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.recording import checked_rollout
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
     axis = _axis(axis)
     limited = np.isfinite(rollout.robot.torque_limits)
     share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
-    axis.plot(rollout.time, share, color=COM, linewidth=0.8, alpha=0.7)
+    axis.plot(rollout.time, share, color=GREYS[0], linewidth=0.8, alpha=0.7)
     for limit in (-1.0, 1.0):
         axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else "")
     return _finished(axis, rollout, "torques, of their limits")

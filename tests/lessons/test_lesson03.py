@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -152,10 +153,35 @@ def test_the_pictures_are_drawn() -> None:
     finally:
         view.close()
     assert "rank J = <b>11</b>" in text
-    assert bars(np.full(18, 19.0), np.zeros(12), np.zeros(12)).count("#222") == 3  # the names of the groups
-    assert bars(np.full(18, 21.0), np.zeros(12), np.full(12, -200.0)).count("#222") == 33  # and a dark end for each
     assert len(matrix_picture(np.eye(4), {"a": 1, "b": 3}, {"c": 2, "d": 2}).axes) == 3  # with the colour bar
     assert ConstantTorques([1.0])(np.zeros(1), np.zeros(1), 0.0).tau == [1.0]
+
+
+def test_every_bar_says_its_name_its_number_and_its_unit() -> None:
+    numbers = np.arange(42.0) - 3
+    said = re.findall(r"<title>(.*?): (.*?) (.*?)</title>", bars(numbers[:18], numbers[18:30], numbers[30:]))
+    assert [float(number) for _, number, _ in said] == list(numbers)
+    assert said[0] == ("q̈ base x", "-3", "m/s²") and said[3] == ("q̈ turning x", "0", "rad/s²")
+    assert said[6] == ("q̈ front left hip", "3", "rad/s²") and said[20] == ("τ front left knee", "17", "N·m")
+    assert said[-1] == ("λ rear right z", "38", "N")
+    assert re.findall("<title>(.*?)</title>", bars(np.full(18, -1e-12), np.zeros(12), np.zeros(12)))[0] == "q̈ base x: 0 m/s²"
+
+
+def test_bars_are_as_long_as_their_numbers_and_those_that_are_longer_have_an_end() -> None:
+    def heights(drawn: str) -> list[float]:
+        return [float(height) for height in re.findall(r'height="([\d.]+)" fill="#', drawn)]
+
+    drawn = bars(np.zeros(18), np.array([10.0, -5.0, 20.0] * 4), np.array([0.0, 50.0, 300.0] * 4), full=(20.0, 20.0, 100.0))
+    full = heights(drawn)[20]
+    assert heights(drawn) == [0.0] * 18 + [full / 2, full / 4, full] * 4 + [0.0, full / 2, full] * 4
+    assert drawn.count('height="3"') == 4  # 20 of 20 fits, 300 of 100 does not
+
+
+def test_words_below_the_bars_are_as_large_as_those_of_a_page_and_never_shrink() -> None:
+    drawn = bars(np.zeros(18), np.zeros(12), np.zeros(12))
+    assert min(int(size) for size in re.findall(r'font-size="(\d+)"', drawn)) >= 11
+    assert "viewBox" not in drawn and "%" not in drawn
+    assert re.findall("(?<=>)[xyzhtk](?=</text>)", drawn) == list("xyz" * 2 + "htk" * 8 + "xyz" * 4)
 
 
 def test_the_veil_of_a_motion_is_not_called_a_posture() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from floatbase.viewer import (
     BACKGROUNDS,
     CONE,
     FIGURES,
+    GREYS,
     LEGEND,
     MEASURED,
     PLANNED,
@@ -151,8 +153,19 @@ DEFICIENCIES = {
 def test_the_colour_code_is_readable_for_the_colour_blind() -> None:
     for name, deficiency in DEFICIENCIES.items():
         for one, other in [(MEASURED, PLANNED), (CONE["inside"], CONE["active"]), (CONE["inside"], CONE["outside"]),
-                           (CONE["active"], CONE["outside"])]:  # fmt: skip
+                           (CONE["active"], CONE["outside"]), (GREYS[1], PLANNED), *pairwise(GREYS)]:  # fmt: skip
             assert np.linalg.norm(_simulated(one, deficiency) - _simulated(other, deficiency)) > 0.2, name
+
+
+def test_the_middle_grey_shows_on_every_background() -> None:
+    def luminance(colour: tuple[float, ...]) -> float:
+        c = np.array(colour)
+        return float(np.array([0.2126, 0.7152, 0.0722]) @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4))
+
+    papers = [colour for top, bottom, _, _ in BACKGROUNDS.values() for colour in (top, bottom)]
+    for paper in [*papers, (17 / 255,) * 3]:  # the last is a dark JupyterLab's
+        dark, light = sorted((luminance(paper), luminance(GREYS[1])))
+        assert (light + 0.05) / (dark + 0.05) > 2.5, paper
 
 
 def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_the_push() -> None:

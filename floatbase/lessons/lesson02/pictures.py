@@ -18,7 +18,7 @@ from floatbase.lessons.lesson02.helpers import DISC_RADIUS, park, wheel
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
-from floatbase.viewer import ALARM, COM, MEASURED, PLANNED, Picture, View, Viewer, geometry, hexadecimal, marks, props, shapes
+from floatbase.viewer import GREYS, MEASURED, PLANNED, Picture, View, Viewer, geometry, hexadecimal, marks, props, shapes
 
 MOMENT = 0.01  # m drawn for a newton metre
 
@@ -32,8 +32,8 @@ def draw_equation(eom: EquationsOfMotion) -> Figure:
     figure, axes = plt.subplots(1, 4, figsize=(9.5, 3.7), width_ratios=widths, layout="constrained")
     for axis, (name, part, first) in zip(axes, parts, strict=True):
         filled = np.abs(part) > 1e-9 * np.abs(part).max()
-        axis.imshow(np.where(filled, 1.0, 0.0), cmap="Blues", vmin=0.0, vmax=1.6, aspect="equal")
-        axis.axhline(5.5, color=hexadecimal(ALARM), linewidth=1.5)
+        axis.imshow(np.where(filled, 1.0, 0.0), cmap="Greys", vmin=0.0, vmax=2.0, aspect="equal")
+        axis.axhline(5.5, color=hexadecimal(GREYS[0]), linewidth=2.0)
         axis.set_title(name, fontsize=14)
         axis.set(xlabel=f"{part.shape[0]} × {part.shape[1]}", xticks=[], yticks=[])
         if first is not None:
@@ -102,9 +102,9 @@ def plot_both(record: Rollout, title: str) -> Axes:
 def plot_strayed(curves: dict[str, Array], duration: float) -> Axes:
     """Curves of how far feet stray, name -> distances in mm over `duration` s, on a logarithmic scale."""
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
-    for (name, curve), colour in zip(curves.items(), (ALARM, MEASURED, PLANNED), strict=False):
+    for (name, curve), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
         time = np.linspace(0.0, duration, len(curve))
-        axis.semilogy(time[1:], curve[1:], color=hexadecimal(colour), label=name)
+        axis.semilogy(time[1:], curve[1:], style, color=hexadecimal(colour), linewidth=2.0, label=name)
     axis.set(xlabel="time [s]", ylabel="worst foot strayed [mm]", ylim=(1e-3, 1e2))
     axis.grid(alpha=0.25)
     axis.legend(loc="lower right", fontsize="small")
@@ -112,20 +112,21 @@ def plot_strayed(curves: dict[str, Array], duration: float) -> Axes:
 
 
 def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
-    """The arm without b, and as a veil the arm with b; a red line leads from where the tool was to where it is.
+    """The arm without b, and as a veil the arm with b. A pin stands where the tool was, a thick line leads from there to it.
 
     forgotten, kept: records without and with b, equally long.
     """
-    home = forgotten.state(0).point("tool0")
+    home, colour = forgotten.state(0).point("tool0"), view.painter.text
+    pin = {"home/pin": shapes.rod(home, np.eye(3), 0.24, 0.005, colour)}
+    pin["home/name"] = shapes.label(home + [0.0, 0.0, 0.27], "home", 0.035, colour, plate=False)
     rows = np.linspace(0, len(kept) - 1, 30).astype(int)
     pictures = []
     for i in rows:
-        drawn = view.painter.picture(forgotten.state(i), com=False, ghost=kept.state(i))
-        drawn["home"] = shapes.arrow(home + [0.0, 0.0, 0.25], [0.0, 0.0, -0.24], PLANNED, view.painter.size)
+        drawn = view.painter.picture(forgotten.state(i), com=False, ghost=kept.state(i)) | pin
         way = forgotten.state(i).point("tool0") - home
         length = float(np.linalg.norm(way))
         if length > 2e-3:
-            drawn["way"] = shapes.rod(home, geometry.frame_along(way / length), length, 0.012, ALARM)
+            drawn["way"] = shapes.rod(home, geometry.frame_along(way / length), length, 0.012, colour)
         pictures.append(drawn)
     view.play_pictures(forgotten.time[rows], pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))
@@ -134,7 +135,7 @@ def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
 def play_collapse(
     view: Viewer, forgotten: Sequence[fb.State], kept: Sequence[fb.State], contacts: fb.Contacts, duration: float
 ) -> Viewer:
-    """The robot without b, and as a veil the robot with b; marks where the feet belong, red lines to where they are.
+    """The robot without b, and as a veil the robot with b; marks where the feet belong, lines to where they are.
 
     forgotten, kept: states without and with b, equally many.
     contacts: the pinned feet.
@@ -150,7 +151,7 @@ def play_collapse(
             length = float(np.linalg.norm(way))
             if length > 2e-3:  # beside the foot, where it is seen
                 start = a + [0.0, 0.06 * np.sign(a[1]), 0.0]
-                drawn[f"way/{i}"] = shapes.rod(start, geometry.frame_along(way / length), length, 0.006, ALARM)
+                drawn[f"way/{i}"] = shapes.rod(start, geometry.frame_along(way / length), length, 0.006, view.painter.text)
         return drawn
 
     rows = np.linspace(0, len(kept) - 1, 30).astype(int)
@@ -172,7 +173,8 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
         for i, (a, b) in enumerate(pairwise(corners)):
             length = float(np.linalg.norm(b - a))
             if length > 1e-6:
-                picture[f"way/{i}"] = shapes.rod(a, geometry.frame_along((b - a) / length), length, 0.006, COM)
+                rod = shapes.rod(a, geometry.frame_along((b - a) / length), length, 0.006, view.painter.text)
+                picture[f"way/{i}"] = rod
         picture["wheel/now"] = _drawn(states[min(round(time * 20), len(states) - 1)], way, time)
         for name, at in (("start", corners[0]), ("end", corners[-1])):
             picture[f"mark/{name}"] = shapes.contact_patch(at + [0.0, 0.0, 0.002], [0.0, 0.0, 1.0], 0.035)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,16 +16,20 @@ from floatbase.dynamics import FeasibleSpace
 from floatbase.lessons.lesson03.helpers import upright
 from floatbase.linear_algebra import rank
 from floatbase.robots import Robot
-from floatbase.viewer import Viewer
+from floatbase.viewer import GHOST, GREYS, PLANNED, Viewer, hexadecimal
 
 GHOST_TIME = 0.25  # s: the veil shows where an acceleration leads in this time from rest
 FULL = (20.0, 20.0, 100.0)  # m/s² or rad/s², N·m, N: bars of full length
+BAR, FULL_BAR, MIDDLE = 14, 40, 62  # px: width of a bar, length of a full one, and where they begin, below the top
+BLOCK, GAP = 58, 16  # px: a name of a leg, 11 px high, fits below its three bars; between the bars of two legs
+
+_Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]  # name, marks of its three numbers, unit
 
 
 def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike) -> str:
     """Draw (q̈, τ, λ) of a β, shape (dimension,): forces as arrows, where q̈ leads from rest as a veil.
 
-    Returns all the numbers as bars, SVG.
+    Returns all the numbers as bars, HTML.
     """
     qdd, tau, forces = space(beta)
     state = space.eom.state
@@ -36,7 +40,7 @@ def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike) -> str:
 
 
 def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tuple[float, float, float] = FULL) -> str:
-    """All numbers of a quadruped's motion as bars, SVG, leg by leg.
+    """All numbers of a quadruped's motion as bars, HTML, leg by leg. Under the mouse a bar says its name, number and unit.
 
     qdd: shape (18,), m/s² and rad/s².
     tau: shape (12,), N·m.
@@ -44,33 +48,50 @@ def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tu
     full: what a bar of full length means for each of the three; longer ones get a dark end.
     """
     legs = ("front left", "front right", "rear left", "rear right")
+    joints, axes = ("hip", "thigh", "knee"), ("x", "y", "z")
+    base = [("base", axes, "m/s²"), ("turning", axes, "rad/s²")]
     groups = (
-        ("q̈", "m/s², rad/s²", "#7A86A8", ("base x y z", "turning", *legs)),
-        ("τ", "N·m", "#E69F00", legs),
-        ("λ", "N", "#0072B2", legs),
+        ("q̈", "m/s², rad/s²", GHOST, base + [(leg, joints, "rad/s²") for leg in legs]),
+        ("τ", "N·m", GREYS[1], [(leg, joints, "N·m") for leg in legs]),
+        ("λ", "N", PLANNED, [(leg, axes, "N") for leg in legs]),
     )
-    parts, x = [], 10
-    for (name, unit, colour, blocks), values, most in zip(groups, (qdd, tau, forces), full, strict=True):
-        parts.append(f'<text x="{x}" y="12" font-size="11" fill="#222">{name}, ± {most:g} {unit}</text>')
-        parts.append(f'<line x1="{x}" y1="60" x2="{x + 12 * np.size(values) + 5 * len(blocks) - 8}" y2="60" stroke="#888"/>')
-        for block, three in zip(blocks, np.reshape(values, (-1, 3)), strict=True):
-            parts.append(f'<text x="{x + 17}" y="112" font-size="7" fill="#444" text-anchor="middle">{block}</text>')
-            for value in three:
-                parts += _bar(x, float(value) / most, colour)
-                x += 12
-            x += 5
-        x += 20
-    return f'<svg width="{1.45 * x:.0f}" style="max-width: 100%" viewBox="0 0 {x} 118">{"".join(parts)}</svg>'
+    drawn = [
+        _group(f"{name}, ± {most:g} {units}", hexadecimal(colour), blocks, np.reshape(values, (-1, 3)), most)
+        for (name, units, colour, blocks), values, most in zip(groups, (qdd, tau, forces), full, strict=True)
+    ]
+    return f'<div style="display: flex; flex-wrap: wrap; gap: 10px 16px">{"".join(drawn)}</div>'
 
 
-def _bar(x: float, part: float, colour: str) -> list[str]:
-    """A bar at x, up or down from the middle; part: of the full length."""
-    length = min(abs(part), 1.0) * 40
-    top = 60 - length if part > 0 else 60
-    drawn = [f'<rect x="{x}" y="{top:.1f}" width="9" height="{length:.1f}" fill="{colour}"/>']
-    if length == 40:
-        drawn.append(f'<rect x="{x}" y="{20 if part > 0 else 97}" width="9" height="3" fill="#222"/>')
-    return drawn
+def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
+    """The bars of q̈, τ or λ, SVG, as large as it says: it wraps, but never shrinks. Text has the page's own colour.
+
+    title: what stands above, the symbol first.
+    colour: of the bars.
+    blocks: of three numbers each.
+    values: shape (len(blocks), 3).
+    most: what a bar of full length means.
+    """
+    width, bottom = BLOCK * len(blocks), MIDDLE + FULL_BAR
+    parts = [f'<text y="12" font-size="13">{title}</text>']
+    parts.append(f'<path d="M0 {MIDDLE}H{width}" stroke="currentColor" stroke-opacity="0.5"/>')
+    for i, ((block, marks, unit), three) in enumerate(zip(blocks, values, strict=True)):
+        parts.append(f'<text x="{BLOCK * (i + 0.5)}" y="{bottom + 28}" text-anchor="middle">{block}</text>')
+        for j, (mark, value) in enumerate(zip(marks, three, strict=True)):
+            x, number = BLOCK * i + BAR * j + GAP // 2, f"{value:.4g}" if abs(value) > 1e-6 * most else "0"
+            parts.append(f"<g><title>{title.split(',')[0]} {block} {mark}: {number} {unit}</title>")
+            parts.append(_bar(x, value / most, colour))
+            parts.append(f'<text x="{x + BAR / 2}" y="{bottom + 14}" text-anchor="middle">{mark[0]}</text></g>')
+    size = f'width="{width}" height="{bottom + 32}" role="img" aria-label="{title}"'
+    return f'<svg {size} font-size="11" fill="currentColor">{"".join(parts)}</svg>'
+
+
+def _bar(x: float, part: float, colour: str) -> str:
+    """A bar at x, up or down from the middle, on a column that feels the mouse. part: of the full length."""
+    length = min(abs(part), 1.0) * FULL_BAR
+    top, end = (MIDDLE - length, MIDDLE - FULL_BAR) if part > 0 else (MIDDLE, MIDDLE + FULL_BAR - 3)
+    drawn = f'<rect x="{x}" y="{MIDDLE - FULL_BAR}" width="{BAR}" height="{2 * FULL_BAR + 16}" fill-opacity="0"/>'
+    drawn += f'<rect x="{x + 1}" y="{top:.1f}" width="{BAR - 2}" height="{length:.1f}" fill="{colour}"/>'
+    return drawn + (f'<rect x="{x + 1}" y="{end}" width="{BAR - 2}" height="3"/>' if abs(part) > 1.0 else "")
 
 
 def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[str, int]) -> Figure:
@@ -85,7 +106,7 @@ def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[s
     figure.colorbar(shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="size, as a power of ten", shrink=0.8)
     _name_blocks(left, rows, columns)
     values = np.linalg.svd(A, compute_uv=False)
-    right.semilogy(np.arange(1, len(values) + 1), values, "o", color="#0072B2")
+    right.semilogy(np.arange(1, len(values) + 1), values, "o", color=hexadecimal(GREYS[0]))
     right.set(xlabel="number", ylabel="singular value", title=f"{len(values)} singular values, rank {rank(A)}")
     right.grid(alpha=0.3)
     plt.close(figure)
@@ -99,7 +120,7 @@ def _name_blocks(axes: Any, rows: Mapping[str, int], columns: Mapping[str, int])
     ):
         ends = np.cumsum(list(mapping.values()))
         for end in ends[:-1]:
-            line(end - 0.5, color="#222", linewidth=0.8)
+            line(end - 0.5, color=hexadecimal(GREYS[0]), linewidth=0.8)
         ticks(ends - np.array(list(mapping.values())) / 2 - 0.5)
         names([f"{name}\n{size}" for name, size in mapping.items()])
     axes.xaxis.tick_top()
@@ -120,6 +141,5 @@ def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
     return (
         f"rank J = <b>{rank(eom.J)}</b>, smallest singular value {np.linalg.svd(eom.J)[1][-1]:.3f}; "
         f"torques for the wobble: <b>{np.linalg.norm(extra):.3f} N·m</b>"
-        + "<br>"
         + bars(np.zeros(18), tau, forces, full=(20.0, 2.0, 20.0))
     )

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.viewer import ALARM, COM, Viewer, hexadecimal, shapes
+from floatbase.viewer import COM, GREYS, Viewer, hexadecimal, shapes
 
 ARROW = 0.5  # m drawn for 1 m/s²
 LEVELS = (0.02, 0.125, 0.4, 1.0, 2.0)  # of a cost above its least value
@@ -48,7 +48,7 @@ def slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
         ax.contour(x, y, height, levels=LEVELS, colors="white", linewidths=0.8)
         flat, curved = np.linalg.eigvalsh(cost.H)
         if flat > VALLEY * curved:
-            ax.plot(*cost.minimiser(), "o", color=hexadecimal(ALARM), markeredgecolor="white", markersize=8)
+            ax.plot(*cost.minimiser(), "o", color=hexadecimal(GREYS[0]), markeredgecolor="white", markersize=8)
         ax.set(xlabel=x_name, ylabel=y_name, title=title.replace("_", " "), aspect="equal")
     plt.close(figure)
     return figure
@@ -68,16 +68,17 @@ def level_curves(cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: 
     s = 130.0 / half  # pixels for 1
     x, y = (np.array([1, -1]) * s * np.asarray(point)) + 130
     at = f'transform="translate({130 + s * centre[0]:.1f} {130 - s * centre[1]:.1f}) rotate({turn:.2f})"'
+    grey = hexadecimal(GREYS[1])
     rings = "".join(
         f'<ellipse rx="{s * (2 * level / values[1]) ** 0.5:.1f}" ry="{s * (2 * level / values[0]) ** 0.5:.1f}" {at} '
-        'fill="#0072B2" fill-opacity="0.12" stroke="#0072B2"/>'
+        f'fill="{grey}" fill-opacity="0.15" stroke="{grey}" stroke-width="1.5"/>'
         for level in LEVELS
     )
     return (
-        f'<svg width="330" height="290" viewBox="-40 0 310 290"><svg x="0" y="0" width="260" height="260">'
-        f'<rect width="260" height="260" fill="#f4f6f9"/>{rings}'
-        f'<path d="M0 130H260M130 0V260" stroke="#aaa" stroke-dasharray="3 3"/>'
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" fill="#D55E00" stroke="white"/></svg>'
+        f'<svg width="310" viewBox="-40 0 310 290" style="max-width: 100%" fill="currentColor">'
+        f'<svg x="0" y="0" width="260" height="260"><rect width="260" height="260" fill-opacity="0.05"/>{rings}'
+        f'<path d="M0 130H260M130 0V260" stroke="currentColor" stroke-opacity="0.4" stroke-dasharray="3 3"/>'
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6"/></svg>'
         f'<text x="130" y="278" text-anchor="middle" font-size="13">{x_name}, ± {half:g}</text>'
         f'<text transform="translate(-10 130) rotate(-90)" text-anchor="middle" font-size="13">{y_name}, ± {half:g}</text>'
         "</svg>"
@@ -87,9 +88,8 @@ def level_curves(cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: 
 def effort_picture(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]) -> Figure:
     """Curves of effort over the acceleration to the left: name -> (accelerations, efforts)."""
     figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
-    styles = (("#D55E00", "-"), ("#E69F00", "--"), ("#0072B2", "-"))
-    for (name, (x, y)), (colour, style) in zip(curves.items(), styles, strict=False):
-        ax.plot(x, y, style, color=colour, label=name, linewidth=2)
+    for (name, (x, y)), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
+        ax.plot(x, y, style, color=hexadecimal(colour), label=name, linewidth=2)
     ax.set(xlabel="acceleration of the base to the left [m/s²]", ylabel="½‖τ‖² [(N·m)²]", ylim=(0, None))
     ax.grid(alpha=0.3)
     ax.legend()
