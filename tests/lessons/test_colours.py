@@ -17,7 +17,7 @@ import floatbase as fb
 from floatbase.dynamics import motion_matrix
 from floatbase.lessons import ConstantTorques, lesson02, lesson03, lesson04
 from floatbase.lessons.publish import FOLDER, read
-from floatbase.viewer import ALARM, CALM, COM, CONE, MEASURED, PLANNED, WARNING, Viewer, hexadecimal
+from floatbase.viewer import ALARM, CALM, COM, CONE, GREYS, MEASURED, PLANNED, WARNING, Viewer, hexadecimal
 
 LESSONS = Path(fb.__file__).parent / "lessons"
 TAKEN = {hexadecimal(colour) for colour in (MEASURED, PLANNED, COM, *CONE.values())}
@@ -81,7 +81,7 @@ def test_words_and_dots_of_svg_have_the_colour_of_the_page_so_that_a_dark_one_ca
 
 
 @pytest.mark.parametrize("background", ["white", "dark"])
-def test_places_and_ways_in_a_picture_have_the_colour_of_text(background: str) -> None:
+def test_a_place_in_a_picture_has_the_colour_of_text_and_a_way_is_grey(background: str) -> None:
     arm = judges.load("ur5")
     still = fb.rollout(fb.Simulation(arm), judges.controller_of("ur5"), 0.1)
     limp = fb.rollout(fb.Simulation(arm), ConstantTorques(np.zeros(6)), 0.1)
@@ -91,6 +91,6 @@ def test_places_and_ways_in_a_picture_have_the_colour_of_text(background: str) -
         made = {path: c for (path, kind, _), c in view.window.scene.commands().items() if kind == "set_object"}
     finally:
         view.close()
-    for part in ("home/pin", "way"):
+    for part, colour in (("home/pin", view.painter.text), ("way", GREYS[2])):
         (command,) = (command for path, command in made.items() if path.startswith(f"/meshcat/{part}"))
-        assert f"#{command['object']['materials'][0]['color']:06X}" == hexadecimal(view.painter.text)
+        assert f"#{command['object']['materials'][0]['color']:06X}" == hexadecimal(colour)

@@ -122,7 +122,7 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slider
 
     along = (-6.0, 0.0, 6.0, "m/s²")
     panel = slider_panel(view, draw, forwards=(-6.0, 2.0, 6.0, "m/s²"), up=along, turn=(-40.0, 0.0, 40.0, "rad/s²"))
-    view.camera(View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.42), 0.62)))
+    view.camera(View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.5), 0.66)))
     return panel
 
 
@@ -151,7 +151,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
 
     each = (-40.0, 30.0, 40.0, "N")
     panel = slider_panel(view, draw, left_feet=each, right_feet=each, twist=(-40.0, 0.0, 40.0, "N"))
-    view.camera(View(50.0, 14.0, 1.0, around=((0.0, 0.0, 0.33), 0.55)))
+    view.camera(View(50.0, 14.0, 1.0, around=((0.0, 0.0, 0.38), 0.6)))
     return panel
 
 
