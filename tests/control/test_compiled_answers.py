@@ -196,14 +196,16 @@ def test_straight_knees(bend: float) -> None:
 
 def test_every_task_with_targets_that_move() -> None:
     robot = judges.load("go2")
-    at, com = robot.standing(), robot.standing().com
+    at, com, foot = robot.standing(), robot.standing().com, robot.standing().point("FL_foot")
     tasks = [
-        fb.CoMTask(lambda t: com + [0.0, 0.0, 0.01 * t], lambda t: [0.0, 0.0, 0.01], kp=50.0, kd=3.0, weight=4.0),
-        fb.OrientationTask("base", lambda t: judges.rotation([0.1 * t, 0.0, 0.2]), angular_velocity=[0.1, 0.0, 0.0]),
+        fb.CoMTask(lambda t: (com + [0.0, 0.0, 0.01 * t], [0.0, 0.0, 0.01], [0.0, 0.2, t]), kp=50.0, kd=3.0, weight=4.0),
+        fb.OrientationTask("base", lambda t: (judges.rotation([0.1 * t, 0.0, 0.2]), [0.1, 0.0, 0.0], [0.0, t, 0.0])),
         fb.OrientationTask("FL_calf", judges.rotation([0.3, 0.1, 0.0]), weight=0.3),
-        fb.FrameTask("FL_foot", at.point("FL_foot") + [0.0, 0.0, 0.05], acceleration=lambda t: [0.0, t, 1.0], weight=3.0),
-        fb.PostureTask(lambda t: at.q, weight=0.2),
-        fb.PostureTask(at.q, kp=3.0, weight=0.1, name="soft posture"),
+        fb.FrameTask("FL_foot", lambda t: np.array([foot + [0.0, 0.0, 0.05], np.zeros(3), [0.0, t, 1.0]]), weight=3.0),
+        fb.FrameTask("FL_calf", at.point("FL_calf"), [0.1, 0.0, 0.2], [0.0, 1.0, 0.0]),
+        fb.PostureTask(lambda t: (at.q, np.linspace(-t, t, 12), np.linspace(-1.0, 1.0, 12)), weight=0.2),
+        fb.PostureTask(lambda t: at.q, weight=0.02),
+        fb.PostureTask(at.q, np.linspace(1.0, 2.0, 12), np.full(12, 0.5), kp=3.0, weight=0.1, name="soft posture"),
         fb.ForceTask(lambda t: np.full(9, 10.0 + t), weight=1e-4),
         fb.TorqueTask(np.ones(12), weight=1e-3),
     ]
@@ -397,7 +399,7 @@ def test_a_replaced_controller_is_like_a_new_one() -> None:
     for frames in (["FL_foot"], ["FR_foot", "RL_foot"], ["FL_foot", "FR_foot", "RR_foot"]):
         contacts = fb.Contacts.points(robot, frames=frames)
         assert difference((both[0].replace(contacts=contacts), both[1].replace(contacts=contacts)), state) < TORQUE
-    with pytest.raises(InputError, match="target forces has shape"):
+    with pytest.raises(InputError, match="target of force regularisation has shape"):
         aimed = both[0].replace(tasks=[*both[0].tasks[:3], fb.ForceTask(np.zeros(12))])
         aimed.replace(contacts=fb.Contacts.points(robot, frames=["FL_foot"]))
 
@@ -417,13 +419,14 @@ def test_a_tick_keeps_its_targets_when_another_tick_comes_between() -> None:
     robot = judges.load("go2")
     state, com = robot.standing(), robot.standing().com
 
-    def velocity(t: float) -> list[float]:
+    def turning(t: float) -> np.ndarray:
         if t == 1.0:
             compiled(state.q, state.v, 7.0)
-        return [0.0, 0.0, 0.0]
+        return judges.rotation([0.0, 0.1 * t, 0.0])
 
-    rising = fb.CoMTask(lambda t: com + [0.0, 0.0, 0.01 * t], velocity)
-    compiled, readable = pair(robot, judges.stance(robot), [rising, *fb.standing_tasks(state)[1:]])
+    rising = fb.CoMTask(lambda t: com + [0.0, 0.0, 0.01 * t])
+    tasks = [rising, fb.OrientationTask("base", turning), *fb.standing_tasks(state)[2:]]
+    compiled, readable = pair(robot, judges.stance(robot), tasks)
     assert difference((compiled, readable), state, 1.0) < TORQUE
 
 
@@ -431,7 +434,7 @@ def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
     robot = judges.load("go2")
     state, slider = robot.standing(), {"height": 0.0, "turn": 0.0}
     tasks = [
-        fb.CoMTask(lambda t: state.com + [0.0, 0.0, slider["height"]], lambda t: [0.0, 0.0, slider["height"]]),
+        fb.CoMTask(lambda t: (state.com + [0.0, 0.0, slider["height"]], [0.0, 0.0, slider["height"]], np.zeros(3))),
         fb.OrientationTask("base", lambda t: judges.rotation([slider["turn"], 0.0, 0.0])),
         fb.PostureTask(state.q),
     ]

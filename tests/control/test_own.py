@@ -115,7 +115,7 @@ def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: st
     hand = at.point(frame) + [0.0, 0.0, 0.05]
     others = [*fb.standing_tasks(at)[1:], fb.ForceTask(weight=1e-4)]
     own = [MyCoM(at.com), others[0], MyHand(frame, hand), *others[1:]]
-    moving = fb.FrameTask(frame, lambda t: hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], weight=7.0)
+    moving = fb.FrameTask(frame, lambda t: (hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]), weight=7.0)
     known = fb.WholeBodyController(robot, contacts, [fb.CoMTask(at.com), moving, *others], path="compiled")
     compiled, readable = pair(robot, contacts, own)
     active = 0
