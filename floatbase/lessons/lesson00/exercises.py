@@ -34,8 +34,8 @@ def _weight() -> float:
 EXERCISES = (
     Exercise(
         name="00.1",
-        statement="The centre of mass of go2 accelerates upwards at 2 m/s². How large is the sum of the vertical forces that the "
-        "ground exerts on its feet, in N?",
+        statement="The centre of mass of go2 accelerates upwards at 2 m/s². How large is the sum of the vertical forces that "
+        "the ground exerts on its feet, in N?",
         stub="total = 100.0  # N: replace this number by an expression",
         solution="total = robot.mass * (robot.gravity + 2.0)",
         judge=Numeric(
