@@ -103,6 +103,7 @@ ACCEPTED: dict[str, set[str]] = {
     "ForceTask.target": ANY_LENGTH, "TorqueTask.target": ANY_LENGTH, "PostureTask.q": ANY_LENGTH,
     "PostureTask.velocity": ANY_LENGTH, "PostureTask.acceleration": ANY_LENGTH,
     "time": {"one too many"}, "times": {"one too many"},
+    "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
 }  # fmt: skip
 
 ZERO = np.zeros(12)
@@ -120,9 +121,11 @@ EXAMPLES: dict[str, Any] = {
     "WrenchSet.cones": VALUES["WrenchSet"].cones, "cones": True, "contact": "FL_foot", "contacts": CONTACTS,
     "control_period": 0.002, "controller": CONTROLLER, "corners": TALOS.feet[0].corners,
     "cost": fb.Quadratic.zero(SPACE.dimension), "cost_on_qdd": fb.Quadratic.zero(18), "crank": 0.045, "curvature": (1.0, 2.0),
+    "digits": 3,
     "damping": 10.0, "dead_volume": 8e-6, "direction": np.ones(6), "distance": 1.0, "dt": 1e-3, "duration": 0.002,
     "dv": np.zeros(18), "elevation": 10.0, "eom": EOM, "equality_names": tuple("abcdefghijkl"), "extra": {},
     "f": fb.Affine(np.eye(12), ZERO), "facets": 4, "View.feet": True, "feet": ["FL_foot"], "load_urdf.feet": ["tool0"],
+    "floor": 1e-6,
     "floating": True, "follow": True, "foot_radius": 0.02, "WrenchSet.torques.force": 150.0 * UP, "force": NORMAL,
     "cost_on_space.forces": fb.Quadratic.zero(12), "forces": 30.0 * np.tile(UP, 4),
     "plots.friction_used.forces": RECORD.measured, "frame": "FL_foot",
@@ -155,7 +158,8 @@ EXAMPLES: dict[str, Any] = {
     "state": STATE, "status": "inside", "step": 0.1, "stiffness": 100.0, "supply_pressure": 160e5, "support": True, "t": 0.5,
     "tank_pressure": 2e5, "target": ZERO, "tasks": CONTROLLER.tasks, "cost_on_space.tau": fb.Quadratic.zero(12), "tau": ZERO,
     "tau_desired": ZERO, "time": (0.0, 0.1), "times": (0.0, 0.1), "timestep": 1e-3, "title": "standing", "tolerance": 1e-9,
-    "torque": 1e-6, "Limits.torque_limits": np.full(12, 20.0), "torque_limits": 20.0, "v": STATE.v, "v_joints": ZERO,
+    "torque": 1e-6, "Limits.torque_limits": np.full(12, 20.0), "torque_limits": 20.0, "unit": "N", "v": STATE.v,
+    "v_joints": ZERO,
     "Viewer.checkbox.value": True, "value": 0.5, "valve_bandwidth": 250.0, "velocity": UP, "view": "front", "weight": 1.0,
     "working": (), "wrench": np.ones(6), "x": ZERO,
 }  # fmt: skip
@@ -171,7 +175,8 @@ RESULTS = {
 }  # fmt: skip
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live"),
-    "judges whatever a learner may give": ("Exercise", "Numeric", "Shaped", "check", "numbers", "reveal"),
+    "judges whatever a learner may give": ("Exercise", "Numeric", "Shaped", "check", "compare", "numbers", "predict", "reveal",
+        "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
