@@ -176,8 +176,8 @@ EXERCISES = (
                 "That is all of β. Directions along which the costs are curved do not count.": lambda: _on_three_feet().d,
             },
         ),
-        explanation="Three feet have 9 forces, of which 9 - 6 = 3 are squeezes. They are flat and move nothing. The other 6 - 3 move "
-        "the free foot, wherever you like, and base and legs follow so that neither wish is missed.",
+        explanation="Three feet have 9 forces, of which 9 - 6 = 3 are squeezes. They are flat and move nothing. The other "
+        "3 move the free foot, wherever you like, and base and legs follow so that neither wish is missed.",
     ),
     Exercise(
         name="04.3",
