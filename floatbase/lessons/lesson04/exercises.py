@@ -185,7 +185,8 @@ EXERCISES = (
         stub="design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort  # change or add costs",
         solution="from floatbase.objectives import tangential_bias\n\n"
         "friction = tangential_bias(contacts)  # on λ\n"
-        "design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort + 1e-4 * friction.pullback(zeta)",
+        "wishes = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort\n"
+        "design = wishes + 1e-4 * friction.pullback(zeta)",
         judge=_judge_design,
         names=_first_costs,
         explanation="Friction is easy to say in λ, so say it there and bring it to the torques through ζ. Its weight is small "
