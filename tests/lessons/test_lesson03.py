@@ -216,3 +216,16 @@ def test_the_veil_of_a_motion_is_not_called_a_posture() -> None:
     finally:
         view.close()
     assert "leads in a quarter" in drawn and "posture" not in drawn
+
+
+def test_a_motion_is_drawn_without_cones_on_request() -> None:
+    space = space_of(GO2)
+    view = fb.Viewer(GO2)
+    try:
+        show_beta(view, space, standing_still(space), cones=False)
+        without = str(view.window.scene.file_commands())
+        show_beta(view, space, standing_still(space))
+        drawn = str(view.window.scene.file_commands())
+    finally:
+        view.close()
+    assert "friction cone" not in without and "friction cone" in drawn
