@@ -101,13 +101,15 @@ ACCEPTED: dict[str, set[str]] = {
     "Problem.robot": {"of another robot"}, "torque_limits": NO_LIMIT, "Limits.torque_limits": NO_LIMIT | ANY_LENGTH,
     "Affine.constant.b": ANY_LENGTH, "Affine.__call__.x": {"column"}, "ConstantTorques.tau": ANY_LENGTH,
     "ForceTask.target": ANY_LENGTH, "TorqueTask.target": ANY_LENGTH, "PostureTask.q": ANY_LENGTH,
+    "PostureTask.velocity": ANY_LENGTH, "PostureTask.acceleration": ANY_LENGTH,
     "time": {"one too many"}, "times": {"one too many"},
     "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
 }  # fmt: skip
 
 ZERO = np.zeros(12)
 EXAMPLES: dict[str, Any] = {
-    "A": np.ones((12, 12)), "a": 10.0, "about": STATE.com, "acceleration": UP, "moving_frame.acceleration": lambda t: UP,
+    "A": np.ones((12, 12)), "a": 10.0, "about": STATE.com, "acceleration": UP, "PostureTask.velocity": ZERO,
+    "PostureTask.acceleration": ZERO, "moving_frame.acceleration": lambda t: UP,
     "actuators": HYDRAULIC, "after_reset": lambda: None, "alpha": 0.1, "angle": 30.0, "angular_acceleration": UP,
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
@@ -178,8 +180,8 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
-        "vertices", "conflicting_rows", "linear_program", "nearest_rotation", "QP.objective", "Rows.labels",
-        "Rows.at", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
+        "vertices", "conflicting_rows", "linear_program", "target_shapes", "targets_at", "QP.objective", "Rows.labels",
+        "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
         "recording.checked_rollout",
