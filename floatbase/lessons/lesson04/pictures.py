@@ -74,7 +74,7 @@ def level_curves(cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: 
         for level in LEVELS
     )
     return (
-        f'<svg width="330" height="290" viewBox="-40 0 310 290"><svg x="0" y="0" width="260" height="260">'
+        f'<svg width="330" height="290" viewBox="-40 0 310 290" fill="currentColor"><svg x="0" y="0" width="260" height="260">'
         f'<rect width="260" height="260" fill="#f4f6f9"/>{rings}'
         f'<path d="M0 130H260M130 0V260" stroke="#aaa" stroke-dasharray="3 3"/>'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" fill="#D55E00" stroke="white"/></svg>'
