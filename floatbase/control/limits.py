@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, plain_numbers, positive, read_only, said, text, texts
+from floatbase._arrays import (
+    Array,
+    Value,
+    cached_property,
+    checked,
+    of_kind,
+    plain_numbers,
+    positive,
+    read_only,
+    said,
+    text,
+    texts,
+)
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron

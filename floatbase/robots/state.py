@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, of_kind, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, of_kind, read_only
 from floatbase.robots.robot import Robot, check_unit_lengths
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

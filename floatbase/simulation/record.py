@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, read_only, whole
+from floatbase._arrays import Array, Value, cached_property, read_only, whole
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State

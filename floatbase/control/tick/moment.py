@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import pinocchio as pin
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, cached_property, read_only
 from floatbase.control.tick.tables import Dynamics
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.robots import State
