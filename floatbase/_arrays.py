@@ -158,16 +158,21 @@ def read_only(value: Any) -> Array:
     """`value` as a float64 array that cannot be written to: a copy, unless it is one already."""
     if _is_read_only(value):
         return value
-    array = np.array(value, dtype=np.float64)
+    return sealed(np.array(value, dtype=np.float64))
+
+
+def sealed(array: Array) -> Array:
+    """An array that nobody else has, which cannot be written to any more."""
     array.setflags(write=False)
     return array
 
 
 def _is_read_only(value: Any) -> bool:
     """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one that can."""
-    if type(value) is not np.ndarray or value.dtype is not _FLOAT64 or value.flags.writeable or not value.flags.c_contiguous:
+    if type(value) is not np.ndarray or value.dtype is not _FLOAT64 or (flags := value.flags).writeable:
         return False
-    return value.base is None or (type(value.base) is np.ndarray and not value.base.flags.writeable)
+    base = value.base
+    return flags.c_contiguous and (base is None or (type(base) is np.ndarray and not base.flags.writeable))
 
 
 def plain_numbers(value: Any) -> Array | None:
@@ -192,18 +197,21 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
     if array is None:
         required = f"numbers of shape {_text(shape)}" if shape else "a number"
         raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {said(value)}.")
-    fits = array.shape == shape or (
-        array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
-    )
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         raise InputError(f"{name} has shape {array.shape}; it must have shape {_text(shape)}{f' ({unit})' if unit else ''}.")
     # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger, the entries decide
     if not (np.vdot(array, array) <= LARGEST**2 or (usual := np.abs(array) <= LARGEST).all()):
         at = tuple(np.argwhere(~usual)[0].tolist())
         place = f"holds {array[at]:g} at index {list(at)}; every entry must be" if shape else f"is {array[at]:g}; it must be"
         raise InputError(f"{name} {place} a finite number{f' of at most {LARGEST:g}' if np.isfinite(array[at]) else ''}.")
-    array.setflags(write=False)
-    return array
+    return sealed(array)
+
+
+def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    for have, n in zip(found, shape, strict=False):
+        if n is not None and n != have:
+            return False
+    return len(found) == len(shape)
 
 
 def flat_forces(forces: Any, k: int | None, name: str = "forces") -> Array:
