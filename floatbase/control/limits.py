@@ -31,6 +31,7 @@ from floatbase.qp import RowLabel
 from floatbase.robots import Robot, torque_limits_of
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
+SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of each block: its name among the equations of motion
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 RowsAt: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -64,7 +65,7 @@ class Rows(Value):
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
         """G, shape (m, n), and h, shape (m,), at a state and a time t in s, checked."""
-        n = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[self.block]
+        n = getattr(eom, SIZES[self.block])
         if not callable(self.rows) and np.shape(self.rows[0])[1] == n:  # checked when they were made, but for that
             return cast("tuple[Array, Array]", self.rows)
         return self._checked(self.rows(eom, t) if callable(self.rows) else self.rows, n)

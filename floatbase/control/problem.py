@@ -11,7 +11,7 @@ import numpy as np
 
 from floatbase._arrays import Array, Value, of_kind, positive, said
 from floatbase.affine import Affine
-from floatbase.control.limits import BLOCKS, Limits, force_bounds, force_rows, torque_rows
+from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
 from floatbase.dynamics import MOTION_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
@@ -157,7 +157,7 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     if not isinstance(residual, Affine):
         form = f"A x + b of its block x as fb.Affine(A, b), not {type(residual).__name__}"
         raise InputError(f"the residual of {task.name!r} must be {form}.")
-    size = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[task.block]
+    size = getattr(eom, SIZES[task.block])
     if residual.n_in != size:
         raise InputError(f"the residual of {task.name!r} takes {residual.n_in} numbers; its block {task.block!r} has {size}.")
     return residual
