@@ -131,7 +131,7 @@ def _standing(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
     """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or torques."""
-    if isinstance(tasks, Task) or not isinstance(tasks, Sequence):
+    if hasattr(tasks, "residual") or not isinstance(tasks, Sequence):
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
     tasks = tuple(tasks)
     for task in tasks:
@@ -139,7 +139,7 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
         if 0 < len(lacks) < len(_PARTS_OF_A_TASK):
             has = "a task has block, name, weight and residual(eom, t), as floatbase.objectives.Task says"
             raise InputError(f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; {has}.")
-        if isinstance(task, type) or not isinstance(task, Task):
+        if lacks or isinstance(task, type) or not callable(task.residual):
             raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {said(task)} is none.")
         if task.block not in BLOCKS:
             raise InputError(f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".')
