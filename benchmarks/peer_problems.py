@@ -21,12 +21,14 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from tick import OwnCoM
 
 import floatbase as fb
 
 ROBOTS = ("go2", "solo12", "talos")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 MU = 0.7
+WAYS = ("compiled", "own", "readable")  # floatbase's answers; own: compiled, with a task as a user writes it
 HESSIAN = 1e-8  # DEFAULT_HESSIAN_REGULARIZATION of TSID
 
 
@@ -82,9 +84,15 @@ class Problem:
             fb.TorqueTask(weight=weights.torque),
         )
 
-    def controller(self, path: str) -> fb.WholeBodyController:
-        """floatbase's answer to it."""
-        return fb.WholeBodyController(self.robot, self.contacts, self.tasks, facets=4, inside=False, path=path)
+    def controller(self, way: str) -> fb.WholeBodyController:
+        """floatbase's answer to it.
+
+        way: one of `WAYS`; of one's own is the task for the centre of mass.
+        """
+        com, *others = self.tasks
+        tasks = [OwnCoM(com.position) if way == "own" else com, *others]
+        path = "compiled" if way == "own" else way
+        return fb.WholeBodyController(self.robot, self.contacts, tasks, facets=4, inside=False, path=path)
 
     def states(self, label: str, n: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """Random configurations and velocities, the same ones every time."""

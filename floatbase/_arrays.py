@@ -155,7 +155,10 @@ def whole(name: str, value: Any, least: int, most: int, why: str = "") -> int:
 
 
 def read_only(value: Any) -> Array:
-    """`value` as a float64 array that cannot be written to: a copy, unless it is one already."""
+    """`value` as a float64 array that cannot be written to: a copy, unless it is one already.
+
+    A read-only array is taken at its word: numpy does not tell of views that were taken of it before and can be written to.
+    """
     if _is_read_only(value):
         return value
     return sealed(np.array(value, dtype=np.float64))

@@ -82,7 +82,7 @@ class Playground:
         """The controller that the controls request."""
         standing = self.robot.standing()
         _, level, posture = fb.standing_tasks(standing)
-        tasks = (fb.CoMTask(standing.com + self.shift), level, posture) if self.robot.is_floating else (posture,)
+        tasks = (fb.CoMTask(standing.com + self.shift), level, posture)
         lifted = [frame for frame, stands in self.stance.items() if not stands]
         contacts = fb.Contacts.feet(self.robot, self.mu).without(*lifted)
         return fb.WholeBodyController(self.robot, contacts, tasks, facets=self.facets)

@@ -16,7 +16,7 @@ WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class State(Value):
-    """A configuration q and a velocity v of a robot, and all that follows from them alone.
+    """(2) A configuration q = (q_base, q_jnt) and a velocity v of a robot, and all that follows from them alone.
 
     A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts of frames are given in the
     world-aligned frame at the point requested.

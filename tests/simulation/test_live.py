@@ -118,7 +118,7 @@ def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run: Live, held: H
     assert [(p.start, p.force[1]) for p in held.slices[count].pushes] == [(0.0, 30.0)]
 
 
-HARD = ([0.0, 500.0, -200.0], 0.3)  # N, s: a push that no controller stands
+HARD = ([0.0, 0.0, -1200.0], 0.3)  # N, s: down, a push that no controller stands
 
 
 def test_the_same_push_after_a_fall_has_the_same_result_every_time(run: Live, slices: list[fb.Rollout]) -> None:
@@ -216,7 +216,7 @@ def test_a_status_is_told_as_it_comes(run: Live, slices: list[fb.Rollout]) -> No
     run.start()
     until(lambda: len(slices) > 0)
     run.pause()
-    run.push([0.0, 500.0, -200.0], duration=0.3)
+    run.push(*HARD)
     run.start()
     until(lambda: run.status == "fell")
     assert told == ["running", "paused", "running", "fell"]

@@ -102,7 +102,7 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
     np.testing.assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
     picture(page, "bare_page_pushed")
     page.wait_for_function(f"{drawn}.children.length == 0")
-    playground.run.push([0.0, 500.0, -200.0], duration=0.3)  # harder than the handle can
+    playground.run.push([0.0, 0.0, -1200.0], duration=0.3)  # harder than the handle can
     page.wait_for_function("document.getElementById('title').textContent.includes('fell: press reset')")
     page.evaluate("viewer.gui_controllers['reset'].fire()")
     page.wait_for_function("!document.getElementById('title').textContent.includes('fell')")

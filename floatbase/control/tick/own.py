@@ -46,15 +46,16 @@ class Own:
         self._contacts = [contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS]
         self.any = bool(self._tasks or self._contacts or self._limits.rows)
         self.changes = self.any or self._limits.move
-        self._bounds = _finite(self._limits.normal_forces(problem.contacts))
+        bounds = np.zeros((2, problem.contacts.n_points))  # of those that move: they are asked at a time
+        self._still = (bounds[0], bounds[1]) if self._limits.move else self._limits.normal_forces(problem.contacts)
+        self._bounds = _finite(self._still)
 
     def nothing(self, targets: Array) -> Given:
         """Targets, what still bounds of normal forces are, and otherwise as many zeros as a tick without a state needs."""
-        contacts, nv = self._problem.contacts, self._problem.robot.nv
-        bounds = self._limits.normal_forces(contacts)
+        nv = self._problem.robot.nv
         own = sum(len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts)
         nothing = np.zeros(own + 3 * len(self._tasks) + 2 * len(self._limits.rows))
-        return Given(np.concatenate([targets, *self._bounds, nothing]), normal_forces=bounds)
+        return Given(np.concatenate([targets, *self._bounds, nothing]), normal_forces=self._still)
 
     def given(self, targets: Array, q: Array, v: Array, t: float) -> Given:
         """What a tick is given at a state. Raises `InputError`, or what functions of the owner's raise."""
@@ -102,7 +103,8 @@ def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
 def _motion(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
     """A, b and J of a contact. Raises `InputError` where they do not have the shapes that the contact says."""
     A, b = map(read_only, contact.constraint(state, t))  # it may write to its own arrays in the next tick
-    J = A if isinstance(contact, LinearConstraint) else read_only(contact.jacobian(state, t))  # asks its function once
+    is_linear = getattr(type(contact), "jacobian", None) is LinearConstraint.jacobian  # then its function is asked once
+    J = A if is_linear else read_only(contact.jacobian(state, t))
     m, nv = len(contact.row_names), state.robot.nv
     if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
         raise InputError(f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}.")
