@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, plain_numbers, positive, read_only, said, text, texts
+from floatbase._arrays import (
+    Array,
+    Value,
+    cached_property,
+    checked,
+    of_kind,
+    plain_numbers,
+    positive,
+    read_only,
+    said,
+    text,
+    texts,
+)
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
@@ -19,6 +31,7 @@ from floatbase.qp import RowLabel
 from floatbase.robots import Robot, torque_limits_of
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
+SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of each block: its name among the equations of motion
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 RowsAt: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -52,7 +65,7 @@ class Rows(Value):
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
         """G, shape (m, n), and h, shape (m,), at a state and a time t in s, checked."""
-        n = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[self.block]
+        n = getattr(eom, SIZES[self.block])
         if not callable(self.rows) and np.shape(self.rows[0])[1] == n:  # checked when they were made, but for that
             return cast("tuple[Array, Array]", self.rows)
         return self._checked(self.rows(eom, t) if callable(self.rows) else self.rows, n)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, number, of_kind, plain_numbers, read_only, said, texts
+from floatbase._arrays import Array, Value, cached_property, checked, number, of_kind, plain_numbers, read_only, said, texts
 from floatbase.dynamics.constraints import LinearConstraint
 from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, OnePoint, PointContact
 from floatbase.errors import InputError, unknown_name

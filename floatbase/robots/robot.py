@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
@@ -14,7 +13,19 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import LARGEST, Array, Value, checked, plain_numbers, positive, read_only, said, text, whole
+from floatbase._arrays import (
+    LARGEST,
+    Array,
+    Value,
+    cached_property,
+    checked,
+    plain_numbers,
+    positive,
+    read_only,
+    said,
+    text,
+    whole,
+)
 from floatbase.errors import InputError, unknown_name
 
 if TYPE_CHECKING:

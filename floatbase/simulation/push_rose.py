@@ -5,14 +5,14 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from math import ceil
 from typing import Any
 
 import cloudpickle
 import numpy as np
 
-from floatbase._arrays import Array, Value, checked, positive, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, positive, read_only
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, SimulationError
 from floatbase.friction import WrenchSet, wrench_set

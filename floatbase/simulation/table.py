@@ -8,14 +8,13 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Value
+from floatbase._arrays import Value, cached_property
 from floatbase.errors import InputError, unknown_name
 
 RESERVED = ("point", "error")  # names of the store's own

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import judges
 import numpy as np
@@ -60,6 +61,7 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
             InputError,
             r"another robot, Robot\('solo12', .*\), than the problem, Robot\('go2', .* 4 feet",
         ),
+        (lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})), InputError, "a SimpleNamespace is none"),
         (lambda: controller("stand"), InputError, r"tasks must hold tasks, such as fb\.CoMTask\(state\.com\); 'stand' is none"),
         (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "frame of go2 'FL_fot'; near names: FL_foot"),
         (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "unknown frame of go2 'torso'"),

@@ -151,6 +151,28 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
         seen[0].M = np.eye(robot.nv)
 
 
+def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> None:
+    """Its memory serves the states of later ticks."""
+    robot = judges.load("go2")
+    seen: list[EquationsOfMotion] = []
+    controller = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), Looks(seen)])[0]
+    parts = ("M", "h", "com", "com_velocity", "com_jacobian", "com_drift", "joint_transforms")
+
+    def arrays(state: State) -> list[np.ndarray]:
+        """All that the state of a new tick says."""
+        seen.clear()
+        controller(state.q, state.v)
+        at = seen.pop().state
+        asked = [at.point("base"), at.frame_velocity("base"), at.frame_drift("base"), at.frame_jacobian("base")]
+        return [*asked, at.frame_pose("base").homogeneous, *(getattr(at, part) for part in parts)]
+
+    kept = arrays(robot.random_state(1_000))
+    before = [array.copy() for array in kept]
+    others = [arrays(state) for state in judges.states("go2", 6)]
+    assert all(np.array_equal(array, was) for array, was in zip(kept, before, strict=True))
+    assert not any(np.array_equal(a, b) for other in others for a, b in zip(other, kept, strict=True))
+
+
 def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
     robot = judges.load("go2")
     task = Looks([], rows=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -26,12 +26,12 @@ class Given(NamedTuple):
 
     numbers: Array  # targets, least and largest normal force of each point, then own contacts, tasks and rows
     rows: int = 0  # of all tasks of one's own
-    contacts: tuple[tuple[Array, Array, Array], ...] = ()  # A, b and J of each own contact
+    contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each own contact
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType(
         {}
     )  # weight and residual of tasks of one's own, by their number
     normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))  # least and largest of each point, (P,)
-    inequalities: tuple[tuple[Array, Array], ...] = ()  # G and h of rows of one's own
+    inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of rows of one's own
 
 
 class Own:
@@ -65,21 +65,24 @@ class Own:
         if not self.any:
             return Given(np.concatenate(parts), normal_forces=bounds)
         eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)
-        contacts = tuple(_motion(contact, eom.state, t) for contact in self._contacts)
-        for A, b, J in contacts:
-            parts += [A.ravel(), b, J.ravel()]
-        residuals, rows = {}, 0
+        contacts, residuals, rows, inequalities = [], {}, 0, []
+        for contact in self._contacts:
+            A, b, J = _motion(contact, eom.state, t)
+            contacts.append((A, b, J))
+            parts += A.ravel(), b, J.ravel()
         for i, task, block in self._tasks:
             residual, weight = residual_of(task, eom, t), float(task.weight)
             if not weight >= 0.0:
                 raise InputError(f"weight of {task.name} is {weight:g}; it must be ≥ 0.")
-            residuals[i] = weight, residual
-            rows += residual.n_out
-            parts += [(block, residual.n_out, weight), residual.A.ravel(), residual.b]
-        inequalities = tuple(each.at(eom, t) for each in limits.rows)
-        for each, (G, h) in zip(limits.rows, inequalities, strict=True):
-            each.labels(len(h))
-            parts += [(BLOCKS[each.block], len(h)), G.ravel(), h]
+            residuals[i], A, b = (weight, residual), residual.A, residual.b
+            rows += len(b)
+            parts += (block, len(b), weight), A.ravel(), b
+        for each in limits.rows:
+            G, h = each.at(eom, t)
+            if each.owners:
+                each.labels(len(h))  # raises where there is another number of them
+            inequalities.append((G, h))
+            parts += (BLOCKS[each.block], len(h)), G.ravel(), h
         return Given(np.concatenate(parts), rows, contacts, residuals, bounds, inequalities)
 
     def equations(self, state: State, t: float, given: Given) -> EquationsOfMotion:

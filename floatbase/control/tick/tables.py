@@ -55,7 +55,6 @@ class Dynamics:
     tree, links: as in `kinematics.Bodies`.
     lock: held from `update` until the views have been read.
     spare: memory for the results of `moment.TickState`, for making it takes longer than a tick.
-    still: zeros (nv,), an acceleration.
     """
 
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
@@ -63,7 +62,6 @@ class Dynamics:
     def __init__(self, robot: Robot):
         self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
         self.spare: deque[pin.Data] = deque(maxlen=_SPARE)
-        self.still = np.zeros(robot.nv)
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE), (8 * _POSE, 8))
