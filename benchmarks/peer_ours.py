@@ -1,4 +1,4 @@
-"""floatbase's side of the comparison: what its users write. Started by `peers.py`; the argument is the controller's path."""
+"""floatbase's side of the comparison: what its users write. Started by `peers.py`; the argument is one of `WAYS`."""
 
 from __future__ import annotations
 

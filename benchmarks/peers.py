@@ -28,17 +28,22 @@ TOLERANCE = 1e-6  # of the strongest motor's limit, by which torques may differ 
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
 PLANAR = "placo planar"  # placo's own flat foot, an easier problem
 SIDES = {"tsid": "peer_tsid.py", "placo": "peer_placo.py", PLANAR: "peer_placo.py"}
+RUNS = {  # our way, whom it is measured beside, robots
+    "tsid": (("compiled", "tsid", ROBOTS), ("own", "tsid", ROBOTS), ("readable", "tsid", ("go2",))),
+    "placo": (("compiled", "placo", ROBOTS), ("compiled", PLANAR, ("talos",))),
+}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One robot, one peer, one kind of states.
+    """One of our ways (`peer_problems.WAYS`), one robot, one peer, one kind of states.
 
     differences: of the torques, for each state, N·m; those up to tolerance count as none. within: the largest between
     the path measured and the readable one on every fifth state, N·m. ours, theirs: times, µs. ratios: of the medians of each
     block.
     """
 
+    way: str
     robot: str
     peer: str
     label: str
@@ -68,8 +73,8 @@ class Row:
         return float(np.median(self.ratios)) if self.states else np.nan
 
 
-def compare(pair: Sequence[Process], robot: str, peer: str, n: int, rounds: int) -> Iterator[Row]:
-    """Rows of one robot and one peer."""
+def compare(pair: Sequence[Process], way: str, robot: str, peer: str, n: int, rounds: int) -> Iterator[Row]:
+    """Rows of one robot, one of our ways and one peer."""
     problem = peer_problems.problem(robot, peer)
     everything = {label: [(q.tolist(), v.tolist()) for q, v in problem.states(label, n)] for label in SPREADS}
     for process in pair:
@@ -89,6 +94,7 @@ def compare(pair: Sequence[Process], robot: str, peer: str, n: int, rounds: int)
         times = np.array(turns[label])
         medians = np.median(times, axis=2)
         yield Row(
+            way,
             robot,
             peer,
             label,
@@ -117,38 +123,30 @@ def _within(problem: peer_problems.Problem, ours: Sequence[np.ndarray], states: 
     return float(np.max(_differences(ours[::5], [readable(q, v).tau for q, v in states[::5]])))
 
 
-def ours(path: str) -> Process:
+def ours(way: str) -> Process:
     """floatbase, in the environment that runs this."""
-    return Process(Path(sys.executable), HERE / "peer_ours.py", [path], [HERE.parent])
+    return Process(Path(sys.executable), HERE / "peer_ours.py", [way], [HERE.parent])
 
 
 def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
     """Every row of one peer."""
-    names = [name for name in SIDES if name.split()[0] == peer]
-    for name, robot in [(which, robot) for which in names for robot in (ROBOTS if which == peer else ("talos",))]:
-        pair = [ours("compiled"), Process(python, HERE / SIDES[name])]
-        yield from compare(pair, robot, name, n, rounds)
+    for way, name, robot in [(way, name, robot) for way, name, robots in RUNS[peer] for robot in robots]:
+        pair = [ours(way), Process(python, HERE / SIDES[name])]
+        some = (max(1, n // 6), min(20, rounds)) if way == "readable" else (n, rounds)  # it takes long
+        yield from compare(pair, way, robot, name, *some)
         for process in pair:
             process.close()
-
-
-def readable_rows(python: Path, n: int) -> Iterator[Row]:
-    """The readable path, which needs no compiler, on go2 against TSID."""
-    pair = [ours("readable"), Process(python, HERE / SIDES["tsid"])]
-    yield from compare(pair, "go2", "tsid", n, 20)
-    for process in pair:
-        process.close()
 
 
 # results -------------------------------------------------------------------------------------------------------------------
 
 
 def torque_table(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| robot | peer | states | compared | no answer: floatbase, peer | largest difference | from our readable path |"
-    yield "|---|---|---|---|---|---|---|"
+    yield "| our way | robot | peer | states | compared | no answer: ours, peer | largest difference | from our readable path |"
+    yield "|---" * 8 + "|"
     for row in rows:
         missing, size = " and ".join(map(str, row.unanswered)), f"{row.difference:.1e} N·m | {row.within:.1e} N·m"
-        yield f"| {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | {size} |"
+        yield f"| {row.way} | {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | {size} |"
 
 
 def time_table(rows: Sequence[Row], name: str = "floatbase") -> Iterator[str]:
@@ -200,27 +198,36 @@ binding: `computeProblemData`, `solve` and `getActuatorForces` for TSID, `update
 `controller(q, v)` for floatbase. The peers are the packages of PyPI, compiled for any processor of their kind; numba compiles
 floatbase's tick for this one."""
 
+OWN = """\
+floatbase takes a task that its user writes in Python. TSID's binding takes classes of its own alone: `addMotionTask` has an
+overload for each of them, and C++ never calls what a Python class derived from one overrides. Who needs another task there
+writes C++. So like cannot be compared with like, and these rows say what a task in Python costs: the problem is that above,
+but floatbase's task for the centre of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every tick, while TSID has
+its `TaskComEquality`."""
+
 SAMENESS = """\
 Torques are compared before times are: they count as the same up to a millionth of the strongest motor's limit. What is left is
 rounding in the peers' solver, as floatbase's compiled and readable paths, which share no solver, agree more closely (on every
 fifth state)."""
 
 
-def report(rows: list[Row], readable: list[Row], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
+def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
     """The text of peers.md."""
     equal = [row for row in rows if row.peer != PLANAR]
-    same, other = [row for row in equal if row.is_same], [row for row in equal if not row.is_same]
+    other = [row for row in equal if not row.is_same]
+    compiled, own, readable = ([row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS)
     peers = "; ".join(f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items())
     lines = ["# The tick against C++ peers, measured", "", f"`python benchmarks/peers.py` on {machine()}. {peers}.", ""]
     lines += [f"**Not measured: {why}**\n" for why in lacking]
     lines += [INTRODUCTION, ""]
     lines += ["## The same optimum", "", (peer_problems.__doc__ or "").strip(), "", SAMENESS, "", *torque_table(equal), ""]
-    lines += [f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}.\n" for row in other]
-    lines += ["## Times", "", *time_table(same), ""]
+    lines += [f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}, {row.way}.\n" for row in other]
+    lines += ["## Times", "", *time_table(compiled), ""]
     if readable:
-        same_readable = [row for row in readable if row.is_same]
-        lines += ['The readable path, `path="readable"`:', "", *time_table(same_readable, "readable"), ""]
-    lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(same), ""]
+        lines += ['The readable path, `path="readable"`:', "", *time_table(readable, "readable"), ""]
+    lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(compiled), ""]
+    if own:
+        lines += ["## A task of one's own", "", OWN, "", *time_table(own, "own task"), ""]
     planar = [row for row in rows if row.peer == PLANAR]
     if planar:
         lines += ["## An easier problem", "", *planar_section(planar), ""]
@@ -249,7 +256,6 @@ def main() -> None:
     ask.add_argument("--rounds", type=int, default=100, help="turns that each side takes")
     options = ask.parse_args()
     rows: list[Row] = []
-    readable: list[Row] = []
     used: dict[str, dict[str, str]] = {}
     lacking: list[str] = []
     for peer in options.peers:
@@ -257,16 +263,16 @@ def main() -> None:
             python = python_of(peer, options.env.resolve())
             used[peer] = versions(python, PACKAGES[peer])
             for row in measure(peer, python, options.states, options.rounds):
-                print(f"{row.robot} {row.peer} {row.label}: {row.difference:.1e} N·m, {row.ratio:.2f} ×", flush=True)
+                told = f"{row.way} {row.robot} {row.peer} {row.label}"
+                print(f"{told}: {row.difference:.1e} N·m, {row.ratio:.2f} ×", flush=True)
                 rows.append(row)
-            readable += readable_rows(python, options.states // 6) if peer == "tsid" else []
         except (MissingError, RuntimeError) as error:
             lacking.append(f"{peer}. {error}")
             print(f"No {peer}: {error}", flush=True)
-    text = report(rows, readable, used, lacking)
+    text = report(rows, used, lacking)
     (HERE / "peers.md").write_text(text, encoding="utf-8")
     if rows:
-        plot([row for row in rows if row.is_same])
+        plot([row for row in rows if row.is_same and row.way == "compiled"])
     print(text)
     raise SystemExit(1 if lacking else 0)
 

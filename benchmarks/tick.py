@@ -72,7 +72,7 @@ def interleaved(
 
 def tick_times(n: int) -> Iterator[str]:
     """Both paths, by robot and difficulty."""
-    yield "| robot | states | active rows | compiled median | compiled p99 | readable median | readable p99 | ratio |"
+    yield "| robot | states | active rows | compiled median | compiled p99 | readable median | readable p99 | times faster |"
     yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
@@ -89,7 +89,7 @@ def parts(n: int) -> Iterator[str]:
     """The compiled tick taken apart: it is stopped after one part, two, ..., and the times are taken from each other."""
     from floatbase.control.tick import tick
 
-    yield "| robot | states | dynamics | contact rows | elimination | costs | optimum | Python around them |"
+    yield "| robot | states | dynamics | rows | elimination | objective | optimum | Python around them |"
     yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
@@ -249,7 +249,7 @@ def machine() -> str:
     if info.exists():
         cpu = next(line.split(":")[1].strip() for line in info.read_text().splitlines() if line.startswith("model name"))
     names = ("numpy", "pin", "numba", "daqp", "mujoco")
-    packages = ", ".join(f"{name} {version(name)}" for name in names)
+    packages = ", ".join([f"floatbase {fb.__version__}", *(f"{name} {version(name)}" for name in names)])
     return f"{cpu}, {os.cpu_count()} cores, one used; Python {platform.python_version()}, {packages}"
 
 

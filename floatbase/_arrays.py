@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
+import functools
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
 from difflib import get_close_matches
-from functools import cached_property, partial
-from threading import RLock
 from types import MappingProxyType
-from typing import Any, ClassVar, Self, TypeAlias, TypeVar
+from typing import Any, ClassVar, Self, TypeAlias, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +40,24 @@ _EXAMPLES = {
 }
 
 
+class cached_property(functools.cached_property[Kind]):
+    """What a value computes of itself when it is first asked for, and keeps; where threads ask at once, what the first found.
+
+    It takes no lock, as that of functools does in Python 3.11: values find the same whenever they compute it, and in a forked
+    process nobody is left to release a lock that another thread held.
+    """
+
+    @overload
+    def __get__(self, value: None, owner: type | None = None) -> Self: ...
+    @overload
+    def __get__(self, value: object, owner: type | None = None) -> Kind: ...
+    def __get__(self, value: object, owner: type | None = None) -> Self | Kind:
+        if value is None:
+            return self
+        found: Kind = value.__dict__.setdefault(self.attrname, self.func(value))  # type: ignore[arg-type]  # it has a name
+        return found
+
+
 class Value:
     """Base of values: they do not change, so a copy is the value itself, and out of a pickle their arrays come read-only.
 
@@ -62,7 +77,7 @@ class Value:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        computed = {name for name in vars(self) if isinstance(getattr(type(self), name, None), cached_property)}
+        computed = {name for name in vars(self) if isinstance(getattr(type(self), name, None), functools.cached_property)}
         computed -= set(getattr(self, "__dataclass_fields__", ()))  # given here, though a class above computes it
         kept = {name: value for name, value in vars(self).items() if name not in computed}
         return {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in kept.items()}
@@ -92,20 +107,6 @@ class Fixed:
             raise InputError(f"{name} of a {kind} cannot be set once it is made: {self._instead[name]}.")
         near = get_close_matches(name, self._instead, n=1)
         raise InputError(f"a {kind} has no {name!r} to set{f'; {near[0]}? {self._instead[near[0]]}' if near else ''}.")
-
-
-def _unlock(kind: type) -> None:
-    """New locks for what values compute for themselves: in a forked process nobody is left to release one that was held."""
-    for part in vars(kind).values():
-        if isinstance(part, cached_property):
-            part.lock = RLock()  # type: ignore[attr-defined]
-    derived: type
-    for derived in kind.__subclasses__():
-        _unlock(derived)
-
-
-if sys.version_info < (3, 12) and hasattr(os, "register_at_fork"):  # later ones compute without a lock
-    os.register_at_fork(after_in_child=partial(_unlock, Value))
 
 
 def of_kind(name: str, value: object, kind: type[Kind], example: str = "") -> Kind:
@@ -154,19 +155,27 @@ def whole(name: str, value: Any, least: int, most: int, why: str = "") -> int:
 
 
 def read_only(value: Any) -> Array:
-    """`value` as a float64 array that cannot be written to: a copy, unless it is one already."""
+    """`value` as a float64 array that cannot be written to: a copy, unless it is one already.
+
+    A read-only array is taken at its word: numpy does not tell of views that were taken of it before and can be written to.
+    """
     if _is_read_only(value):
         return value
-    array = np.array(value, dtype=np.float64)
+    return sealed(np.array(value, dtype=np.float64))
+
+
+def sealed(array: Array) -> Array:
+    """An array that nobody else has, which cannot be written to any more."""
     array.setflags(write=False)
     return array
 
 
 def _is_read_only(value: Any) -> bool:
     """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one that can."""
-    if type(value) is not np.ndarray or value.dtype is not _FLOAT64 or value.flags.writeable or not value.flags.c_contiguous:
+    if type(value) is not np.ndarray or value.dtype is not _FLOAT64 or (flags := value.flags).writeable:
         return False
-    return value.base is None or (type(value.base) is np.ndarray and not value.base.flags.writeable)
+    base = value.base
+    return flags.c_contiguous and (base is None or (type(base) is np.ndarray and not base.flags.writeable))
 
 
 def plain_numbers(value: Any) -> Array | None:
@@ -191,18 +200,21 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
     if array is None:
         required = f"numbers of shape {_text(shape)}" if shape else "a number"
         raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {said(value)}.")
-    fits = array.shape == shape or (
-        array.ndim == len(shape) and all(n is None or have == n for have, n in zip(array.shape, shape, strict=True))
-    )
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         raise InputError(f"{name} has shape {array.shape}; it must have shape {_text(shape)}{f' ({unit})' if unit else ''}.")
     # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger, the entries decide
     if not (np.vdot(array, array) <= LARGEST**2 or (usual := np.abs(array) <= LARGEST).all()):
         at = tuple(np.argwhere(~usual)[0].tolist())
         place = f"holds {array[at]:g} at index {list(at)}; every entry must be" if shape else f"is {array[at]:g}; it must be"
         raise InputError(f"{name} {place} a finite number{f' of at most {LARGEST:g}' if np.isfinite(array[at]) else ''}.")
-    array.setflags(write=False)
-    return array
+    return sealed(array)
+
+
+def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    for have, n in zip(found, shape, strict=False):
+        if n is not None and n != have:
+            return False
+    return len(found) == len(shape)
 
 
 def flat_forces(forces: Any, k: int | None, name: str = "forces") -> Array:

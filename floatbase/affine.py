@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -21,7 +21,7 @@ _SLOPE = 1e-7  # part of 1 + the largest |g| that a slope without curvature may 
 _NO_BLOCKS: Mapping[str, slice] = MappingProxyType({})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Affine(Value):
     """The map x -> A x + b.
 
@@ -31,13 +31,13 @@ class Affine(Value):
 
     A: Array
     b: Array
-    blocks: Mapping[str, slice] = field(default_factory=dict)
+    blocks: Mapping[str, slice]
     __array_ufunc__ = None  # array + map is ours to add up, and so are array * map and array @ map
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "A", checked("A", self.A, (None, None)))
-        object.__setattr__(self, "b", checked("b", self.b, (self.A.shape[0],)))
-        object.__setattr__(self, "blocks", block_slices(self.blocks))
+    def __init__(self, A: npt.ArrayLike, b: npt.ArrayLike, blocks: Mapping[str, slice] = _NO_BLOCKS):
+        values = self.__dict__  # written to directly: tasks of one's own make one at every tick
+        values["A"] = A = checked("A", A, (None, None))
+        values["b"], values["blocks"] = checked("b", b, (len(A),)), block_slices(blocks)
 
     @staticmethod
     def linear(A: npt.ArrayLike) -> Affine:
@@ -262,7 +262,7 @@ def _identity(n: int) -> Affine:
 
 def block_slices(blocks: Mapping[str, slice]) -> Mapping[str, slice]:
     """A read-only copy of names of slices, checked."""
-    if type(blocks) is dict and not blocks:
+    if blocks is _NO_BLOCKS or (type(blocks) is dict and not blocks):
         return _NO_BLOCKS  # most maps have none
     if isinstance(blocks, Mapping) and all(isinstance(k, str) and isinstance(v, slice) for k, v in blocks.items()):
         return MappingProxyType(dict(blocks))

@@ -19,6 +19,7 @@ from scipy.optimize import linprog
 
 import floatbase as fb
 from floatbase.dynamics import EquationsOfMotion
+from floatbase.errors import InfeasibleError
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
 from floatbase.simulation import Conversion
@@ -26,6 +27,7 @@ from floatbase.simulation import Conversion
 Array = npt.NDArray[np.float64]
 
 ROBOTS = tuple(fb.catalogue())
+AGREEMENT = 1e-8  # part of the strongest motor's limit between two ways to the same torques
 
 
 @cache
@@ -58,6 +60,41 @@ def controller_of(name: str, **options: object) -> fb.WholeBodyController:
     """A controller that keeps a robot standing on all its feet."""
     robot = load(name)
     return fb.WholeBodyController(robot, stance(robot), fb.standing_tasks(robot.standing()), **options)
+
+
+def pair(
+    robot: Robot, contacts: fb.Contacts, tasks: list[object] | None = None, **options: object
+) -> tuple[fb.WholeBodyController, fb.WholeBodyController]:
+    """The compiled and the readable controller of one problem; without tasks, of standing."""
+    tasks = list(fb.standing_tasks(robot.standing())) if tasks is None else tasks
+    compiled, readable = (
+        fb.WholeBodyController(robot, contacts, tasks, path=path, **options) for path in ("compiled", "readable")
+    )
+    return compiled, readable
+
+
+def near_and_far(name: str, n: int) -> list[State]:
+    """n states near standing, n farther and n far away, where friction and torque limits hold most of them."""
+    return [state for spread in (0.02, 0.1, 0.3) for state in states(name, n, spread)]
+
+
+def difference(one: fb.WholeBodyController, other: fb.WholeBodyController, state: State, t: float = 0.0) -> float:
+    """Largest torque between two controllers, N·m; where there is no answer, both must say so with the same rows."""
+    try:
+        expected = other(state.q, state.v, t)
+    except InfeasibleError as error:
+        with pytest.raises(InfeasibleError) as caught:
+            one(state.q, state.v, t)
+        assert caught.value.rows == error.rows
+        return 0.0
+    found = one(state.q, state.v, t)
+    assert found.path == one.path, "the compiled tick left this state to the readable path"
+    return float(np.max(np.abs(found.tau - expected.tau)))
+
+
+def agreement(robot: Robot) -> float:
+    """N·m that may lie between two ways to the same torques."""
+    return AGREEMENT * float(np.max(robot.torque_limits[np.isfinite(robot.torque_limits)]))
 
 
 def at_rest(name: str, seed: int | None = None, feet: int | None = None) -> EquationsOfMotion:

@@ -66,6 +66,14 @@ def test_a_process_gives_the_torques_of_its_controller():
     process.close()
 
 
+def test_a_task_of_ones_own_is_measured_on_the_same_problem():
+    problem = peer_problems.problem("solo12", "tsid")
+    own, package = problem.controller("own"), problem.controller("compiled")
+    assert type(own.tasks[0]) is not type(package.tasks[0])
+    for q, v in problem.states("saturated", 3):
+        assert np.allclose(own(q, v).tau, package(q, v).tau, rtol=0.0, atol=1e-8)
+
+
 def test_a_process_that_ends_says_why(tmp_path):
     script = tmp_path / "broken.py"
     script.write_text("raise SystemExit('there is no such library')")
@@ -80,17 +88,21 @@ def test_a_missing_compiler_is_said_before_anything_is_made(tmp_path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
-def row(difference: float) -> peers.Row:
+def row(difference: float, way: str = "compiled") -> peers.Row:
     times = np.array([1.0, 2.0, 3.0])
     size = np.array([difference])
-    return peers.Row("go2", "tsid", "easy", 3, (0, 0), 1e-4, size, 1e-9, times, 4 * times, np.full(2, 0.25), {"solve": 2.0})
+    ratios = np.full(2, 0.25)
+    return peers.Row(way, "go2", "tsid", "easy", 3, (0, 0), 1e-4, size, 1e-9, times, 4 * times, ratios, {"solve": 2.0})
 
 
 def test_times_are_given_for_equal_torques_alone():
-    same = peers.report([row(1e-6)], [], {}, [])
-    assert "**0.25**" in same
-    other = peers.report([row(1e-2)], [], {}, ["placo. There is no network."])
-    assert "**0.25**" not in other and "Not the same, so no times: go2 with tsid, easy" in other
+    same = peers.report([row(1e-6)], {}, [])
+    assert same.count("**0.25**") == 1 and "own task median" not in same
+    assert f"floatbase {fb.__version__}" in same
+    both = peers.report([row(1e-6), row(1e-6, "own")], {}, [])
+    assert both.count("**0.25**") == 2 and "own task median | own task p99 | peer median | peer p99" in both
+    other = peers.report([row(1e-2)], {}, ["placo. There is no network."])
+    assert "**0.25**" not in other and "Not the same, so no times: go2 with tsid, easy, compiled" in other
     assert "Not measured: placo. There is no network." in other
 
 

@@ -101,12 +101,15 @@ ACCEPTED: dict[str, set[str]] = {
     "Problem.robot": {"of another robot"}, "torque_limits": NO_LIMIT, "Limits.torque_limits": NO_LIMIT | ANY_LENGTH,
     "Affine.constant.b": ANY_LENGTH, "Affine.__call__.x": {"column"}, "ConstantTorques.tau": ANY_LENGTH,
     "ForceTask.target": ANY_LENGTH, "TorqueTask.target": ANY_LENGTH, "PostureTask.q": ANY_LENGTH,
+    "PostureTask.velocity": ANY_LENGTH, "PostureTask.acceleration": ANY_LENGTH,
     "time": {"one too many"}, "times": {"one too many"},
+    "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
 }  # fmt: skip
 
 ZERO = np.zeros(12)
 EXAMPLES: dict[str, Any] = {
-    "A": np.ones((12, 12)), "a": 10.0, "about": STATE.com, "acceleration": UP, "moving_frame.acceleration": lambda t: UP,
+    "A": np.ones((12, 12)), "a": 10.0, "about": STATE.com, "acceleration": UP, "PostureTask.velocity": ZERO,
+    "PostureTask.acceleration": ZERO, "moving_frame.acceleration": lambda t: UP,
     "actuators": HYDRAULIC, "after_reset": lambda: None, "alpha": 0.1, "angle": 30.0, "angular_acceleration": UP,
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
@@ -118,9 +121,11 @@ EXAMPLES: dict[str, Any] = {
     "WrenchSet.cones": VALUES["WrenchSet"].cones, "cones": True, "contact": "FL_foot", "contacts": CONTACTS,
     "control_period": 0.002, "controller": CONTROLLER, "corners": TALOS.feet[0].corners,
     "cost": fb.Quadratic.zero(SPACE.dimension), "cost_on_qdd": fb.Quadratic.zero(18), "crank": 0.045, "curvature": (1.0, 2.0),
+    "digits": 3,
     "damping": 10.0, "dead_volume": 8e-6, "direction": np.ones(6), "distance": 1.0, "dt": 1e-3, "duration": 0.002,
     "dv": np.zeros(18), "elevation": 10.0, "eom": EOM, "equality_names": tuple("abcdefghijkl"), "extra": {},
     "f": fb.Affine(np.eye(12), ZERO), "facets": 4, "View.feet": True, "feet": ["FL_foot"], "load_urdf.feet": ["tool0"],
+    "floor": 1e-6,
     "floating": True, "follow": True, "foot_radius": 0.02, "WrenchSet.torques.force": 150.0 * UP, "force": NORMAL,
     "cost_on_space.forces": fb.Quadratic.zero(12), "forces": 30.0 * np.tile(UP, 4),
     "plots.friction_used.forces": RECORD.measured, "frame": "FL_foot",
@@ -153,7 +158,8 @@ EXAMPLES: dict[str, Any] = {
     "state": STATE, "status": "inside", "step": 0.1, "stiffness": 100.0, "supply_pressure": 160e5, "support": True, "t": 0.5,
     "tank_pressure": 2e5, "target": ZERO, "tasks": CONTROLLER.tasks, "cost_on_space.tau": fb.Quadratic.zero(12), "tau": ZERO,
     "tau_desired": ZERO, "time": (0.0, 0.1), "times": (0.0, 0.1), "timestep": 1e-3, "title": "standing", "tolerance": 1e-9,
-    "torque": 1e-6, "Limits.torque_limits": np.full(12, 20.0), "torque_limits": 20.0, "v": STATE.v, "v_joints": ZERO,
+    "torque": 1e-6, "Limits.torque_limits": np.full(12, 20.0), "torque_limits": 20.0, "unit": "N", "v": STATE.v,
+    "v_joints": ZERO,
     "Viewer.checkbox.value": True, "value": 0.5, "valve_bandwidth": 250.0, "velocity": UP, "view": "front", "weight": 1.0,
     "working": (), "wrench": np.ones(6), "x": ZERO,
 }  # fmt: skip
@@ -169,12 +175,13 @@ RESULTS = {
 }  # fmt: skip
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live"),
-    "judges whatever a learner may give": ("Exercise", "Numeric", "Shaped", "check", "numbers", "reveal"),
+    "judges whatever a learner may give": ("Exercise", "Numeric", "Shaped", "check", "compare", "numbers", "predict", "reveal",
+        "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
-        "vertices", "conflicting_rows", "linear_program", "nearest_rotation", "QP.objective", "Rows.labels",
-        "Rows.at", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
+        "vertices", "conflicting_rows", "linear_program", "target_shapes", "targets_at", "QP.objective", "Rows.labels",
+        "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
         "recording.checked_rollout",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import os
 import re
@@ -10,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import psutil
@@ -87,14 +89,32 @@ def test_a_lesson_prints_what_is_stored_tries_no_exercise_and_leaves_nothing_beh
     assert list(tmp_path.iterdir()) == []  # no exercise was tried, and the next run begins as this one did
 
 
+def predicted(notebook: Any) -> list[str]:
+    """Put some answer in place of the ... of every prediction, in place; their names."""
+    names = []
+    for cell in notebook.cells:
+        if "prediction" in cell.metadata:
+            calls = [node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)]
+            given = {part.arg: ast.literal_eval(part.value) for part in calls[0].keywords}
+            answer = given["choices"][0] if "choices" in given else [1.0] * given["count"] if "count" in given else 1.0
+            cell.source = cell.source.replace("...", repr(answer), 1)
+            names.append(cell.metadata["prediction"])
+    return names
+
+
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
-def test_a_lesson_runs_with_its_exercises_solved(path: Path, tmp_path: Path) -> None:
+def test_a_lesson_runs_with_its_exercises_solved_and_its_predictions_made(path: Path, tmp_path: Path) -> None:
     notebook = with_every_slider_moved(solved(read(path)))
+    names = predicted(notebook)
     for cell in notebook.cells:
         if "check" in cell.metadata.get("tags", []):  # a solved lesson proves each check
             cell.source = re.sub(r"^check\((.*)\)$", r"assert check(\1).right, check(\1)", cell.source, flags=re.M)
     with timed(f"{path.stem}, solved"):
         execute(notebook, tmp_path)
+    printed = "".join(output.get("text", "") for cell in notebook.cells for output in cell.get("outputs", []))
+    assert [name for name in names if f"{name}: you say " not in printed] == []
+    assert [name for name in names if not re.search(rf"^{name}  .*\S", printed, re.MULTILINE)] == []  # in the review
+    assert "not seen yet" not in printed
 
 
 def test_all_lessons_together_take_less_than_three_minutes() -> None:

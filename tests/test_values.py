@@ -6,7 +6,8 @@ import copy
 import inspect
 import multiprocessing
 import pickle
-from concurrent.futures import ProcessPoolExecutor
+import threading
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from importlib import import_module
 from typing import Any
 
@@ -18,6 +19,7 @@ from values import COMMAND, CONTACTS, CONTROLLER, RECORD, ROBOT, STATE, UP, VALU
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.control import AnalyticController
+from floatbase.dynamics import PointContact
 
 WITHOUT_ARRAYS = ("ActiveSetRun", "FeasibleSpace", "Problem", "Residuals", "Rows", "Table")
 NO_VALUES = {
@@ -120,6 +122,27 @@ def test_values_come_back_from_another_process() -> None:
     np.testing.assert_array_equal(record.q, RECORD.q)
     assert isinstance(values["State"], fb.State) and not values["State"].q.flags.writeable
     fb.Simulation(ROBOT).reset(record.final)  # a state of the same robot
+
+
+def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_the_same() -> None:
+    """A lock would be held for ever in a process that is forked meanwhile."""
+    started, go_on = threading.Event(), threading.Event()
+
+    class Slow(PointContact):
+        @property
+        def point_names(self) -> tuple[str, ...]:
+            if threading.current_thread() is not threading.main_thread():
+                started.set()
+                assert go_on.wait(10.0), "the main thread waits for this one"
+            return (self.frame,)
+
+    contacts = fb.Contacts([Slow("FL_foot")])
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(lambda: contacts.normals)
+        assert started.wait(10.0)
+        normals = contacts.normals
+        go_on.set()
+        assert other.result() is normals is contacts.normals
 
 
 def test_what_a_value_returns_cannot_be_written_to() -> None:

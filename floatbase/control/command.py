@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array, Value
+from floatbase._arrays import Array, Value, cached_property
 from floatbase.dynamics import Contacts
 from floatbase.qp import Solution
 

@@ -35,7 +35,8 @@ class WholeBodyController(Fixed):
         none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added, so that the optimum is unique.
     facets, inside: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
     min_normal_force, max_normal_force: N, at every contact point; one number, or a mapping from the name of a contact to a
-        number or a function of t: a foot that is unloaded.
+        number or a function of t: a foot that is unloaded. The name of a foot that does not stand bounds nothing until it
+        does, so that `replace(contacts=…)` may lift it; other names that are no contact's are errors.
     torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.
     rows: inequality rows of one's own on q̈, τ or λ, see `floatbase.control.Rows`.
     solver: one of `floatbase.qp.solvers()`.
@@ -77,6 +78,7 @@ class WholeBodyController(Fixed):
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
         bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows)
         problem = Problem(robot, contacts, tasks, bounds)
+        bounds.check_names(contacts.names, _feet(robot))
         problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
         self._prepare(problem, solver, path)
 
@@ -167,6 +169,8 @@ class WholeBodyController(Fixed):
         """A new controller with other contacts, tasks or limits and everything else as here; cheap enough for the loop."""
         new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
         problem = replace(self.problem, **{name: value for name, value in new.items() if value is not None})
+        if limits is not None:
+            limits.check_names(problem.contacts.names, self.contacts.names, _feet(self.robot), before=self.limits)
         other = object.__new__(type(self))
         other._prepare(problem, self.solver, self.requested_path, warm_up=self.compiled is None)
         if other.compiled is None:
@@ -177,3 +181,8 @@ class WholeBodyController(Fixed):
 
     def __repr__(self) -> str:
         return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"
+
+
+def _feet(robot: Robot) -> list[str]:
+    """Frames of the feet, which are the names of contacts there."""
+    return [foot.frame for foot in robot.feet]

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, plain_numbers, positive, read_only, said, text, texts
+from floatbase._arrays import (
+    Array,
+    Value,
+    cached_property,
+    checked,
+    of_kind,
+    plain_numbers,
+    positive,
+    read_only,
+    said,
+    text,
+    texts,
+)
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
@@ -19,6 +31,7 @@ from floatbase.qp import RowLabel
 from floatbase.robots import Robot, torque_limits_of
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
+SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of each block: its name among the equations of motion
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 RowsAt: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -52,7 +65,7 @@ class Rows(Value):
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
         """G, shape (m, n), and h, shape (m,), at a state and a time t in s, checked."""
-        n = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[self.block]
+        n = getattr(eom, SIZES[self.block])
         if not callable(self.rows) and np.shape(self.rows[0])[1] == n:  # checked when they were made, but for that
             return cast("tuple[Array, Array]", self.rows)
         return self._checked(self.rows(eom, t) if callable(self.rows) else self.rows, n)
@@ -80,7 +93,8 @@ class Limits(Value):
     facets: number of facets of the friction polyhedron (28) of every contact point.
     inside: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
     min_normal_force, max_normal_force: N, bounds of normal · f at every contact point: one number for all, or a mapping from
-        the name of a contact to a number or a function of the time t in s; 0 and none where it has none.
+        the name of a contact to a number or a function of the time t in s; 0 and none where it has none. The bound of a name
+        that is not among the contacts waits until it is: a foot that has lifted will stand again.
     rows: rows of one's own.
 
     Raises `InputError` for values that do not fit.
@@ -111,13 +125,26 @@ class Limits(Value):
     @cached_property
     def move(self) -> bool:
         """Whether a normal force is bounded by a function of time."""
-        given = (bound for bound in (self.min_normal_force, self.max_normal_force) if isinstance(bound, Mapping))
-        return any(callable(value) for bound in given for value in bound.values())
+        return any(callable(value) for bound in self._by_name.values() for value in bound.values())
+
+    @property
+    def _by_name(self) -> dict[str, Mapping[str, Any]]:
+        """The bounds of normal forces that are mappings, by the name of the argument."""
+        both = {"min_normal_force": self.min_normal_force, "max_normal_force": self.max_normal_force}
+        return {name: bound for name, bound in both.items() if isinstance(bound, Mapping)}
+
+    def check_names(self, *known: Iterable[str], before: Limits | None = None) -> None:
+        """Raise `UnknownNameError` where a normal force is bounded by a name that is neither known nor in the limits before."""
+        names = {name for some in (*known, *(before._by_name.values() if before else ())) for name in some}
+        for argument, bound in self._by_name.items():
+            for name in bound:
+                if name not in names:
+                    raise unknown_name(f"contact in {argument}", name, names)
 
     def normal_forces(self, contacts: Contacts, t: float = 0.0) -> tuple[Array, Array]:
         """Least and largest normal force, N, of each point at time t in s, shapes (P,); inf where none is the largest.
 
-        Raises `UnknownNameError` for the name of no contact, and `InputError` for a function's value that is no force.
+        Raises `InputError` for a function's value that is no force.
         """
         if not self.move:
             return _still_normal_forces(contacts, self)
@@ -150,9 +177,6 @@ def _at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise:
     """Bounds of normal forces at time t, (P,)."""
     if not isinstance(given, Mapping):
         return np.full(contacts.n_points, given)
-    for contact in given:
-        if contact not in contacts.names:
-            raise unknown_name(f"contact in {name}", contact, contacts.names)
     found = []
     for each in contacts:
         value = given.get(each.name, otherwise)

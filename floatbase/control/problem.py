@@ -11,7 +11,7 @@ import numpy as np
 
 from floatbase._arrays import Array, Value, of_kind, positive, said
 from floatbase.affine import Affine
-from floatbase.control.limits import BLOCKS, Limits, force_bounds, force_rows, torque_rows
+from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
 from floatbase.dynamics import MOTION_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
@@ -131,7 +131,7 @@ def _standing(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
     """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or torques."""
-    if isinstance(tasks, Task) or not isinstance(tasks, Sequence):
+    if hasattr(tasks, "residual") or not isinstance(tasks, Sequence):
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
     tasks = tuple(tasks)
     for task in tasks:
@@ -139,7 +139,7 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
         if 0 < len(lacks) < len(_PARTS_OF_A_TASK):
             has = "a task has block, name, weight and residual(eom, t), as floatbase.objectives.Task says"
             raise InputError(f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; {has}.")
-        if isinstance(task, type) or not isinstance(task, Task):
+        if lacks or isinstance(task, type) or not callable(task.residual):
             raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {said(task)} is none.")
         if task.block not in BLOCKS:
             raise InputError(f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".')
@@ -157,7 +157,7 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     if not isinstance(residual, Affine):
         form = f"A x + b of its block x as fb.Affine(A, b), not {type(residual).__name__}"
         raise InputError(f"the residual of {task.name!r} must be {form}.")
-    size = {"qdd": eom.nv, "tau": eom.d, "forces": eom.k}[task.block]
+    size = getattr(eom, SIZES[task.block])
     if residual.n_in != size:
         raise InputError(f"the residual of {task.name!r} takes {residual.n_in} numbers; its block {task.block!r} has {size}.")
     return residual

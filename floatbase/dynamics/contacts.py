@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, number, of_kind, plain_numbers, read_only, said, texts
+from floatbase._arrays import Array, Value, cached_property, checked, number, of_kind, plain_numbers, read_only, said, texts
+from floatbase.dynamics.constraints import LinearConstraint
 from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, OnePoint, PointContact
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
@@ -139,9 +139,12 @@ class Contacts(Value):
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
     def _jacobian_and_constraint(self, state: State, t: float) -> tuple[Array, Array, Array]:
-        """J of (4) with A and b of (5); for point contacts J = A, computed once."""
-        A, b = self.constraint(state, t)
-        return A if all(map(_holds_its_point, self.items)) else self.jacobian(state, t), A, b
+        """J of (4) with A and b of (5); a contact whose J is its A, as that of a point, is asked once."""
+        of_kind("state", state, State)
+        t = number("t", t, "s")
+        parts = [_motion(contact, state, t) for contact in self.items]
+        A, b = self._stacked(state, [part[0] for part in parts]), np.concatenate([np.zeros(0), *(part[1] for part in parts)])
+        return A if all(J is A for A, _, J in parts) else self._stacked(state, [part[2] for part in parts]), A, read_only(b)
 
     def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
         return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
@@ -195,10 +198,13 @@ class Contacts(Value):
         return f"Contacts({', '.join(self.names)}; k={self.k})"
 
 
-def _holds_its_point(contact: Contact) -> bool:
-    """Whether J = A by definition: a class of one's own may say otherwise."""
-    kind = type(contact)
-    return isinstance(contact, OnePoint) and (kind.jacobian, kind.constraint) == (OnePoint.jacobian, OnePoint.constraint)
+def _motion(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
+    """A, b and J of a contact; J is A where that is so by definition, which a class of one's own may change."""
+    A, b = contact.constraint(state, t)
+    kind: Any = type(contact)
+    held = isinstance(contact, OnePoint) and (kind.jacobian, kind.constraint) == (OnePoint.jacobian, OnePoint.constraint)
+    is_linear = getattr(kind, "jacobian", None) is LinearConstraint.jacobian
+    return A, b, A if held or is_linear else contact.jacobian(state, t)
 
 
 def _contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:

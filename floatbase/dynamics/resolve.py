@@ -65,7 +65,7 @@ def contact_space(eom: EquationsOfMotion) -> ContactSpace:
 
 
 def resolved_motion(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(5) A, shape (m, nv), and b, shape (m,), m/s², without the directions that A resolves badly (see `contact_space`)."""
+    """A, shape (m, nv), and b, shape (m,), m/s², of (5) without the directions that A resolves badly (see `contact_space`)."""
     U, s, Vt = _resolved(eom)
     return read_only(U * s @ Vt), read_only(U @ (U.T @ eom.b))
 

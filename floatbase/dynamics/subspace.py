@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, flat_forces, of_kind, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, flat_forces, of_kind, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.dynamics.resolve import contact_space

@@ -6,13 +6,12 @@ A force is what the ground does to the robot, shape (3,), N, world. Normals poin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, flag, positive, read_only, unit_vector, whole
+from floatbase._arrays import Array, Value, cached_property, checked, flag, positive, read_only, unit_vector, whole
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
 MOST_FACETS = 1000  # they miss the cone by 5e-6 of μ, which nobody knows as well

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, plain_numbers, positive, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, of_kind, plain_numbers, positive, read_only
 from floatbase.dynamics import Contacts, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction.cones import FrictionPolyhedron

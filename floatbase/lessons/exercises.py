@@ -20,6 +20,7 @@ from floatbase._arrays import LARGEST, Array
 from floatbase.affine import Quadratic
 from floatbase.errors import unknown_name
 from floatbase.lessons import progress
+from floatbase.lessons.rounding import about
 
 TRIES = 2  # so many before `reveal` shows a solution
 
@@ -67,8 +68,8 @@ def _wrong_shape(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
 
 
 def vector_text(vector: npt.ArrayLike, digits: int = 0) -> str:
-    """A vector as text, such as "(1, 0, -2)", with so many decimals and no minus before a zero."""
-    return "(" + ", ".join(f"{x + 0.0:.{digits}f}" for x in np.round(np.asarray(vector, dtype=np.float64), digits)) + ")"
+    """A vector as text, such as "(1, 0, -2)", by `about`, but with so many decimals at most."""
+    return about(np.round(np.asarray(vector, dtype=np.float64), digits), digits=12, floor=0.0)
 
 
 @dataclass(frozen=True, eq=False)

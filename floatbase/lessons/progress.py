@@ -1,15 +1,19 @@
-"""Which exercises a learner has tried and solved, stored in a file of the learner's own.
+"""Which exercises a learner has tried and solved, and what was predicted, stored in a file of the learner's own.
 
-Every try is one line at the end of the file, written at once: processes and threads that write together need no lock, and
-an interrupt or a full disk costs that one try at most. Nothing that stands in the file is ever changed.
+Every try and every prediction is one line at the end of the file, written at once: processes and threads that write together
+need no lock, and an interrupt or a full disk costs that one line at most. Nothing that stands in the file is ever changed.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+from floatbase._arrays import LARGEST
 
 _NAME = "progress.jsonl"
 _BEFORE = "progress.json"  # one object for all tries, written by floatbase up to 0.2.0: read, and left as it is
@@ -36,32 +40,52 @@ def load() -> dict[str, dict[str, int]]:
 
 def record(name: str, right: bool) -> None:
     """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten, without an error."""
+    keep(name, {"tries": 1, "right": int(right)})
+
+
+def predictions() -> dict[str, dict[str, Any]]:
+    """For each prediction: {"said": …, "unit": …, "is": …}, the latest of each, as far as there is one; see `keep`."""
+    found: dict[str, dict[str, Any]] = {}
+    for text in _texts():
+        for name, entry in _entries(text):
+            usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text}
+            kept = {key: entry[key] for key, fits in usable.items() if key in entry and fits(entry[key])}
+            if kept and _is_text(name):
+                found.setdefault(name, {}).update(kept)
+    return found
+
+
+def keep(name: str, entry: dict[str, Any]) -> str:
+    """Add a line about the exercise or prediction `name`; what prevented it, and what to do, or "".
+
+    entry: of a prediction "said" and "is" are a number, a list of numbers or a text; "unit" is a text.
+    """
     # the line end comes first: a line that a full disk cut short before this one stays alone
-    line = "\n" + json.dumps({name: {"tries": 1, "right": int(right)}})
-    _append(line.encode())
+    return _append(("\n" + json.dumps({name: entry})).encode())
 
 
 def obstacle() -> str:
-    """Why tries cannot be kept, and what to do; "" where they can. Makes no file."""
+    """Why tries and predictions cannot be kept, and what to do; "" where they can. Makes no file."""
     return _append(b"")
 
 
 def _append(line: bytes) -> str:
     """Write a line at the end of the file; what prevented it, or "". Without a line only whether one could be written."""
-    advice = "Set FLOATBASE_HOME to a folder that you may write to"
+    lost, advice = "Tries and predictions cannot be kept", "Set FLOATBASE_HOME to a folder that you may write to"
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
         if not line and not path().exists():
-            return "" if os.access(path().parent, os.W_OK) else f"Tries cannot be kept in {path().parent}. {advice}."
+            return "" if os.access(path().parent, os.W_OK) else f"{lost} in {path().parent}. {advice}."
         file = os.open(path(), os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         try:
-            os.write(file, line)
+            if os.write(file, line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         finally:
             os.close(file)
     except OSError as error:
-        return f"Tries cannot be kept in {path().parent}: {error.strerror}. {advice}."
+        return f"{lost} in {path().parent}: {error.strerror}. {advice}."
     except RuntimeError:
-        return f"Tries cannot be kept: there is no home folder. {advice}."
+        return f"{lost}: there is no home folder. {advice}."
     return ""
 
 
@@ -78,13 +102,27 @@ def _read(name: str) -> bytes:
         return b""
 
 
-def _counts(text: bytes) -> Iterator[tuple[str, int, int]]:
-    """Name, tries and right ones of each exercise in a text of any form."""
+def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and entry of each exercise and prediction in a text of any form."""
     try:
-        counts = json.loads(text)
+        found = json.loads(text)
     except (ValueError, RecursionError):
         return
-    for name, entry in counts.items() if isinstance(counts, dict) else ():
-        tries, right = (entry.get("tries"), entry.get("right")) if isinstance(entry, dict) else (None, None)
+    yield from ((name, entry) for name, entry in found.items() if isinstance(entry, dict)) if isinstance(found, dict) else ()
+
+
+def _counts(text: bytes) -> Iterator[tuple[str, int, int]]:
+    """Name, tries and right ones of each exercise in a text of any form."""
+    for name, entry in _entries(text):
+        tries, right = entry.get("tries"), entry.get("right")
         if type(tries) is int and type(right) is int and 0 <= right <= tries > 0:
             yield name, tries, right
+
+
+def _is_answer(value: Any) -> bool:
+    numbers = value if isinstance(value, list) else [value]
+    return _is_text(value) or (bool(numbers) and all(type(x) in (int, float) and abs(x) <= LARGEST for x in numbers))
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and value.isprintable()

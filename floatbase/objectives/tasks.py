@@ -1,15 +1,17 @@
 """Tasks: what a controller should bring about, each a weighted affine residual, actual - desired, in q̈, τ or λ.
 
 A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of position and velocity. Its
-residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term of ψ in (26). A target is a value, or a function of the
-time t in s that gives one.
+residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term of ψ in (26).
+
+A target is a value, or a function of the time t in s that gives one. That of a motion task gives the position alone, and the
+target's velocity and acceleration count as zero, or all three together: `lambda t: (position, velocity, acceleration)`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
+from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +21,11 @@ from floatbase._arrays import Array, Value, checked, flat_forces, number, of_kin
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
-from floatbase.robots import State, check_unit_lengths
+from floatbase.robots import Robot, State, check_unit_lengths
 
-Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
+Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]]
 _ZERO3 = (0.0, 0.0, 0.0)
+_ALL_THREE = "all three together, as in lambda t: (position, velocity, acceleration)"
 _ROTATION_TOLERANCE = 1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
 _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 
@@ -64,17 +67,56 @@ def _at(eom: EquationsOfMotion, t: float) -> None:
     number("t", t, "s")
 
 
-def _value(name: str, target: Target | None, t: float, shape: tuple[int, ...]) -> Array:
-    """A target at time t. One that does not move was checked when its task was made, but for the shape of a robot's own."""
-    if isinstance(target, np.ndarray) and target.shape == shape:
-        return target
+def target_shapes(task: Task, robot: Robot, k: int) -> dict[str, tuple[int, ...]]:
+    """Shape of each target of a task of the package by its attribute, with k forces; the first may be a function of time."""
+    if isinstance(task, OrientationTask):
+        return {"rotation": (3, 3), "angular_velocity": (3,), "angular_acceleration": (3,)}
+    if isinstance(task, CoMTask | FrameTask):
+        return {"position": (3,), "velocity": (3,), "acceleration": (3,)}
+    if isinstance(task, PostureTask):
+        return {"q": (robot.nq,), "velocity": (robot.d,), "acceleration": (robot.d,)}
+    return {"target": (k if isinstance(task, ForceTask) else robot.d,)}
+
+
+def targets_at(task: Task, robot: Robot, k: int, t: float) -> list[Array]:
+    """The targets of a task of the package at time t in s, in the order of `target_shapes`.
+
+    Raises `InputError` for a function's value that has another shape, or is no rotation or configuration.
+    """
+    shapes = target_shapes(task, robot, k)
+    values = [getattr(task, name) for name in shapes]
+    moves = callable(values[0])
+    if moves:
+        values = _together(values[0](t), *shapes.values())
+    found = [_value(f"{name} of {task.name}", value, shapes[name]) for name, value in zip(shapes, values, strict=True)]
+    if isinstance(task, OrientationTask) and moves:
+        found[0] = nearest_rotation(task.name, found[0])
+    if isinstance(task, PostureTask):
+        check_unit_lengths(robot.model, "q of posture", found[0], first=2 if robot.is_floating else 1)
+    return found
+
+
+def _together(value: Any, shape: tuple[int, ...], *others: tuple[int, ...]) -> list[Any]:
+    """What a function of time gave, with zeros for velocity and acceleration unless it gave all three."""
+    if others and isinstance(value, Sequence | np.ndarray) and len(value) == 3 and np.ndim(value[0]) == len(shape):
+        return list(value)
+    return [value, *(None for _ in others)]
+
+
+def _value(name: str, target: Any, shape: tuple[int, ...]) -> Array:
+    """A target, zero by default. One that does not move was checked when its task was made, but for a robot's own shape."""
     if target is None:
         return np.zeros(shape)
-    return checked(name, target(t) if callable(target) else target, shape)
+    if type(target) is np.ndarray and target.shape == shape and not target.flags.writeable:
+        return target
+    return checked(name, target, shape)
 
 
-def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
-    """Check gains and weight, and copy the targets that do not move; kd is critically damped, 2 √kp, by default."""
+def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
+    """Check gains and weight, and copy the targets that do not move; kd is critically damped, 2 √kp, by default.
+
+    shapes: of each target as far as the task knows it, the one that may be a function of time first.
+    """
     text("name of a task", task.name)
     if isinstance(task, OrientationTask | FrameTask):
         text("frame of a task", task.frame)
@@ -83,11 +125,18 @@ def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
         kp = kept["kp"] = positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
         kd = 2.0 * kp**0.5 if task.kd is None else task.kd
         kept["kd"] = positive(f"kd of {task.name}", kd, "1/s", allow_zero=True)
-    for name in targets:
-        target = getattr(task, name)
-        if isinstance(target, type) or not (callable(target) or (target is None and task.block != "qdd")):
-            what = f"{name} of {task.name}"
-            kept[name] = flat_forces(target, None, what) if task.block == "forces" else checked(what, target, shape)
+    first, moves = next(iter(shapes)), False
+    for name, shape in shapes.items():
+        target, what = getattr(task, name), f"{name} of {task.name}"
+        if name == first and callable(target) and not isinstance(target, type):
+            moves = True
+        elif name != first and callable(target):
+            raise InputError(f"{what} cannot be a function: let {first} be one, and give {_ALL_THREE}.")
+        elif target is not None or (name == first and task.block == "qdd"):
+            found = flat_forces(target, None, what) if task.block == "forces" else checked(what, target, shape)
+            kept[name] = nearest_rotation(task.name, found) if name == "rotation" else found
+            if moves and np.any(found):
+                raise InputError(f"{what} must be left out, for {first} is a function: let it give {_ALL_THREE}.")
     for name, value in kept.items():
         object.__setattr__(task, name, value)
 
@@ -96,16 +145,16 @@ def _keep(task: Task, shape: tuple[int | None, ...], *targets: str) -> None:
 class CoMTask(Value):
     """Bring the centre of mass to a position; residual in q̈, m/s².
 
-    position: shape (3,), m, world.
-    velocity, acceleration: shape (3,), m/s and m/s², world: those of a moving target.
+    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity, acceleration).
+    velocity, acceleration: shape (3,), m/s and m/s², world, of a target that is no function.
     kp, kd: gains, 1/s² and 1/s; kd is critically damped by default.
     weight: of ½‖residual‖² in the objective.
     name: in messages and tables.
     """
 
     position: Target
-    velocity: Target = _ZERO3
-    acceleration: Target = _ZERO3
+    velocity: npt.ArrayLike = _ZERO3
+    acceleration: npt.ArrayLike = _ZERO3
     kp: float = 100.0
     kd: float | None = None
     weight: float = 10.0
@@ -113,13 +162,12 @@ class CoMTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, (3,), "position", "velocity", "acceleration")
+        _keep(self, position=(3,), velocity=(3,), acceleration=(3,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_com q̈ + J̇_com q̇ - a, shape (3,), m/s²."""
         _at(eom, t)
-        state = eom.state
-        x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
+        state, (x, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
         return _motion_residual(self, state.com_jacobian, state.com_drift, a, state.com - x, state.com_velocity - v)
 
 
@@ -128,25 +176,22 @@ class OrientationTask(Value):
     """Bring a frame to an orientation; residual in q̈, rad/s². The error is e = log(R R_desiredᵀ), rad, world-aligned.
 
     frame: its name; "base" is the base link.
-    rotation: R_world_frame, shape (3, 3).
-    angular_velocity, angular_acceleration: shape (3,), rad/s and rad/s², world: those of a moving target.
+    rotation: R_world_frame, shape (3, 3); or a function of t that gives it, or (R, angular velocity, angular acceleration).
+    angular_velocity, angular_acceleration: shape (3,), rad/s and rad/s², world, of a target that is no function.
     kp, kd, weight: as for `CoMTask`.
     """
 
     frame: str = "base"
     rotation: Target = field(default_factory=lambda: np.eye(3))
-    angular_velocity: Target = _ZERO3
-    angular_acceleration: Target = _ZERO3
+    angular_velocity: npt.ArrayLike = _ZERO3
+    angular_acceleration: npt.ArrayLike = _ZERO3
     kp: float = 100.0
     kd: float | None = None
     weight: float = 10.0
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, (3,), "angular_velocity", "angular_acceleration")
-        if isinstance(self.rotation, type) or not callable(self.rotation):
-            rotation = nearest_rotation(self.name, checked(f"rotation of {self.name}", self.rotation, (3, 3)))
-            object.__setattr__(self, "rotation", rotation)
+        _keep(self, rotation=(3, 3), angular_velocity=(3,), angular_acceleration=(3,))
 
     @property
     def name(self) -> str:
@@ -156,15 +201,10 @@ class OrientationTask(Value):
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_ω q̈ + J̇_ω q̇ - α, shape (3,), rad/s², world-aligned."""
         _at(eom, t)
-        state = eom.state
-        desired = _value("rotation", self.rotation, t, (3, 3))
-        if callable(self.rotation):
-            desired = nearest_rotation(self.name, desired)
-        e = pin.log3(state.frame_pose(self.frame).rotation @ desired.T)
-        e_dot = state.frame_velocity(self.frame)[3:] - _value("angular velocity", self.angular_velocity, t, (3,))
-        feed = _value("angular acceleration", self.angular_acceleration, t, (3,))
+        state, (R, omega, alpha) = eom.state, targets_at(self, eom.robot, eom.k, t)
+        e = pin.log3(state.frame_pose(self.frame).rotation @ R.T)
         J, drift = state.frame_jacobian(self.frame)[3:], state.frame_drift(self.frame)[3:]
-        return _motion_residual(self, J, drift, feed, e, e_dot)
+        return _motion_residual(self, J, drift, alpha, e, state.frame_velocity(self.frame)[3:] - omega)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,22 +215,22 @@ class FrameTask(Value):
     frame sits in the ball's centre. So aim at `state.point(frame)`, or at a position one radius above the ground.
 
     frame: its name.
-    position: shape (3,), m, world.
-    velocity, acceleration: shape (3,), m/s and m/s², world: those of a moving target.
+    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity, acceleration).
+    velocity, acceleration: shape (3,), m/s and m/s², world, of a target that is no function.
     kp, kd, weight: as for `CoMTask`.
     """
 
     frame: str
     position: Target
-    velocity: Target = _ZERO3
-    acceleration: Target = _ZERO3
+    velocity: npt.ArrayLike = _ZERO3
+    acceleration: npt.ArrayLike = _ZERO3
     kp: float = 400.0
     kd: float | None = None
     weight: float = 10.0
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, (3,), "position", "velocity", "acceleration")
+        _keep(self, position=(3,), velocity=(3,), acceleration=(3,))
 
     @property
     def name(self) -> str:
@@ -200,8 +240,7 @@ class FrameTask(Value):
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J q̈ + J̇ q̇ - a, shape (3,), m/s², world-aligned."""
         _at(eom, t)
-        state = eom.state
-        x, v, a = (_value(name, getattr(self, name), t, (3,)) for name in ("position", "velocity", "acceleration"))
+        state, (x, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
         J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
         return _motion_residual(self, J, drift, a, state.point(self.frame) - x, state.frame_velocity(self.frame)[:3] - v)
 
@@ -210,12 +249,16 @@ class FrameTask(Value):
 class PostureTask(Value):
     """Bring the joints to those of a configuration; residual in q̈, rad/s².
 
-    q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of length 1.
+    q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of length 1. Or a function of
+        t that gives it, or (q, velocity, acceleration).
+    velocity, acceleration: shape (d,), of the joints, of a target that is no function; 0 by default.
     kp, kd, weight, name: as for `CoMTask`. The weight is small, so that posture settles only what other tasks leave open;
         where posture is what matters most, as for an arm, give it more, such as 1.
     """
 
     q: Target
+    velocity: npt.ArrayLike | None = None
+    acceleration: npt.ArrayLike | None = None
     kp: float = 100.0
     kd: float | None = None
     weight: float = 1e-3
@@ -223,15 +266,14 @@ class PostureTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, (None,), "q")
+        _keep(self, q=(None,), velocity=(None,), acceleration=(None,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
         _at(eom, t)
-        state, robot, zero, joints = eom.state, eom.robot, np.zeros(eom.d), slice(eom.nv - eom.d, None)
-        desired = _value("q of posture", self.q, t, (robot.nq,))
-        check_unit_lengths(robot.model, "q of posture", desired, first=2 if robot.is_floating else 1)
-        return _motion_residual(self, robot.S.T, zero, zero, state.difference(desired)[joints], state.v[joints])
+        state, (q, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
+        joints = slice(eom.nv - eom.d, None)
+        return _motion_residual(self, eom.S.T, np.zeros(eom.d), a, state.difference(q)[joints], state.v[joints] - v)
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,12 +289,12 @@ class ForceTask(Value):
     block: ClassVar[Block] = "forces"
 
     def __post_init__(self) -> None:
-        _keep(self, (None,), "target")
+        _keep(self, target=(None,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """λ - target, shape (k,), N."""
         _at(eom, t)
-        return Affine.identity(eom.k) - _value("target forces", self.target, t, (eom.k,))
+        return Affine.identity(eom.k) - targets_at(self, eom.robot, eom.k, t)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,12 +307,12 @@ class TorqueTask(Value):
     block: ClassVar[Block] = "tau"
 
     def __post_init__(self) -> None:
-        _keep(self, (None,), "target")
+        _keep(self, target=(None,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """τ - target, shape (d,), N·m."""
         _at(eom, t)
-        return Affine.identity(eom.d) - _value("target torques", self.target, t, (eom.d,))
+        return Affine.identity(eom.d) - targets_at(self, eom.robot, eom.k, t)[0]
 
 
 def standing_tasks(state: State) -> tuple[Task, ...]:

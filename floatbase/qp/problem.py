@@ -19,13 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, checked, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, read_only
 from floatbase.affine import Affine, block_slices
 from floatbase.errors import InfeasibleError
 from floatbase.linear_algebra import ranked_svd, row_lengths

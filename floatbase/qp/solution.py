@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, read_only
+from floatbase._arrays import Array, Value, cached_property, read_only
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, row_lengths
 from floatbase.qp.problem import QP

@@ -1,10 +1,9 @@
-"""A robot: floating or fixed base, feet, standing posture, torque limits, S of (2)(3)."""
+"""A robot: floating or fixed base, feet, standing posture, torque limits, lengths of (2), S of (3)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
@@ -14,7 +13,19 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import LARGEST, Array, Value, checked, plain_numbers, positive, read_only, said, text, whole
+from floatbase._arrays import (
+    LARGEST,
+    Array,
+    Value,
+    cached_property,
+    checked,
+    plain_numbers,
+    positive,
+    read_only,
+    said,
+    text,
+    whole,
+)
 from floatbase.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -141,17 +152,17 @@ class Robot(Value):
 
     @cached_property
     def nq(self) -> int:
-        """Length of q."""
+        """(2) Length of q: of q_base, which is 7 for a floating base and 0 for a fixed one, and of q_jnt."""
         return int(self.model.nq)
 
     @cached_property
     def nv(self) -> int:
-        """Length of v, of q̈ and of each row of J: d + 6 for a floating base, d for a fixed one."""
+        """(2) Length of v, of q̈ and of each row of J: d + 6 for a floating base, d for a fixed one."""
         return int(self.model.nv)
 
     @cached_property
     def d(self) -> int:
-        """Number of actuated joints: the length of τ."""
+        """(2) Number of actuated joints: the length of τ."""
         return self.nv - (6 if self.is_floating else 0)
 
     @cached_property
@@ -161,7 +172,7 @@ class Robot(Value):
 
     @cached_property
     def S(self) -> Array:
-        """(2)(3) The actuation matrix, shape (nv, d): S τ puts zeros where no motor acts. Source: the document, §2."""
+        """(3) The actuation matrix, shape (nv, d): S τ puts zeros where no motor acts. Source: the document, §2."""
         return read_only(np.eye(self.nv, self.d, self.d - self.nv))
 
     @cached_property

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, of_kind, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, of_kind, read_only, sealed
 from floatbase.robots.robot import Robot, check_unit_lengths
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -17,7 +16,7 @@ WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class State(Value):
-    """A configuration q and a velocity v of a robot, and all that follows from them alone.
+    """(2) A configuration q = (q_base, q_jnt) and a velocity v of a robot, and all that follows from them alone.
 
     A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts of frames are given in the
     world-aligned frame at the point requested.
@@ -40,64 +39,78 @@ class State(Value):
         object.__setattr__(self, "v", checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,)))
         check_unit_lengths(robot.model, "q", self.q, ", or use robot.standing()")
 
+    def _memory(self) -> pin.Data:
+        """Memory for Pinocchio's results."""
+        return self.robot.model.createData()
+
     @cached_property
     def _data(self) -> pin.Data:
-        """Pinocchio's results at (q, v) with zero acceleration: never handed out, never computed again."""
-        model = self.robot.model
-        data = model.createData()
-        pin.computeAllTerms(model, data, self.q, self.v)
-        # after computeAllTerms: accelerations at q̈ = 0 are the drifts J̇ v
-        pin.forwardKinematics(model, data, self.q, self.v, np.zeros(model.nv))
-        pin.centerOfMass(model, data, self.q, self.v, np.zeros(model.nv))
-        pin.updateFramePlacements(model, data)
+        """Pinocchio's results at (q, v), never handed out: kinematics, then what is asked for, which changes none of them."""
+        data = self._memory()
+        # accelerations at q̈ = 0 are the drifts J̇ v
+        pin.forwardKinematics(self.robot.model, data, self.q, self.v, np.zeros(self.robot.nv))
         return data
 
     @cached_property
     def M(self) -> Array:
         """The generalised inertia matrix M(q) of (1), shape (nv, nv), symmetric positive definite, rotor inertia included."""
-        return read_only(self._data.M)
+        return sealed(pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD))
 
     @cached_property
     def h(self) -> Array:
         """The generalised bias force h(q, q̇) of (1), shape (nv,): Coriolis, centrifugal and gravity."""
-        return read_only(self._data.nle)
+        return sealed(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
 
     @cached_property
+    def _centre_of_mass(self) -> tuple[Array, Array, Array]:
+        """Its position, velocity and drift."""
+        data = self._data
+        com = pin.centerOfMass(self.robot.model, data, pin.KinematicLevel.ACCELERATION, False)
+        return sealed(com), sealed(data.vcom[0].copy()), sealed(data.acom[0].copy())
+
+    @property
     def com(self) -> Array:
         """Centre of mass, shape (3,), m, world."""
-        return read_only(self._data.com[0])
+        return self._centre_of_mass[0]
 
-    @cached_property
+    @property
     def com_velocity(self) -> Array:
         """Velocity of the centre of mass, shape (3,), m/s, world."""
-        return read_only(self._data.vcom[0])
+        return self._centre_of_mass[1]
 
     @cached_property
     def com_jacobian(self) -> Array:
         """Jacobian of the centre of mass, shape (3, nv): com_velocity = com_jacobian v."""
-        return read_only(self._data.Jcom.reshape(3, self.robot.nv))  # of one joint Pinocchio gives (3,)
+        J = sealed(pin.jacobianCenterOfMass(self.robot.model, self._data, False))
+        return J.reshape(3, self.robot.nv)  # of one joint Pinocchio gives (3,)
 
-    @cached_property
+    @property
     def com_drift(self) -> Array:
         """J̇ v of the centre of mass, shape (3,), m/s²: its acceleration when q̈ = 0."""
-        return read_only(self._data.acom[0])
+        return self._centre_of_mass[2]
 
     @cached_property
     def joint_transforms(self) -> Array:
         """World poses of Pinocchio's joints, shape (njoints, 4, 4), index = joint number (0 = the world)."""
         return read_only([placement.homogeneous for placement in self._data.oMi])
 
+    @cached_property
+    def _jacobians(self) -> pin.Data:
+        """Pinocchio's results with the Jacobians of all joints."""
+        pin.computeJointJacobians(self.robot.model, self._data)
+        return self._data
+
     def frame_pose(self, frame: str) -> pin.SE3:
         """Pose T_world_frame of a frame. Raises `UnknownNameError`."""
-        return self._data.oMf[self.robot.frame_id(frame)].copy()
+        return pin.updateFramePlacement(self.robot.model, self._data, self.robot.frame_id(frame))
 
     def point(self, frame: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """World position, shape (3,), m, of a point at `offset` (m, in the frame)."""
-        return read_only(self._data.oMf[self.robot.frame_id(frame)].act(checked("offset", offset, (3,), "m")))
+        return read_only(self.frame_pose(frame).act(checked("offset", offset, (3,), "m")))
 
     def frame_jacobian(self, frame: str) -> Array:
         """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows, world-aligned."""
-        J = pin.getFrameJacobian(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED)
+        J = pin.getFrameJacobian(self.robot.model, self._jacobians, self.robot.frame_id(frame), WORLD_ALIGNED)
         return read_only(J.reshape(6, self.robot.nv))  # of one joint Pinocchio gives (6,)
 
     def frame_velocity(self, frame: str) -> Array:

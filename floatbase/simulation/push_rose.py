@@ -5,17 +5,17 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from math import ceil
 from typing import Any
 
 import cloudpickle
 import numpy as np
 
-from floatbase._arrays import Array, Value, checked, positive, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, positive, read_only
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError, SimulationError
-from floatbase.friction import wrench_set
+from floatbase.errors import InfeasibleError, InputError, SimulationError
+from floatbase.friction import WrenchSet, wrench_set
 from floatbase.robots import State
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.rollout import Controller, rollout
@@ -64,11 +64,14 @@ class PushRose(Value):
         """(20)(21)(28) The largest push that the stance bears for ever without moving, shape (n,), N.
 
         The contact forces must carry the weight and hold against the push, all inside their friction cones: `WrenchSet.reach`.
+        0 where the stance cannot carry the weight alone, even if a push would help it to.
         """
         wrenches = wrench_set(self.state, self.contacts, facets=_FACETS)
         lever = self.state.frame_pose(self.frame).translation - wrenches.about
         carried = np.array([0.0, 0.0, wrenches.weight, 0.0, 0.0, 0.0])
-        return read_only([wrenches.reach(-np.concatenate([d, np.cross(lever, d)]), carried) for d in self.unit_vectors])
+        if not wrenches.contains(carried):
+            return read_only(np.zeros(len(self.directions)))
+        return read_only([_reach(wrenches, -np.concatenate([d, np.cross(lever, d)]), carried) for d in self.unit_vectors])
 
     @cached_property
     def capture(self) -> Array:
@@ -218,6 +221,14 @@ def _largest(
 def _unit_vectors(directions: Any) -> Array:
     """Horizontal unit vectors, shape (…, 3), for directions, rad."""
     return read_only(np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1))
+
+
+def _reach(wrenches: WrenchSet, push: Array, carried: Array) -> float:
+    """The largest multiple of a push that can go with what is carried; 0 where rounding puts that beyond the set's border."""
+    try:
+        return max(0.0, wrenches.reach(push, carried))
+    except InfeasibleError:
+        return 0.0
 
 
 def _border(polygon: Array, inside: Array, directions: Array) -> Array:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, read_only, whole
+from floatbase._arrays import Array, Value, cached_property, read_only, sealed, whole
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -182,8 +181,7 @@ class Recorder:
 
     def _kept(self, rows: Array) -> Array:
         """The rows that are complete, without a copy."""
-        rows.setflags(write=False)
-        return rows[: self._n]
+        return sealed(rows)[: self._n]
 
     def _mean(self, steps: Array) -> Array:
         """The means over the timesteps of each row, shape (n, …), of numbers at all timesteps."""

@@ -74,8 +74,8 @@ def sweep(
     Functions, lambdas and classes of a notebook or script can be used: they are sent by value. What is imported must be
     importable by the workers.
     Raises `InputError` for a grid that does not fit the function, for an answer that cannot be stored, for a file of
-    something else; `SimulationError` when a process or the cluster breaks down; and what `setup` raises. What is in the
-    file stays there, after an interrupt too.
+    something else or that takes no more, as on a full disc; `SimulationError` when a process or the cluster breaks down; and
+    what `setup` raises. What is in the file stays there, after an interrupt too.
     """
     points = _points(grid)
     plain_points = [{name: plain(f"parameter {name}", value) for name, value in point.items()} for point in points]

@@ -8,14 +8,13 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Value
+from floatbase._arrays import Value, cached_property
 from floatbase.errors import InputError, unknown_name
 
 RESERVED = ("point", "error")  # names of the store's own
@@ -98,7 +97,7 @@ class Store:
     path: of the file; None keeps nothing.
     name: of the function.
     points: parameters of all points, in plain values.
-    Raises `InputError` for a file that holds something else, or that another sweep is writing to.
+    Raises `InputError` for a file that holds something else, that another sweep is writing to, or that cannot be written to.
     """
 
     def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
@@ -108,20 +107,23 @@ class Store:
             return
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-        except OSError as error:
-            raise InputError(f"{path} cannot be written to: {error.strerror}.") from None
-        try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._take_up(path, _head(name, points))
         except BlockingIOError:
             self.close()
             raise InputError(f"another sweep is writing to {path}; wait for its end, or give another file.") from None
+        except OSError as error:
+            self.close()
+            raise InputError(f"{path} cannot be written to: {error.strerror}.") from None
         except BaseException:
             self.close()
             raise
 
     def add(self, i: int, row: Row) -> None:
-        """Keep the row of point i. A row is written at once and whole: what ends the program loses no earlier one."""
+        """Keep the row of point i. A row is written at once and whole: what ends the program loses no earlier one.
+
+        Raises `InputError` where the file takes no more.
+        """
         line = json.dumps({"point": i, **row})
         self.rows[i] = json.loads(line)
         del self.rows[i]["point"]
@@ -157,8 +159,12 @@ class Store:
 
     def _write(self, line: str) -> None:
         data = line.encode() + b"\n"
-        if os.write(self._file, data) != len(data):
-            raise OSError(f"{self._path}: the disc is full. Make room and sweep again: what is done is kept.")
+        try:
+            while data:  # what a full disc takes is a part: the next attempt says why
+                data = data[os.write(self._file, data) :]
+        except OSError as error:
+            again = "The rows before are kept: once the file takes more, the same sweep goes on from them."
+            raise InputError(f"{self._path} cannot be written to: {error.strerror}. {again}") from None
 
 
 def plain(what: str, value: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import judges
 import numpy as np
@@ -60,13 +61,19 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
             InputError,
             r"another robot, Robot\('solo12', .*\), than the problem, Robot\('go2', .* 4 feet",
         ),
+        (lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})), InputError, "a SimpleNamespace is none"),
         (lambda: controller("stand"), InputError, r"tasks must hold tasks, such as fb\.CoMTask\(state\.com\); 'stand' is none"),
         (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "frame of go2 'FL_fot'; near names: FL_foot"),
         (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "unknown frame of go2 'torso'"),
         (lambda: controller(fb.PostureTask(np.zeros(5))), InputError, r"q of posture has shape \(5,\); .*\(19,\)"),
-        (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, r"target forces has shape \(3,\); .*\(12,\)"),
-        (lambda: controller(fb.TorqueTask(np.zeros(3))), InputError, r"target torques has shape \(3,\); .*\(12,\)"),
-        (lambda: controller(fb.CoMTask(lambda t: [0.0])), InputError, r"position has shape \(1,\); it must have shape \(3,\)"),
+        (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, r"target of force regularisation .* \(3,\); .*\(12,\)"),
+        (lambda: controller(fb.TorqueTask(np.zeros(3))), InputError, r"target of torque regularisation .* \(3,\); .*\(12,\)"),
+        (lambda: controller(fb.CoMTask(lambda t: [0.0])), InputError, r"position of centre of mass has shape \(1,\)"),
+        (lambda: controller(fb.CoMTask(lambda t: (UP, UP, [0.0]))), InputError, r"acceleration of centre .* shape \(1,\)"),
+        (lambda: controller(fb.CoMTask(lambda t: (UP, UP))), InputError, r"position of centre of mass has shape \(2, 3\)"),
+        (lambda: fb.CoMTask(UP, lambda t: UP), InputError, r"velocity of .* cannot be a function: let position be one"),
+        (lambda: fb.CoMTask(lambda t: UP, UP), InputError, r"velocity of .* must be left out, for position is a function"),
+        (lambda: controller(fb.PostureTask(STATE.q, UP)), InputError, r"velocity of posture has shape \(3,\); .*\(12,\)"),
         (lambda: fb.PostureTask(STATE.q[None]), InputError, r"q of posture has shape \(1, 19\)"),
         (lambda: fb.CoMTask([0.0, 0.0]), InputError, r"position of centre of mass has shape \(2,\); .*\(3,\)"),
         (lambda: fb.CoMTask([0.0, 0.0, np.nan]), InputError, r"position of centre of mass holds nan at index \[2\]"),

@@ -1,4 +1,4 @@
-"""Tasks, constraints and rows of one's own: the same answers on both paths, and the words for what is wrong with them."""
+"""Tasks and constraints of one's own: the same answers on both paths, and the words for what is wrong with them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,9 @@ import pytest
 
 import floatbase as fb
 from floatbase.control import Rows
-from floatbase.control.tick import Compiled
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint, PointContact, RollingWheel
-from floatbase.errors import InfeasibleError, InputError, UnknownNameError
-from floatbase.qp import solve
+from floatbase.errors import InfeasibleError, InputError
 from floatbase.robots import Robot, State
-
-AGREEMENT = 1e-8  # part of the strongest motor's limit between two ways to the same torques
 
 
 @dataclass
@@ -81,30 +77,6 @@ def stance(robot: Robot) -> fb.Contacts:
     return contacts.without(HANDS[robot.name]) if HANDS[robot.name] in contacts.names else contacts
 
 
-def differ(one: fb.WholeBodyController, other: fb.WholeBodyController, state: State, t: float = 0.0) -> float:
-    """Largest torque between two controllers, part of the strongest motor's limit; both must find a state infeasible."""
-    try:
-        expected = other(state.q, state.v, t)
-    except InfeasibleError as error:
-        with pytest.raises(InfeasibleError) as caught:
-            one(state.q, state.v, t)
-        assert caught.value.rows == error.rows
-        return 0.0
-    found = one(state.q, state.v, t)
-    assert found.path == one.path, "the compiled tick left this state to the readable path"
-    limits = state.robot.torque_limits
-    return float(np.max(np.abs(found.tau - expected.tau)) / np.max(limits[np.isfinite(limits)]))
-
-
-def pair(robot: Robot, contacts: fb.Contacts, tasks: list[object], **options: object) -> list[fb.WholeBodyController]:
-    return [fb.WholeBodyController(robot, contacts, tasks, path=path, **options) for path in ("compiled", "readable")]
-
-
-def cases(name: str, n: int) -> list[State]:
-    """Near standing, and far away, where friction and torque limits hold most of them."""
-    return [state for spread in (0.02, 0.1, 0.3) for state in judges.states(name, n, spread)]
-
-
 # tasks ---------------------------------------------------------------------------------------------------------------------
 
 
@@ -115,13 +87,13 @@ def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: st
     hand = at.point(frame) + [0.0, 0.0, 0.05]
     others = [*fb.standing_tasks(at)[1:], fb.ForceTask(weight=1e-4)]
     own = [MyCoM(at.com), others[0], MyHand(frame, hand), *others[1:]]
-    moving = fb.FrameTask(frame, lambda t: hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], weight=7.0)
+    moving = fb.FrameTask(frame, lambda t: (hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]), weight=7.0)
     known = fb.WholeBodyController(robot, contacts, [fb.CoMTask(at.com), moving, *others], path="compiled")
-    compiled, readable = pair(robot, contacts, own)
+    compiled, readable = judges.pair(robot, contacts, own)
     active = 0
-    for i, state in enumerate(cases(name, 8)):
-        assert differ(compiled, readable, state, 0.1 * i) < AGREEMENT
-        assert differ(compiled, known, state, 0.1 * i) < AGREEMENT
+    for i, state in enumerate(judges.near_and_far(name, 8)):
+        assert judges.difference(compiled, readable, state, 0.1 * i) < judges.agreement(robot)
+        assert judges.difference(compiled, known, state, 0.1 * i) < judges.agreement(robot)
         active += len(known(state.q, state.v).active)
     assert active > 8, "nothing was saturated: these states try nothing"
 
@@ -129,8 +101,8 @@ def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: st
 def test_tasks_of_ones_own_on_torques_and_forces() -> None:
     robot = judges.load("go2")
     tasks = [*fb.standing_tasks(robot.standing()), MyEffort("forces"), MyEffort("tau"), fb.ForceTask(), fb.TorqueTask()]
-    both = pair(robot, judges.stance(robot), tasks)
-    assert max(differ(*both, state) for state in cases("go2", 6)) < AGREEMENT
+    both = judges.pair(robot, judges.stance(robot), tasks)
+    assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 6)) < judges.agreement(robot)
 
 
 @dataclass
@@ -179,12 +151,34 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
         seen[0].M = np.eye(robot.nv)
 
 
+def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> None:
+    """Its memory serves the states of later ticks."""
+    robot = judges.load("go2")
+    seen: list[EquationsOfMotion] = []
+    controller = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), Looks(seen)])[0]
+    parts = ("M", "h", "com", "com_velocity", "com_jacobian", "com_drift", "joint_transforms")
+
+    def arrays(state: State) -> list[np.ndarray]:
+        """All that the state of a new tick says."""
+        seen.clear()
+        controller(state.q, state.v)
+        at = seen.pop().state
+        asked = [at.point("base"), at.frame_velocity("base"), at.frame_drift("base"), at.frame_jacobian("base")]
+        return [*asked, at.frame_pose("base").homogeneous, *(getattr(at, part) for part in parts)]
+
+    kept = arrays(robot.random_state(1_000))
+    before = [array.copy() for array in kept]
+    others = [arrays(state) for state in judges.states("go2", 6)]
+    assert all(np.array_equal(array, was) for array, was in zip(kept, before, strict=True))
+    assert not any(np.array_equal(a, b) for other in others for a, b in zip(other, kept, strict=True))
+
+
 def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
     robot = judges.load("go2")
     task = Looks([], rows=0)
-    compiled, readable = pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task])
+    compiled, readable = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task])
     for task.rows in (0, 3, 1, 400, 2):
-        assert differ(compiled, readable, robot.random_state(task.rows, 0.1)) < AGREEMENT
+        assert judges.difference(compiled, readable, robot.random_state(task.rows, 0.1)) < judges.agreement(robot)
 
 
 def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -> None:
@@ -201,7 +195,7 @@ def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -
     rows = Rows("push", "forces", lambda eom, t: (np.eye(eom.k)[2:3], [slider["bound"]]))
     options = {"rows": [rows], "max_normal_force": {"FL_foot": lambda t: slider["bound"]}}
     contacts = judges.stance(robot).without("FR_foot") + fb.Contacts([drive])
-    controller, _ = pair(robot, contacts, [task, *fb.standing_tasks(robot.standing())], **options)
+    controller, _ = judges.pair(robot, contacts, [task, *fb.standing_tasks(robot.standing())], **options)
     command = controller(robot.standing().q, np.zeros(18))
     assert command.path == "compiled"
     slider.update(bound=7.0)
@@ -223,7 +217,7 @@ def test_threads_may_share_a_controller_with_tasks_of_their_own_and_a_task_may_a
             return found
 
     tasks = [Nested(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
-    controller, _ = pair(robot, judges.stance(robot), tasks)
+    controller, _ = judges.pair(robot, judges.stance(robot), tasks)
     expected = [controller(state.q, state.v).tau for state in states]
 
     def wrong(shift: int) -> list[int]:
@@ -239,11 +233,11 @@ class _Wrong:
 
     name, weight, block = "odd", 1.0, "qdd"
 
-    def __init__(self, later: Callable[[], object]):
-        self.later = later
+    def __init__(self, later: Callable[[], object], at_first: fb.Affine | None = None):
+        self.later, self.at_first = later, at_first or fb.Affine.identity(18)
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> object:
-        return self.later() if t else fb.Affine(np.eye(18), np.zeros(18))
+        return self.later() if t else self.at_first
 
 
 def _fail() -> object:
@@ -261,7 +255,7 @@ def _fail() -> object:
 )
 def test_a_task_that_goes_wrong_is_told_in_the_words_of_the_readable_path(later: Callable[[], object], text: str) -> None:
     robot = judges.load("go2")
-    for controller in pair(robot, judges.stance(robot), [_Wrong(later)]):
+    for controller in judges.pair(robot, judges.stance(robot), [_Wrong(later)]):
         assert controller(robot.standing().q, np.zeros(18)).path == controller.path
         with pytest.raises((InputError, RuntimeError), match=text):
             controller(robot.standing().q, np.zeros(18), 1.0)
@@ -288,7 +282,7 @@ def test_ten_thousand_ticks_with_a_task_of_ones_own_take_no_more_memory_at_the_e
     psutil = pytest.importorskip("psutil")
     robot = judges.load("go2")
     tasks = [MyCoM(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
-    controller, states = pair(robot, judges.stance(robot), tasks)[0], judges.states("go2", 50, 0.1)
+    controller, states = judges.pair(robot, judges.stance(robot), tasks)[0], judges.states("go2", 50, 0.1)
 
     def resident(ticks: int) -> float:
         for i in range(ticks):
@@ -314,9 +308,9 @@ def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> No
     robot = judges.load(name)
     feet = judges.stance(robot)
     for contacts in (feet + hold(robot, [7, 9]), hold(robot, [8]) + feet, hold(robot, [6, 7, 8])):
-        compiled, readable = pair(robot, contacts, list(fb.standing_tasks(robot.standing())))
-        for i, state in enumerate(cases(name, 3)):
-            assert differ(compiled, readable, state, 0.2 * i) < AGREEMENT
+        compiled, readable = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())))
+        for i, state in enumerate(judges.near_and_far(name, 3)):
+            assert judges.difference(compiled, readable, state, 0.2 * i) < judges.agreement(robot)
             with np.errstate(all="ignore"):
                 try:
                     command = compiled(state.q, state.v, 0.2 * i)
@@ -324,6 +318,31 @@ def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> No
                     continue
             eom = fb.equations_of_motion(state, contacts, 0.2 * i)
             assert max(np.max(np.abs(r)) for r in eom.residual(command.qdd, command.tau, command.forces)) < 1e-6
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_constraint_of_ones_own_is_asked_once_in_a_tick(path: str) -> None:
+    robot = judges.load("go2")
+    asked: list[float] = []
+    held = LinearConstraint("held", 1, lambda state, t: asked.append(t) or (np.eye(18)[6:7], np.zeros(1)))
+    contacts = judges.stance(robot) + fb.Contacts([held])
+    controller = fb.WholeBodyController(robot, contacts, list(fb.standing_tasks(robot.standing())), path=path)
+    asked.clear()
+    assert controller(robot.standing().q, np.zeros(18), 0.3).path == path
+    assert asked == [0.3]
+
+
+def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows() -> None:
+    """λ acts on two joints, and holds one of them."""
+
+    class Coupled(LinearConstraint):
+        def jacobian(self, state: State, t: float = 0.0) -> np.ndarray:
+            return np.eye(18)[6:7] + np.eye(18)[7:8]
+
+    robot = judges.load("go2")
+    held = Coupled("held", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
+    both = judges.pair(robot, judges.stance(robot).without("FL_foot") + fb.Contacts([held]))
+    assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 4)) < judges.agreement(robot)
 
 
 def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones() -> None:
@@ -335,160 +354,11 @@ def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones()
     own = [RollingWheel("FL_foot", [0.0, 1.0, 0.0], 0.022), MyPoint("RR_foot", radius=0.022)]
     tasks = list(fb.standing_tasks(robot.standing()))
     for contacts in (feet + fb.Contacts(own), fb.Contacts(own[::-1]) + feet):
-        both = pair(robot, contacts, tasks, min_normal_force=3.0)
-        assert max(differ(*both, state) for state in cases("go2", 5)) < AGREEMENT
+        both = judges.pair(robot, contacts, tasks, min_normal_force=3.0)
+        assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 5)) < judges.agreement(robot)
 
 
-# rows ----------------------------------------------------------------------------------------------------------------------
-
-
-def own_rows(robot: Robot, contacts: fb.Contacts) -> list[Rows]:
-    """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with time."""
-    E, up = np.eye(robot.nv)[robot.nv - robot.d :], np.zeros((1, contacts.k))
-    up[0, contacts.point_entries[2::3]] = 1.0
-    turns = np.resize([1.0, -1.0], (1, robot.d))
-    sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
-    return [
-        Rows("acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides),
-        Rows("total force", "forces", (up, [1.05 * robot.weight])),
-        Rows(
-            "joined torques", "tau", lambda eom, t: (np.vstack([turns, -turns]), np.full(2, (0.01 - 0.002 * t) * robot.weight))
-        ),
-    ]
-
-
-@pytest.mark.parametrize("name", ["go2", "solo12", "talos"])
-def test_rows_of_ones_own_hold_and_have_their_names_on_both_paths(name: str) -> None:
-    robot = judges.load(name)
-    contacts = judges.stance(robot)
-    rows = own_rows(robot, contacts)
-    compiled, readable = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=rows)
-    kinds: set[str] = set()
-    for i, state in enumerate(cases(name, 6)):
-        t = 0.1 * i
-        assert differ(compiled, readable, state, t) < AGREEMENT
-        try:
-            command, expected = compiled(state.q, state.v, t), readable(state.q, state.v, t)
-        except InfeasibleError:
-            continue
-        eom = fb.equations_of_motion(state, contacts)
-        for each in rows:
-            G, h = each.at(eom, t)
-            assert np.all(G @ command.solution[each.block] <= h + 1e-6)
-        if name != "talos":  # four corners share one wrench: rows can depend on one another
-            assert command.active == expected.active
-        kinds |= {row.kind for row in command.active} | {row.owner for row in command.active}
-    assert {"acceleration limit", "total force", "joined torques"} <= kinds
-
-
-def test_rows_of_ones_own_against_cvxpy() -> None:
-    robot = judges.load("go2")
-    contacts = judges.stance(robot)
-    controller = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=own_rows(robot, contacts))[0]
-    for state in judges.states("go2", 4, 0.1):
-        command, judge = controller(state.q, state.v), solve(controller.qp(state), "cvxpy")
-        assert command.path == "compiled"
-        assert np.max(np.abs(command.tau - judge["tau"])) < 1e-4 * np.max(robot.torque_limits)
-
-
-def test_rows_in_conflict_are_told_by_their_names() -> None:
-    robot = judges.load("go2")
-    light = Rows("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
-    for controller in pair(robot, judges.stance(robot), [], rows=[light], min_normal_force=10.0):
-        with pytest.raises(InfeasibleError, match="light feet") as caught:
-            controller(robot.standing().q, np.zeros(18))
-        row = next(row for row in caught.value.rows if row == "light feet")
-        assert (row.kind, row.owner, row.number) == ("rows", "light feet", 0)
-        assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
-
-
-# forces over time ----------------------------------------------------------------------------------------------------------
-
-
-def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
-    robot = judges.load("go2")
-    share = 0.25 * robot.weight
-    windows = {
-        "min_normal_force": {"RR_foot": 12.0, "RL_foot": lambda t: 5.0 * t},
-        "max_normal_force": {"FL_foot": lambda t: share * (1.0 - t), "RR_foot": 2.0 * share},
-    }
-    contacts = judges.stance(robot)
-    both = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
-    for t in (0.0, 0.25, 0.5, 1.0):
-        command = both[0](robot.standing().q, np.zeros(18), t)
-        normal = dict(zip(contacts.point_names, command.forces.reshape(-1, 3)[:, 2], strict=True))
-        assert normal["FL_foot"] <= share * (1.0 - t) + 1e-6 and normal["RR_foot"] >= 12.0 - 1e-6
-        assert normal["RL_foot"] >= 5.0 * t - 1e-6
-        assert t == 0.0 or "FL_foot largest normal force" in command.active
-        assert command.active == both[1](robot.standing().q, np.zeros(18), t).active
-        assert max(differ(*both, state, t) for state in cases("go2", 3)) < AGREEMENT
-    row = next(row for row in command.active if row.endswith("largest normal force"))
-    assert (row.kind, row.owner) == ("largest normal force", "FL_foot")
-
-
-def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners() -> None:
-    robot = judges.load("talos")
-    contacts = fb.Contacts.flat_feet(robot)
-    windows = {"min_normal_force": {contacts.names[0]: 40.0}, "max_normal_force": 150.0}
-    both = pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
-    normal = both[0](robot.standing().q, np.zeros(robot.nv)).forces[2::3]
-    assert np.all(normal[:4] >= 40.0 - 1e-6) and np.all(normal <= 150.0 + 1e-6)
-    assert max(differ(*both, state) for state in cases("talos", 3)) < AGREEMENT
-
-
-# words ---------------------------------------------------------------------------------------------------------------------
-
-
-def make(**options: object) -> Callable[[], object]:
-    robot = judges.load("go2")
-    return lambda: fb.WholeBodyController(robot, judges.stance(robot), [], **options)
-
-
-@pytest.mark.parametrize(
-    ("call", "kind", "text"),
-    [
-        (make(max_normal_force=-1.0), InputError, "max_normal_force is -1; it must be ≥ 0 N"),
-        (make(max_normal_force={"FL_foot": -1.0}), InputError, "max_normal_force of FL_foot is -1; it must be ≥ 0 N"),
-        (make(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "unknown contact in min_normal_force 'FL_fot'; .*FL_foot"),
-        (make(min_normal_force={"FL_foot": lambda t: -1.0}), InputError, "min_normal_force of FL_foot is -1; it must be ≥ 0 N"),
-        (make(rows=Rows("r", "tau", (np.eye(12), np.ones(12)))), InputError, "rows must be a list of Rows, not a Rows"),
-        (make(rows=[np.eye(12)]), InputError, "each of rows must be a Rows, as floatbase.control.Rows"),
-        (lambda: Rows("r", "lambda", (np.eye(12), np.ones(12))), InputError, "rows 'r' have block 'lambda'; it must be"),
-        (lambda: Rows("r", "tau", np.eye(12)), InputError, r"rows 'r' must be G and h, as in \(G, h\), not an array"),
-        (
-            lambda: Rows("r", "tau", (np.eye(12), np.ones(3))),
-            InputError,
-            r"h of r has shape \(3,\); it must have shape \(12,\)",
-        ),
-        (make(rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]), InputError, r"G of r has shape \(3, 3\); .* \(any, 12\)"),
-        (make(rows=[Rows("r", "tau", lambda eom, t: 3.0)]), InputError, "rows 'r' must be G and h"),
-        (make(rows=[Rows("r", "tau", (np.eye(12), np.ones(12)), ["a"])]), InputError, "rows 'r' have 1 owners and 12 rows"),
-        (make(rows=2 * [Rows("r", "tau", (np.eye(12), np.ones(12)))]), InputError, "inequality name 'r 0' stands twice"),
-    ],
-)
-def test_bad_rows_and_bounds_are_told_what_would_be_right(call: Callable[[], object], kind: type[Exception], text: str) -> None:
-    with pytest.raises(kind, match=text):
-        call()
-
-
-def test_a_bound_that_goes_wrong_is_told_in_the_words_of_the_readable_path() -> None:
-    robot = judges.load("go2")
-    bound = {"FL_foot": lambda t: 50.0 if t < 1.0 else np.nan}
-    for controller in pair(robot, judges.stance(robot), [], max_normal_force=bound):
-        assert controller(robot.standing().q, np.zeros(18)).path == controller.path
-        with pytest.raises(InputError, match="max_normal_force of FL_foot is nan; it must be ≥ 0 N"):
-            controller(robot.standing().q, np.zeros(18), 1.0)
-
-
-def test_a_replaced_controller_is_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_replaced_controller_is_checked() -> None:
     controller = judges.controller_of("go2", path="compiled")
-    assert isinstance(controller.compiled, Compiled)
     with pytest.raises(InputError, match="the residual of 'odd' takes 12 numbers"):
-        odd = _Wrong(lambda: None)
-        monkeypatch.setattr(odd, "residual", lambda eom, t=0.0: fb.Affine.identity(12))
-        controller.replace(tasks=[odd])
-    with pytest.raises(InputError, match=r"G of r has shape \(3, 3\)"):
-        controller.replace(limits=replace(controller.limits, rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]))
-    with pytest.raises(UnknownNameError, match="unknown contact in max_normal_force 'FL_foot'"):
-        limits = replace(controller.limits, max_normal_force={"FL_foot": 1.0})
-        controller.replace(contacts=controller.contacts.without("FL_foot"), limits=limits)
+        controller.replace(tasks=[_Wrong(lambda: None, at_first=fb.Affine.identity(12))])

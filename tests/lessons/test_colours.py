@@ -14,7 +14,6 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import floatbase as fb
-from floatbase.dynamics import motion_matrix
 from floatbase.lessons import ConstantTorques, lesson02, lesson03, lesson04
 from floatbase.lessons.publish import FOLDER, read
 from floatbase.viewer import ALARM, CALM, COM, CONE, GREYS, MEASURED, PLANNED, WARNING, Viewer, hexadecimal
@@ -55,7 +54,7 @@ def lines(figure: Figure) -> set[str]:
     [
         lambda: lesson02.draw_equation(lesson03.standing_go2()),
         lambda: lesson02.plot_strayed({"one": np.ones(9), "other": np.ones(9), "third": np.ones(9)}, 1.0).figure,
-        lambda: lesson03.matrix_picture(motion_matrix(lesson03.standing_go2())[0], {"rows": 30}, {"q̈": 18, "λ": 24}),
+        lambda: lesson03.matrix_picture(np.eye(4), {"rows": 4}, {"q̈": 1, "λ": 3}),
         lambda: lesson04.slices(bowl=(BOWL, "x", "y", 2.0)),
         lambda: lesson04.effort_picture({name: ([0, 1], [0, 1]) for name in "abc"}),
     ],

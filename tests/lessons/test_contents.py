@@ -11,7 +11,7 @@ import pytest
 from nbformat.v4 import new_markdown_cell, new_notebook
 
 from floatbase.dynamics import MOTION_NOISE
-from floatbase.lessons.publish import FOLDER, README, conventions, equations, lesson_table, readme_with_table
+from floatbase.lessons.publish import FOLDER, README, conventions, equations, lesson_table, read, readme_with_table
 from floatbase.linear_algebra import RANK_TOLERANCE
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
@@ -70,23 +70,36 @@ def test_the_table_of_lessons_in_the_readme_is_the_one_that_the_lessons_make() -
     assert readme_with_table(text.replace("| ready |", "| soon |")) == text
 
 
-def test_every_formula_of_a_lesson_is_one_of_the_equations_in_its_row() -> None:
+def spelt_out(ranges: str) -> set[str]:
+    """The equations of a text such as "(1)-(3), (5), App. A"."""
+    numbers = re.findall(r"\((\d+)\)(?:-\((\d+)\))?", ranges)
+    taught = {f"({n})" for first, last in numbers for n in range(int(first), int(last or first) + 1)}
+    return taught | set(re.findall(r"App\. [ABC]", ranges))
+
+
+def test_every_equation_is_taught_in_a_lesson_or_planned_for_one() -> None:
+    assert set(equations.TITLES) - set().union(*map(spelt_out, lesson_table().splitlines())) == set()
+
+
+def test_the_source_of_a_lesson_names_every_equation_that_it_teaches() -> None:
+    wrong = {}
     for row in lesson_table().splitlines():
-        name = re.search(r"notebooks/(\w+\.ipynb)", row)
-        ranges = re.findall(r"\((\d+)\)(?:-\((\d+)\))?", row)
-        taught = {n for first, last in ranges for n in range(int(first), int(last or first) + 1)}
-        tags = re.findall(r"tag\{(\d+)\}", (FOLDER / name[1]).read_text(encoding="utf-8")) if name else []
-        assert {int(tag) for tag in tags} <= taught, row
+        if name := re.search(r"notebooks/(\w+\.ipynb)", row):
+            texts = [cell.source for cell in read(FOLDER / name[1]).cells if cell.cell_type == "markdown"]
+            (source,) = (line for text in texts for line in text.splitlines() if line.startswith("**Source**"))
+            wrong[name[1]] = spelt_out(row) - spelt_out(source)
+    assert {name: missing for name, missing in wrong.items() if missing} == {}
 
 
 def test_a_planned_lesson_is_ready_once_its_notebook_is_there(tmp_path: Path) -> None:
-    texts = {
-        "06_friction_cones": ["# 06 · Cones of friction\n", "**Source**: §4.2, equation (28)."],
-        "A_turning": ["# A · Turning\n\n**Source**: App. A."],
+    lessons = {
+        "06_friction_cones": ["# 06 · Cones of friction", ["(28)"], ["(7)", "(1)"], ["(6)", "(5)", "(2)"]],
+        "A_turning": ["# A · Turning", ["App. A"]],
     }
-    for name, cells in texts.items():
-        nbformat.write(new_notebook(cells=[new_markdown_cell(text) for text in cells]), tmp_path / f"{name}.ipynb")
+    for name, (title, *taught) in lessons.items():
+        cells = [new_markdown_cell(title), *(new_markdown_cell("…", metadata={"teaches": some}) for some in taught)]
+        nbformat.write(new_notebook(cells=cells), tmp_path / f"{name}.ipynb")
     rows = lesson_table(tmp_path).splitlines()[2:]
-    assert rows[1] == "| 06 | [Cones of friction](notebooks/06_friction_cones.ipynb) | (28) | ready |"
+    assert rows[1] == "| 06 | [Cones of friction](notebooks/06_friction_cones.ipynb) | (1), (2), (5)-(7), (28) | ready |"
     assert rows[5] == "| A | [Turning](notebooks/A_turning.ipynb) | App. A | ready |"
     assert [row.endswith("| planned |") for row in rows].count(False) == 2

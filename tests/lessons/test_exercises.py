@@ -20,6 +20,7 @@ import floatbase as fb
 from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
 
 MASS = 16.085  # kg, of go2
+LIFTED = (9.81 + 2.0) * MASS  # N: the right answer to 00.1
 TIMES = 300  # tries of each of those who record at once
 
 
@@ -91,7 +92,7 @@ def test_progress_is_kept_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
     check("00.1", None)
     assert progress.load() == {}
     marks = []
-    for answer in (None, 3.0, 9.81 * MASS):
+    for answer in (None, 3.0, LIFTED):
         check("00.1", answer)
         show_progress()
         marks += re.findall("00.1 (.)", capsys.readouterr().out)
@@ -103,14 +104,15 @@ def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     show_progress()
-    assert "Tries" not in capsys.readouterr().out
+    assert "cannot be kept" not in capsys.readouterr().out
     (tmp_path / "file").write_text("")
     monkeypatch.delenv("FLOATBASE_HOME")
     monkeypatch.setenv(home, str(tmp_path / "file"))
     assert not check("00.1", 3.0).right
     assert progress.load() == {}
     show_progress()
-    assert re.search(rf"\nTries cannot be kept in {tmp_path / 'file'}.*: .*\. Set FLOATBASE_HOME", capsys.readouterr().out)
+    said = rf"\nTries and predictions cannot be kept in {tmp_path / 'file'}.*: .*\. Set FLOATBASE_HOME"
+    assert re.search(said, capsys.readouterr().out)
 
 
 def test_without_any_home_a_check_still_works(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,7 +137,7 @@ DAMAGED = (
 def test_damage_is_left_out_and_left_as_it_is(tmp_path: Path, name: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / name).write_text(text)
     check("00.1", 3.0)
-    check("00.1", 9.81 * MASS)
+    check("00.1", LIFTED)
     assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
     reveal("00.1")
     show_progress()
@@ -178,9 +180,14 @@ def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(tmp_path:
 
 def test_wrong_answers_to_00_1_get_the_hint_that_fits() -> None:
     wrong = [
-        (MASS, "a mass in kg"),
-        (-9.81 * MASS, "what the robot does to the ground"),
-        (9.81 * MASS / 4, "share of one foot"),
+        (9.81 * MASS, "the weight alone"),
+        (2.0 * MASS, "m a, the sum of all forces"),
+        ((9.81 - 2.0) * MASS, "accelerate downwards"),
+        (9.81 + 2.0, "an acceleration"),
+        (9.81 * MASS + 2.0, "must be multiplied by the mass"),
+        (2.0 * MASS + 9.81, "g without the mass"),
+        (-LIFTED, "what the robot does to the ground"),
+        (LIFTED / 4, "share of one foot"),
         ([1.0, 2.0], "shape"),
         (float("nan"), "not finite"),
         ("heavy", "should be numbers"),
@@ -196,11 +203,11 @@ def test_the_hints_of_every_exercise_are_tried() -> None:
     assert tried == set(all_exercises())
 
 
-@pytest.mark.parametrize(("name", "share"), [("00.1", 1.0), ("01.3", 0.7)])
-def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str, share: float) -> None:
+@pytest.mark.parametrize(("name", "share", "upwards"), [("00.1", 1.0, 2.0), ("01.3", 0.7, 0.0)])
+def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str, share: float, upwards: float) -> None:
     mass = fb.load("go2").mass
-    assert right(name, share * mass * 9.8)
-    assert missed(name, [(share * mass * 10.0, "g as 10")]) == []
+    assert right(name, share * mass * (9.8 + upwards))
+    assert missed(name, [(share * mass * (10.0 + upwards), "g as 10")]) == []
 
 
 @pytest.mark.parametrize("name", ["01.3", "03.1", "04.2"])

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hints import missed, right
 
 import floatbase as fb
 from floatbase.lessons import joint_servo, lesson01
-from floatbase.robots import Robot, unbolted
+from floatbase.robots import PLATE, Foot, Robot, unbolted
 
 F_R = np.array([-60.0, 0.0, 0.0])
+WIDE_ENOUGH = 0.6596  # m: by hand, 2 (120 N · 0.6340 m / 205.95 N - 0.0396 m)
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +55,56 @@ def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(go2: Robot, 
             ends = arrow[2, 3], arrow[2, 3] + arrow[2, 2]
             assert ends[1] - ends[0] == pytest.approx(0.003 * thrust)
             assert max(ends) == pytest.approx(foot[2])
+    finally:
+        view.close()
+
+
+@pytest.fixture(scope="module")
+def pressing(arm: Robot) -> Robot:
+    """The arm on its plate."""
+    return unbolted(arm, plate=True)
+
+
+def outcome(pressing: Robot, width: float, press: float) -> str:
+    """How two seconds of pressing end on a plate of that width, m, on the physics engine."""
+    corners = [[x * width / 2, y * width / 2, -PLATE[1]] for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    robot = replace(pressing, feet=(Foot(pressing.base, corners=np.array(corners)),))
+    state, force = robot.standing(), np.array([-press, 0.0, 0.0])
+    hold = (state.h - state.frame_jacobian("tool0")[:3].T @ force)[6:]
+    servo = joint_servo(state, hold, stiffness=400.0, damping=40.0)
+    return fb.rollout(fb.Simulation(robot), servo, 2.0, [fb.Push(force, 0.0, 2.0, "tool0")]).outcome
+
+
+def test_the_smallest_robot_is_newtons_law() -> None:
+    box = fb.load_urdf(lesson01.LIFT, floating=False).standing()
+    assert (box.M.item(), box.h.item()) == pytest.approx((5.0, 5.0 * 9.81))
+
+
+def test_the_centre_of_mass_leaves_every_point_of_the_base(go2: Robot) -> None:
+    view = fb.Viewer(go2)
+    try:
+        panel = lesson01.centre_panel(view, go2.standing())
+        slider = panel.sliders["swing_forwards"]
+        seen = []
+        for swung in (slider.min, slider.max):
+            slider.value = swung
+            seen.append((view.canvas.picture, panel.note.value))
+        (back, note), (forth, other_note) = seen
+        np.testing.assert_array_equal(back["axes/axes"].matrix, forth["axes/axes"].matrix)
+        assert (forth["com/ball"].matrix - back["com/ball"].matrix)[0, 3] > 0.02 and note != other_note
+        assert "ground" not in back
+    finally:
+        view.close()
+
+
+def test_the_pressing_panel_names_the_busiest_motor_and_its_limit(arm: Robot) -> None:
+    view = fb.Viewer(arm, scale=0.005)
+    try:
+        panel = lesson01.pressing_panel(view, arm.standing())
+        panel.sliders["press"].value = 120.0
+        assert "busiest motor: wrist_1_joint, 11 of 28 N·m" in panel.note.value
+        panel.sliders["press"].value = 0.0
+        assert "wall on tool <b>0 N</b>, bolts on base <b>0 N</b>" in panel.note.value
     finally:
         view.close()
 
@@ -128,3 +181,33 @@ def test_thrusts_by_the_lever_rule_are_right_in_either_shape_and_wrong_ones_get_
         ("up", "should be numbers"),
     ]
     assert missed("01.4", wrong) == []
+
+
+def test_wrong_widths_of_the_plate_get_their_hint(pressing: Robot) -> None:
+    state = pressing.standing()
+    height, ahead = state.point("tool0")[2], state.com[0]
+    holds = pressing.weight * (ahead + PLATE[0] / 2) / height
+    wrong = [
+        (WIDE_ENOUGH / 2, "as far to the front"),
+        (2 * (120 * (height - PLATE[1]) / pressing.weight - ahead), "from there, not from the base"),
+        (2 * 120 * height / pressing.weight, "not above the middle"),
+        (2 * (120 * height / pressing.weight + ahead), "is that good or bad"),
+        (PLATE[0], "with 120 N it tips"),
+        (PLATE[0] * 120 / holds, "in proportion"),
+        (2 * (60 * height / pressing.weight - ahead), "holds 60 N"),
+        (2 * (120 * height / pressing.mass - ahead), "one more factor"),
+        (2 * (pressing.weight * height / 120 - ahead), "exchanged"),
+        (-WIDE_ENOUGH, "sign"),
+        (1e3 * WIDE_ENOUGH, "Neither right"),
+        ([WIDE_ENOUGH, WIDE_ENOUGH], "one number"),
+        (None, "no answer yet"),
+    ]
+    assert missed("01.5", wrong) == []
+
+
+@pytest.mark.parametrize(("part", "expected"), [(0.97, "fell"), (1.03, "completed")])
+def test_the_right_width_of_the_plate_is_the_one_from_which_on_the_engine_lets_the_arm_stand(
+    pressing: Robot, part: float, expected: str
+) -> None:
+    assert right("01.5", WIDE_ENOUGH)
+    assert outcome(pressing, part * WIDE_ENOUGH, 120.0) == expected

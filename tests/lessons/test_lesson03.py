@@ -10,12 +10,13 @@ import pytest
 from hints import missed, right
 
 import floatbase as fb
-from floatbase.dynamics import dimensions, internal_forces
+from floatbase.dynamics import dimensions, internal_forces, torque_force_matrix
 from floatbase.lessons import ConstantTorques
 from floatbase.lessons.lesson03 import (
     bars,
     direction,
     matrix_picture,
+    rising_solo8,
     show_beta,
     show_knee,
     space_of,
@@ -26,6 +27,7 @@ from floatbase.lessons.lesson03 import (
 )
 
 GO2 = fb.load("go2")
+RANK_TOLERANCE = 1e-9  # of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below
 WOBBLE = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])  # forces without a sum and without a moment
 
 
@@ -103,6 +105,62 @@ def test_03_3_knows_what_is_wrong() -> None:
     assert missed("03.3", [(answer, hint) for hint, answer in wrong.items()]) == []
 
 
+def pairs_by_svd(C: Any, right_side: Any, tolerance: float = RANK_TOLERANCE) -> Any:
+    """v and V⊥ of C x = right_side as columns, by (11)."""
+    U, s, Vt = np.linalg.svd(C)
+    r = int(np.sum(s > tolerance * s[0]))
+    return np.column_stack([Vt[:r].T @ (U[:, :r].T @ right_side / s[:r]), Vt[r:].T])
+
+
+def test_03_4_takes_any_orthonormal_columns_behind_the_shortest_pair() -> None:
+    built = pairs_by_svd(*torque_force_matrix(rising_solo8()))
+    assert built.shape == (20, 11)
+    assert right("03.4", built)
+    turned = np.linalg.qr(np.random.default_rng(0).standard_normal((10, 10)))[0]
+    assert right("03.4", np.column_stack([built[:, 0], built[:, 1:] @ turned]))
+
+
+def test_03_4_knows_what_was_forgotten_and_what_was_miscounted() -> None:
+    eom = rising_solo8()
+    C, right_side = torque_force_matrix(eom)
+    built, drop, J_M = pairs_by_svd(C, right_side), eom.J @ np.linalg.solve(eom.M, eom.h), eom.J @ eom.M
+    v, V = built[:, 0], built[:, 1:]
+    Vt = np.linalg.svd(C)[2]
+    not_inverted = pairs_by_svd(np.hstack([J_M @ eom.S, J_M @ eom.J.T]), eom.b + J_M @ eom.h)
+    wrong = [
+        (pairs_by_svd(C, drop), "b is missing"),
+        (pairs_by_svd(C, eom.b), "h is missing"),
+        (pairs_by_svd(C, eom.b - drop), "The sign of h"),
+        (pairs_by_svd(C, drop - eom.b), "The sign of b"),
+        (not_inverted, "M is not inverted"),
+        (np.column_stack([v + 0.1 * V[:, 0], V]), "longer than need be"),
+        (np.column_stack([v, Vt[12:].T]), "not every row says"),
+        (np.column_stack([v, Vt[:, 10:]]), "its rows are the directions"),
+        (np.column_stack([v, Vt[:10].T]), "its rows are the directions"),
+        (np.column_stack([v, V, V[:, 0] + Vt[0]]), "not to zero"),
+        (np.column_stack([v, 2.0 * V]), "not orthonormal"),
+        (built[:, :-1], "1 missing"),
+        (built[:, ::-1], "does not solve"),
+        (np.zeros((20, 9)), "still zero"),
+        (built.T, "These are rows"),
+        (np.zeros((34, 11)), "with q̈"),
+        (v, "One matrix"),
+        (3.0, "One matrix"),
+        (np.full((20, 11), np.nan), "not finite"),
+        (None, "no answer yet"),
+    ]
+    assert missed("03.4", wrong) == []
+
+
+def test_the_solo8_of_03_4_moves_without_asking_its_feet_for_the_impossible() -> None:
+    eom = rising_solo8()
+    assert np.linalg.matrix_rank(eom.J, tol=RANK_TOLERANCE) == 10
+    np.testing.assert_allclose(eom.J @ eom.state.v, 0.0, atol=1e-12)
+    assert abs(eom.b).max() > 0.1
+    reached = eom.J @ np.linalg.pinv(eom.J, rcond=RANK_TOLERANCE) @ eom.b
+    np.testing.assert_allclose(reached, eom.b, atol=1e-12)
+
+
 @pytest.mark.parametrize("frames", [(), ("FL_foot", "FR_foot", "RL_foot"), ("FL_foot",)], ids=len)
 def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forces(frames: tuple[str, ...]) -> None:
     space = space_of(GO2, *frames)
@@ -111,15 +169,6 @@ def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forc
     np.testing.assert_allclose((space.qdd.A @ step)[:6], desired, atol=1e-9)
     free = np.linalg.svd(space.qdd.A[:6])[2][6:].T
     np.testing.assert_allclose((space.forces.A @ free).T @ (space.forces.A @ step), 0.0, atol=1e-7)
-
-
-def test_a_squeeze_is_a_direction_that_moves_nothing() -> None:
-    space = space_of(GO2)
-    apart = np.zeros(12)
-    apart[1], apart[4] = 1, -1
-    step = direction(space, squeeze=apart)
-    np.testing.assert_allclose(space.qdd.A @ step, 0.0, atol=1e-9)
-    np.testing.assert_allclose(space.forces.A @ step, apart, atol=1e-9)
 
 
 def test_standing_still_is_in_the_space_and_still() -> None:
@@ -193,3 +242,16 @@ def test_the_veil_of_a_motion_is_not_called_a_posture() -> None:
     finally:
         view.close()
     assert "leads in a quarter" in drawn and "posture" not in drawn
+
+
+def test_a_motion_is_drawn_without_cones_on_request() -> None:
+    space = space_of(GO2)
+    view = fb.Viewer(GO2)
+    try:
+        show_beta(view, space, standing_still(space), cones=False)
+        without = str(view.window.scene.file_commands())
+        show_beta(view, space, standing_still(space))
+        drawn = str(view.window.scene.file_commands())
+    finally:
+        view.close()
+    assert "friction cone" not in without and "friction cone" in drawn

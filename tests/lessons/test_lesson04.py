@@ -22,9 +22,11 @@ from floatbase.lessons.lesson04 import (
     slices,
     tilted,
 )
+from floatbase.linear_algebra import null_space, rank
 from floatbase.objectives import seen_from_best, seen_from_smallest, tangential_bias
 
 GO2 = fb.load("go2")
+ROUNDING = 1e-6  # of orthonormal columns, and of their product with v, which counts forces in thousands where the unit is 1 mN
 EFFORT = fb.Quadratic.from_residual(np.eye(12), np.zeros(12))
 
 
@@ -54,7 +56,7 @@ def test_04_1_knows_sign_frame_transpose_drift_offset_and_shape() -> None:
         "both forgotten": slope @ (-DESIRED),
         "The frame: `desired` is in world axes, as": slope @ (J @ b + drift - R @ DESIRED),
         "The frame: `desired` is in world axes already": slope @ (J @ b + drift - R.T @ DESIRED),
-        "transpose of A": np.linalg.pinv(A) @ J.T @ (J @ b + drift - DESIRED),
+        "transpose of η": np.linalg.pinv(A) @ J.T @ (J @ b + drift - DESIRED),
         "½": 2 * gradient,
         "standing robot": com_cost(standing_go2()).pullback(fb.accelerations_from_torques(eom)).g,
         "nothing there yet": np.zeros(12),
@@ -70,8 +72,9 @@ def test_04_1_knows_sign_frame_transpose_drift_offset_and_shape() -> None:
 
 
 def test_04_2_knows_each_wrong_count() -> None:
-    assert right("04.2", 6)
-    assert missed("04.2", {9: "alone", 3: "free leg", 12: "q̈", 0: "with effort"}.items()) == []
+    assert right("04.2", 3)
+    hints = {6: "all flat", 9: "alone", 0: "Neither cost", 1: "more than one direction", 2: "Upwards", 12: "all of β"}
+    assert missed("04.2", [*hints.items(), (5, "Neither right"), (None, "no answer yet")]) == []
 
 
 def test_04_3_takes_any_cost_whose_least_point_does_it() -> None:
@@ -101,11 +104,23 @@ def test_04_3_knows_what_is_wrong() -> None:
     assert missed("04.3", [(answer, hint) for hint, answer in wrong.items()]) == []
 
 
+@pytest.mark.parametrize("feet", [("FL_foot", "FR_foot", "RL_foot"), ("FL_foot", "FR_foot", "RL_foot", "RR_foot")])
+def test_04_2_counts_the_flat_directions_that_accelerate_the_free_foot(feet: tuple[str, ...]) -> None:
+    space = space_of(GO2, *feet)
+    eom = space.eom
+    flat = null_space((com_cost(eom) + turn_cost(eom)).pullback(space.qdd).H)
+    moving = rank(eom.state.frame_jacobian("RR_foot")[:3] @ space.qdd.A @ flat, absolute=True)
+    assert flat.shape[1] == 6 and moving == (3 if len(feet) == 3 else 0)
+
+
 def test_other_units_give_the_same_motions_and_the_same_least_effort() -> None:
     space = space_of(GO2)
     least, with_shortest = [], []
     for newtons in (1e-3, 1.0, 1e3):
-        same = counted_in(space, newtons)
+        W = np.diag(np.repeat([1, 1, 1 / newtons], [18, 12, 12]))
+        same = counted_in(space, W)
+        V, v = W @ same.map.A, W @ same.map.b
+        assert max(abs(V.T @ V - np.eye(12)).max(), abs(V.T @ v).max()) < ROUNDING
         beta = np.random.default_rng(0).standard_normal(same.dimension)
         motion, feet = same.eom.residual(*same(beta))
         assert max(abs(motion).max(), abs(feet).max()) < 1e-6

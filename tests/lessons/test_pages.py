@@ -56,6 +56,8 @@ CURVE = """import matplotlib.pyplot as plt
 
 plt.plot([1, 2]);
 """
+PREDICT = 'from floatbase.lessons import predict\npredict("07.a", ..., unit="mm")'
+CLAIMS = "# claims of the text above\nassert state.com[2] > 0.2"
 CHECK = 'from floatbase.lessons import check\ncheck("00.1", 100.0)'
 
 
@@ -65,6 +67,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("lessons")
     cells: list[Any] = [new_markdown_cell(TEXT)]
     cells += [new_code_cell(code) for code in (ROBOT, STILL, STILL, MOVING, SLIDER, CURVE)]
+    cells += [new_code_cell(PREDICT, metadata={"tags": ["predict"], "prediction": "07.a"})]
+    cells += [new_code_cell(CLAIMS, metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}})]
     cells += [new_code_cell("total = 100.0", metadata={"exercise": "00.1", "tags": ["exercise"]})]
     cells += [new_code_cell(CHECK, metadata={"tags": ["check"]})]
     nbformat.write(new_notebook(cells=cells), folder / "07_page.ipynb")
@@ -96,6 +100,8 @@ def test_a_page_says_what_the_lesson_says_and_what_a_slider_does(built: Path) ->
     assert "answers to the slider <b>up [m]</b>, from −2 to 4 (here 1)" in text
     assert 'class="figure"' in text
     assert "total = " not in text and 'class="cell exercise"' in text  # coloured, so in parts
+    assert "skipped" not in text and text.count('class="cell exercise"') == 2  # a question to answer, too
+    assert text.count("<details") == 1 and text.index("<summary") < text.index("# claims of the text above")
     assert "compiling" not in text  # what this run alone had to say
     assert "Not yet" not in text and "FLOATBASE" not in text and "retina" not in text
 

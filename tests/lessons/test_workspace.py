@@ -68,6 +68,23 @@ def test_a_copy_does_not_answer_what_it_asks_the_learner_to_predict(course: Path
     assert nbformat.read(course / MINE / LESSON, as_version=4).cells[0].outputs == []
 
 
+def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> None:
+    question = new_code_cell('predict("00.a", ..., unit="mm")', metadata={"tags": ["predict"], "prediction": "00.a"})
+    claims = new_code_cell("assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}})
+    question.outputs = [new_output("stream", text="00.a: skipped. Running on is fine.")]
+    nbformat.write(new_notebook(cells=[question, claims]), course / LESSON)
+    prepare(course)
+    copied = nbformat.read(course / MINE / LESSON, as_version=4).cells
+    assert [(cell.source, cell.metadata) for cell in copied] == [(cell.source, cell.metadata) for cell in (question, claims)]
+    assert copied[0].outputs == []
+
+    copied[0].source = 'predict("00.a", 40, unit="mm")'
+    nbformat.write(new_notebook(cells=copied), course / MINE / LESSON)
+    update(course)
+    prepare(course)
+    assert source(course / MINE / LESSON) == copied[0].source  # what was predicted is the learner's writing
+
+
 def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
     assert prepare(course) == [f"{LESSON}: new"]
     write(course / MINE / LESSON, "first = 'my answer'")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import judges
 import numpy as np
 
@@ -101,13 +105,49 @@ def test_a_resting_robot_that_stands_where_it_should_is_given_no_acceleration(na
 def test_targets_may_be_functions_of_time() -> None:
     state = judges.load("go2").random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    path = fb.CoMTask(lambda t: [t, 0.0, 0.0], lambda t: [1.0, t, 0.0], lambda t: [0.0, 1.0, t], kp=4.0)
-    still = fb.CoMTask([2.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 2.0], kp=4.0)
-    assert np.allclose(path.residual(eom, 2.0).b, still.residual(eom, 0.0).b)
-    assert not np.allclose(path.residual(eom, 1.0).b, still.residual(eom, 0.0).b)
-    turn = fb.OrientationTask("base", lambda t: judges.rotation([0.0, 0.0, t]))
-    there = fb.OrientationTask("base", judges.rotation([0.0, 0.0, 0.3]))
-    assert np.allclose(turn.residual(eom, 0.3).b, there.residual(eom).b)
+    p, v, a = [2.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 2.0]
+    R, q, w = judges.rotation([0.0, 0.0, 0.3]), state.integrate(np.full(18, 0.1)), np.linspace(-1.0, 1.0, 12)
+    kinds = [
+        (partial(fb.CoMTask, kp=4.0), (p, v, a)),
+        (partial(fb.FrameTask, "FL_foot"), (p, v, a)),
+        (partial(fb.OrientationTask, "base"), (R, v, a)),
+        (fb.PostureTask, (q, w, 2.0 * w)),
+    ]
+    for task, (x, *rates) in kinds:
+        alone, still = task(lambda t, x=x: x), task(x)
+        for together in ((x, *rates), [x, *rates]):
+            moving = task(lambda t, x=x, given=together: given if t == 2.0 else x)
+            assert np.array_equal(moving.residual(eom, 2.0).b, task(x, *rates).residual(eom).b)
+            assert np.array_equal(moving.residual(eom, 1.0).b, still.residual(eom).b)
+        assert np.array_equal(alone.residual(eom, 1.0).b, still.residual(eom).b)
+        assert not np.allclose(task(x, *rates).residual(eom).b, still.residual(eom).b)
+    rows = fb.CoMTask(lambda t: np.array([p, v, a]))
+    assert np.array_equal(rows.residual(eom).b, fb.CoMTask(p, v, a).residual(eom).b)
+
+
+def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag() -> None:
+    """A critically damped task lags behind a slow target by (kd / kp) times its velocity, unless it is given that too."""
+    robot, amplitude, rate = judges.load("go2"), 0.01, 2.0  # m, rad/s
+    state, asked = robot.standing(), []
+
+    def path(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        asked.append(t)
+        side = np.array([0.0, amplitude, 0.0])
+        return state.com + side * np.sin(rate * t), side * rate * np.cos(rate * t), -side * rate**2 * np.sin(rate * t)
+
+    def error(position: Callable[[float], Any]) -> float:
+        tasks = [fb.CoMTask(position, weight=1e3), *fb.standing_tasks(state)[1:]]
+        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
+        asked.clear()
+        run = fb.rollout(fb.Simulation(robot), controller, 1.5)
+        assert run.outcome == "completed"
+        wanted = state.com[1] + amplitude * np.sin(rate * run.time)
+        return float(np.max(np.abs(run.com[1000:, 1] - wanted[1000:])))
+
+    lag = error(lambda t: path(t)[0])
+    assert 0.7 < lag / (0.2 * amplitude * rate) < 1.1  # kd / kp = 0.2 s
+    assert error(path) < 0.1 * lag
+    assert len(asked) == len(set(asked))
 
 
 def test_damping_is_critical_unless_it_is_given() -> None:

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +80,48 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     calls = (tmp_path / "calls").read_text().split()
     assert set(calls) == {str(i) for i in range(60)}
     assert len(calls) - 60 <= 2 * 2  # for each of two workers the point that it was at, and the next
+
+
+def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400, -1))  # bytes, of a file: a disc that is full"
+    script.write_text(f"{limit}\n{SCRIPT}")
+    command = [sys.executable, "script.py"]
+    full = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    kept = Table.read(tmp_path / "marked.jsonl")
+    assert full.returncode == 1 and 0 < len(kept) < 60
+    last = "InputError: marked.jsonl cannot be written to: File too large. The rows before are kept: once the file takes more, "
+    assert full.stderr.splitlines()[-1].endswith(last + "the same sweep goes on from them.")
+    assert (tmp_path / "marked.jsonl").stat().st_size == 400, "the last row was written in part"
+    script.write_text(SCRIPT)
+    before = len((tmp_path / "calls").read_text().split())
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    table = Table.read(tmp_path / "marked.jsonl")
+    assert table.rows == tuple({"i": i, "result": i / 7, "error": None} for i in range(60))
+    assert len((tmp_path / "calls").read_text().split()) - before == 60 - len(kept)
+
+
+def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path: Path) -> None:
+    def patient(made: None, i: int) -> int:
+        (tmp_path / "begun").touch()
+        until = time.monotonic() + 60.0
+        while not (tmp_path / "failed").exists() and time.monotonic() < until:
+            time.sleep(0.02)
+        return i
+
+    def setup() -> None:
+        with (tmp_path / "setups").open("a") as setups:
+            setups.write("x")
+
+    with ThreadPoolExecutor(1) as thread:
+        running = thread.submit(fb.sweep, patient, {"i": [0, 1, 2, 3]}, setup=setup, workers=1, progress=False)
+        while not (tmp_path / "begun").exists() and not running.done():
+            time.sleep(0.02)
+        with pytest.raises(InputError, match="holds a value of type object"):
+            fb.sweep(lambda i: object(), {"i": [0, 1]}, workers=1, progress=False)
+        (tmp_path / "failed").touch()
+        assert list(running.result()["result"]) == [0, 1, 2, 3]
+    assert (tmp_path / "setups").read_text() == "x"
 
 
 def test_workers_of_a_dask_cluster_give_the_same_table() -> None:

@@ -20,10 +20,9 @@ from floatbase._arrays import Array
 from floatbase.control.problem import Problem, assemble_qp, residual_of
 from floatbase.control.tick.own import Given, Own
 from floatbase.control.tick.tables import dynamics_of, tables_of
-from floatbase.errors import InputError
-from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, TorqueTask, nearest_rotation
+from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, TorqueTask, target_shapes, targets_at
 from floatbase.qp import QP
-from floatbase.robots import Robot, State, check_unit_lengths
+from floatbase.robots import Robot, State
 
 # joints whose axes stand still in their own frame
 _JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
@@ -96,7 +95,7 @@ class Compiled:
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics = problem, dynamics_of(robot)
         *tables, targets, self._moving = tables_of(problem)
-        self.own, moving = Own(problem, self.dynamics), {target.task for target in self._moving}
+        self.own, moving = Own(problem, self.dynamics), {each.number for each in self._moving}
         still = (CoMTask, OrientationTask, FrameTask, ForceTask, TorqueTask)
         self.unknown = [task for i, task in enumerate(problem.tasks) if i in moving or type(task) not in still]
         self.given, self.n_targets = self.own.nothing(targets), targets.size
@@ -148,8 +147,11 @@ class Compiled:
     def qp(self, q: Array, v: Array, t: float, given: Given) -> QP:
         """The readable QP of a tick, with what its functions returned then: called again, they may return something else."""
         values: dict[int, dict[str, Any]] = {}
-        for at, first, shape, name, _ in self._moving:
-            values.setdefault(at, {})[name] = given.numbers[first : first + prod(shape)].reshape(shape)
+        for number, task, first in self._moving:
+            values[number] = {}
+            for name, shape in target_shapes(task, self._problem.robot, self._problem.contacts.k).items():
+                values[number][name] = given.numbers[first : first + prod(shape)].reshape(shape)
+                first += prod(shape)
         eom, costs = self.own.equations(State(self._problem.robot, q, v), t, given), []
         for i, task in enumerate(self._problem.tasks):
             still = replace(cast(Any, task), **values[i]) if i in values else task
@@ -187,14 +189,9 @@ class Compiled:
 
     def _targets_at(self, t: float) -> Array:
         """All targets at time t. Raises `InputError` for a bad one."""
-        targets, robot = self.given.numbers[: self.n_targets].copy(), self._problem.robot
-        for _, first, shape, name, function in self._moving:
-            value: Array = np.asarray(function(t), dtype=np.float64)
-            if value.shape != shape:
-                raise InputError(f"{name} has shape {value.shape}; it must have shape {shape}.")
-            if name == "rotation":
-                value = nearest_rotation(name, value)
-            if name == "q":
-                check_unit_lengths(robot.model, name, value, first=2 if robot.is_floating else 1)
-            targets[first : first + value.size] = value.ravel()
+        targets, robot, k = self.given.numbers[: self.n_targets].copy(), self._problem.robot, self._problem.contacts.k
+        for _, task, first in self._moving:
+            for value in targets_at(task, robot, k, t):
+                targets[first : first + value.size] = value.ravel()
+                first += value.size
         return targets

@@ -20,7 +20,7 @@ class TaskTable(NamedTuple):
     table: Any  # (N, 3), kind, joint, first number in targets
     gains: Any  # (N, 3), weight, kp, kd
     frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
-    targets: Any  # of all tasks, one after the other: position or rotation row by row, velocity, acceleration
+    targets: Any  # of all tasks, one after the other: position, rotation row by row or q, then velocity and acceleration
     first: Any  # where tasks of one's own start among them, one after the other: block, m, weight, A (m, n), b (m,)
     own: Any  # how many these are
     rows: Any  # the sum of their m
@@ -76,12 +76,15 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
 
 @jit
 def posture_error(tree, q, v, target, base, e, e_dot):
-    """e and ė (d,) of all joints, the first at `base` in v, from q and target (nq,); unlimited ones are (cos, sin) in q."""
+    """e and ė (d,) of all joints, the first at `base` in v; unlimited ones are (cos, sin) in q.
+
+    target: q (nq,), then velocities (d,).
+    """
     for i in range(1, tree.shape[0]):
         row, at = tree[i, 1] - base, tree[i, 3]
         if row < 0:
             continue
-        e_dot[row] = v[tree[i, 1]]
+        e_dot[row] = v[tree[i, 1]] - target[q.size + row]
         if tree[i, 4] == 1:
             e[row] = q[at] - target[at]
         else:
@@ -122,8 +125,11 @@ def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Space, base, works
             first = nv + k if kind == TORQUE else (nv if kind == FORCE else base)
             if kind == POSTURE:
                 posture_error(bodies.tree, q, v, tasks.targets[at:], base, e_joint, e_dot_joint)
+                at += q.size + d  # the accelerations
             for j in range(k if kind == FORCE else d):
-                desired = -kp * e_joint[j] - kd * e_dot_joint[j] if kind == POSTURE else tasks.targets[at + j]
+                desired = tasks.targets[at + j]
+                if kind == POSTURE:
+                    desired -= kp * e_joint[j] + kd * e_dot_joint[j]
                 weights[first + j] += w
                 weighted[first + j] += w * desired
     used = own_costs(used, tasks, space, nv, R)

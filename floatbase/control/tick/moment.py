@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections import deque
 from typing import Any
 
 import pinocchio as pin
 
-from floatbase._arrays import Array, read_only
+from floatbase._arrays import Array, sealed
 from floatbase.control.tick.tables import Dynamics
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.robots import State
@@ -22,40 +22,21 @@ class TickState(State):
     q, v: (nq,), (nv,), which nobody else may write to.
     """
 
+    _spare: deque[pin.Data]
+
     def __init__(self, dynamics: Dynamics, q: Array, v: Array):
-        q, v = q.view(), v.view()
-        q.flags.writeable = v.flags.writeable = False
-        self.__dict__.update(robot=dynamics.robot, q=q, v=v, _spare=dynamics.spare, _still=dynamics.still)
+        self.__dict__.update(robot=dynamics.robot, q=sealed(q.view()), v=sealed(v.view()), _spare=dynamics.spare)
 
-    @cached_property
-    def _data(self) -> pin.Data:
-        """What `State` computes, but for M and h, with which whoever asks for positions or Jacobians need not wait."""
-        model, spare = self.robot.model, self.__dict__["_spare"]
+    def _memory(self) -> pin.Data:
+        """What another state has given back, where there is some."""
         try:
-            data = spare.pop()
+            return self._spare.pop()
         except IndexError:
-            data = model.createData()
-        pin.forwardKinematics(model, data, self.q, self.v, self.__dict__["_still"])
-        pin.centerOfMass(model, data, pin.KinematicLevel.ACCELERATION, False)
-        pin.jacobianCenterOfMass(model, data, False)
-        pin.computeJointJacobians(model, data)
-        pin.updateFramePlacements(model, data)
-        return data
-
-    @cached_property
-    def M(self) -> Array:
-        """As `State.M`."""
-        pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD)
-        return read_only(self._data.M)
-
-    @cached_property
-    def h(self) -> Array:
-        """As `State.h`."""
-        return read_only(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
+            return super()._memory()
 
     def __del__(self) -> None:
         if "_data" in self.__dict__:
-            self.__dict__["_spare"].append(self.__dict__["_data"])
+            self._spare.append(self._data)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return State, (self.robot, self.q, self.v)
@@ -81,12 +62,12 @@ class TickEquations(EquationsOfMotion):
     @property
     def nv(self) -> int:
         """Length of q̈."""
-        return self.robot.nv
+        return self.state.robot.nv
 
     @property
     def d(self) -> int:
         """Length of τ."""
-        return self.robot.d
+        return self.state.robot.d
 
     @property
     def k(self) -> int:

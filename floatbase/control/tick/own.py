@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -26,12 +26,12 @@ class Given(NamedTuple):
 
     numbers: Array  # targets, least and largest normal force of each point, then own contacts, tasks and rows
     rows: int = 0  # of all tasks of one's own
-    contacts: tuple[tuple[Array, Array, Array], ...] = ()  # A, b and J of each own contact
+    contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each own contact
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType(
         {}
     )  # weight and residual of tasks of one's own, by their number
     normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))  # least and largest of each point, (P,)
-    inequalities: tuple[tuple[Array, Array], ...] = ()  # G and h of rows of one's own
+    inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of rows of one's own
 
 
 class Own:
@@ -46,15 +46,16 @@ class Own:
         self._contacts = [contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS]
         self.any = bool(self._tasks or self._contacts or self._limits.rows)
         self.changes = self.any or self._limits.move
-        self._bounds = _finite(self._limits.normal_forces(problem.contacts))
+        bounds = np.zeros((2, problem.contacts.n_points))  # of those that move: they are asked at a time
+        self._still = (bounds[0], bounds[1]) if self._limits.move else self._limits.normal_forces(problem.contacts)
+        self._bounds = _finite(self._still)
 
     def nothing(self, targets: Array) -> Given:
         """Targets, what still bounds of normal forces are, and otherwise as many zeros as a tick without a state needs."""
-        contacts, nv = self._problem.contacts, self._problem.robot.nv
-        bounds = self._limits.normal_forces(contacts)
+        nv = self._problem.robot.nv
         own = sum(len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts)
         nothing = np.zeros(own + 3 * len(self._tasks) + 2 * len(self._limits.rows))
-        return Given(np.concatenate([targets, *self._bounds, nothing]), normal_forces=bounds)
+        return Given(np.concatenate([targets, *self._bounds, nothing]), normal_forces=self._still)
 
     def given(self, targets: Array, q: Array, v: Array, t: float) -> Given:
         """What a tick is given at a state. Raises `InputError`, or what functions of the owner's raise."""
@@ -64,21 +65,24 @@ class Own:
         if not self.any:
             return Given(np.concatenate(parts), normal_forces=bounds)
         eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)
-        contacts = tuple(_motion(contact, eom.state, t) for contact in self._contacts)
-        for A, b, J in contacts:
-            parts += [A.ravel(), b, J.ravel()]
-        residuals, rows = {}, 0
+        contacts, residuals, rows, inequalities = [], {}, 0, []
+        for contact in self._contacts:
+            A, b, J = _motion(contact, eom.state, t)
+            contacts.append((A, b, J))
+            parts += A.ravel(), b, J.ravel()
         for i, task, block in self._tasks:
             residual, weight = residual_of(task, eom, t), float(task.weight)
             if not weight >= 0.0:
                 raise InputError(f"weight of {task.name} is {weight:g}; it must be ≥ 0.")
-            residuals[i] = weight, residual
-            rows += residual.n_out
-            parts += [(block, residual.n_out, weight), residual.A.ravel(), residual.b]
-        inequalities = tuple(each.at(eom, t) for each in limits.rows)
-        for each, (G, h) in zip(limits.rows, inequalities, strict=True):
-            each.labels(len(h))
-            parts += [(BLOCKS[each.block], len(h)), G.ravel(), h]
+            residuals[i], A, b = (weight, residual), residual.A, residual.b
+            rows += len(b)
+            parts += (block, len(b), weight), A.ravel(), b
+        for each in limits.rows:
+            G, h = each.at(eom, t)
+            if each.owners:
+                each.labels(len(h))  # raises where there is another number of them
+            inequalities.append((G, h))
+            parts += (BLOCKS[each.block], len(h)), G.ravel(), h
         return Given(np.concatenate(parts), rows, contacts, residuals, bounds, inequalities)
 
     def equations(self, state: State, t: float, given: Given) -> EquationsOfMotion:
@@ -99,7 +103,8 @@ def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
 def _motion(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
     """A, b and J of a contact. Raises `InputError` where they do not have the shapes that the contact says."""
     A, b = map(read_only, contact.constraint(state, t))  # it may write to its own arrays in the next tick
-    J = A if isinstance(contact, LinearConstraint) else read_only(contact.jacobian(state, t))  # asks its function once
+    is_linear = getattr(type(contact), "jacobian", None) is LinearConstraint.jacobian  # then its function is asked once
+    J = A if is_linear else read_only(contact.jacobian(state, t))
     m, nv = len(contact.row_names), state.robot.nv
     if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
         raise InputError(f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}.")

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable
 from functools import lru_cache
 from threading import Lock
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
@@ -20,7 +19,17 @@ import pinocchio as pin
 from floatbase._arrays import Array
 from floatbase.dynamics import Contact, FlatFootContact, PointContact
 from floatbase.friction import FrictionPolyhedron
-from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, PostureTask, Task, TorqueTask
+from floatbase.objectives import (
+    CoMTask,
+    ForceTask,
+    FrameTask,
+    OrientationTask,
+    PostureTask,
+    Task,
+    TorqueTask,
+    target_shapes,
+    targets_at,
+)
 from floatbase.robots import Robot
 
 if TYPE_CHECKING:
@@ -46,7 +55,6 @@ class Dynamics:
     tree, links: as in `kinematics.Bodies`.
     lock: held from `update` until the views have been read.
     spare: memory for the results of `moment.TickState`, for making it takes longer than a tick.
-    still: zeros (nv,), an acceleration.
     """
 
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
@@ -54,7 +62,6 @@ class Dynamics:
     def __init__(self, robot: Robot):
         self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
         self.spare: deque[pin.Data] = deque(maxlen=_SPARE)
-        self.still = np.zeros(robot.nv)
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE), (8 * _POSE, 8))
@@ -88,17 +95,15 @@ if hasattr(os, "register_at_fork"):
 dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one for each robot, shared by its controllers
 
 
-class Target(NamedTuple):
-    """A target that is a function of time."""
+class Moving(NamedTuple):
+    """A task whose targets are a function of time."""
 
-    task: int  # whose it is
-    first: int  # where it starts among the targets
-    shape: tuple[int, ...]
-    name: str  # of the task's attribute
-    function: Callable[[float], npt.ArrayLike]
+    number: int  # of the task
+    task: Task
+    first: int  # where its targets start among all
 
 
-def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Target]]:
+def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Moving]]:
     """A problem as what `tick.unpack` takes, with its targets, zeros for those that move, and the moving ones.
 
     Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
@@ -176,32 +181,22 @@ def _task_tables(problem: Problem) -> tuple[Any, ...]:
     known = [i for i, task in enumerate(problem.tasks) if type(task) in TASK_KINDS]
     n, robot = len(known), problem.robot
     table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE))
-    targets, first, moving = [np.zeros(0)], 0, []
+    targets: list[Array] = [np.zeros(0)]
+    first, moving = 0, []
     for i, which in enumerate(known):
         task = problem.tasks[which]
         joint, poses[i] = _frame(robot, task.frame) if isinstance(task, OrientationTask | FrameTask) else (0, np.zeros(_POSE))
         table[i] = TASK_KINDS[type(task)], joint, first
         gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)
-        for name, shape in _target_shapes(task, robot, problem.contacts.k).items():
-            value, target = getattr(task, name), np.zeros(shape)
-            if callable(value):
-                moving.append(Target(which, first, shape, name, value))
-            elif np.shape(value) == shape:
-                target = np.asarray(value)
-            elif value is not None:
-                problem.qp(problem.robot.standing())  # raises
-            targets.append(target.ravel())
-            first += target.size
+        shapes = target_shapes(task, robot, problem.contacts.k)
+        still: list[Array] = [np.zeros(shape) for shape in shapes.values()]
+        if callable(getattr(task, next(iter(shapes)))):
+            moving.append(Moving(which, task, first))
+        else:
+            still = targets_at(task, robot, problem.contacts.k, 0.0)
+        targets += [target.ravel() for target in still]
+        first += sum(target.size for target in still)
     return table, gains, poses, np.concatenate(targets), moving
-
-
-def _target_shapes(task: Task, robot: Robot, k: int) -> dict[str, tuple[int, ...]]:
-    """Shape of each target of a task by its attribute, in the order in which the tick reads them."""
-    if isinstance(task, OrientationTask):
-        return {"rotation": (3, 3), "angular_velocity": (3,), "angular_acceleration": (3,)}
-    if isinstance(task, CoMTask | FrameTask):
-        return {"position": (3,), "velocity": (3,), "acceleration": (3,)}
-    return {"q": (robot.nq,)} if isinstance(task, PostureTask) else {"target": (k if isinstance(task, ForceTask) else robot.d,)}
 
 
 def _frame(robot: Robot, name: str) -> tuple[int, Array]:

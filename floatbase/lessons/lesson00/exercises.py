@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
+
 import floatbase as fb
 from floatbase.lessons.exercises import Exercise, Numeric
 from floatbase.robots import Robot
+
+UP = 2.0  # m/s², the acceleration asked for
 
 
 @cache
@@ -14,31 +18,47 @@ def _go2() -> Robot:
     return fb.load("go2")
 
 
-def _weight_of_links() -> float:
-    """The weight, link by link: not by `robot.weight`."""
-    return 9.81 * sum(inertia.mass for inertia in _go2().model.inertias)
+@cache
+def _sum_of_forces() -> float:
+    """The vertical force row of M q̈ + h when all of the robot accelerates upwards: neither by its mass nor by its weight."""
+    state = _go2().standing()  # its base is level, so that the third row is vertical
+    qdd = np.zeros(_go2().nv)
+    qdd[2] = UP
+    return float((state.M @ qdd + state.h)[2])
+
+
+def _weight() -> float:
+    return _go2().weight
 
 
 EXERCISES = (
     Exercise(
         name="00.1",
-        statement="go2 stands still. How large is the sum of the vertical forces that the ground exerts on its feet, in N?",
-        stub="total = 100.0  # N: replace this number by an expression with robot.mass",
-        solution="total = robot.mass * 9.81",
+        statement="The centre of mass of go2 accelerates upwards at 2 m/s². How large is the sum of the vertical forces that "
+        "the ground exerts on its feet, in N?",
+        stub="total = 100.0  # N: replace this number by an expression",
+        solution="total = robot.mass * (robot.gravity + 2.0)",
         judge=Numeric(
-            right=_weight_of_links,
+            right=_sum_of_forces,
             tolerance=2e-3,  # g may be 9.8
-            praise="Standing still means no vertical acceleration, so the ground carries exactly the weight.",
+            praise="The ground carries the weight and accelerates the mass: m (g + 2 m/s²).",
             mistakes={
-                "That is a mass in kg; a force needs one more factor.": lambda: _go2().mass,
-                "That takes g as 10 m/s²; the physics here has 9.81.": lambda: 10 * _go2().mass,
-                "That is the share of one foot, on average; the question is about all feet.": lambda: _weight_of_links() / 4,
+                "That is the weight alone: with it the robot stays where it is, or goes on as it goes.": _weight,
+                "That is m a, the sum of all forces on the robot. Is the ground's the only one?": lambda: UP * _go2().mass,
+                "That would let it accelerate downwards: draw both forces, and which one is larger.": lambda: (
+                    _weight() - UP * _go2().mass
+                ),
+                "That is an acceleration, in m/s²; a force needs the mass.": lambda: _go2().gravity + UP,
+                "The weight is right; the 2 m/s² must be multiplied by the mass before they are added.": lambda: _weight() + UP,
+                "m a is right, but g without the mass is no force.": lambda: UP * _go2().mass + _go2().gravity,
+                "That takes g as 10 m/s²; the physics here has 9.81.": lambda: (10.0 + UP) * _go2().mass,
+                "That is the share of one foot, on average; the question is about all feet.": lambda: _sum_of_forces() / 4,
                 "That is what the robot does to the ground; the answer is what the ground does to the robot.": lambda: (
-                    -_weight_of_links()
+                    -_sum_of_forces()
                 ),
             },
         ),
-        explanation="Newton: the vertical forces of the ground minus the weight give mass times vertical acceleration, and "
-        "that is zero.",
+        explanation="Newton: the vertical forces of the ground minus the weight give mass times acceleration, so together they "
+        "are m g + m a.",
     ),
 )

@@ -13,7 +13,7 @@ from floatbase.dynamics import fixed_frame
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers, vector_text
 from floatbase.lessons.lesson01.pictures import PRESSING
 from floatbase.objectives import momentum_rate
-from floatbase.robots import unbolted
+from floatbase.robots import PLATE, unbolted
 
 
 @cache
@@ -55,6 +55,40 @@ def _carried_by_friction() -> float:
     robot = fb.load("go2")
     contacts = fb.Contacts.points(robot, mu=0.7)
     return float(contacts.mus.max()) * sum(inertia.mass for inertia in robot.model.inertias) * 9.81
+
+
+def _held_width() -> float:
+    """Width, m, of the plate of the pressing arm whose rear edge is where the floor's force then acts.
+
+    By the centre of pressure: the base's rows say which force and moment the plate must give at the base for q̈ = 0.
+    """
+    state = _on_the_plate()
+    wrench = (state.h - state.frame_jacobian("tool0")[:3].T @ np.array([-120.0, 0.0, 0.0]))[:6]
+    about_the_floor = wrench[4] + state.point("base_link")[2] * wrench[0]
+    return float(2 * about_the_floor / wrench[2])
+
+
+@cache
+def _on_the_plate() -> fb.State:
+    return unbolted(fb.load("ur5", posture=PRESSING), plate=True).standing()
+
+
+def _by_levers(press: float = 120.0, *, weight: float | None = None, below: float = 0.0, ahead: float | None = None) -> float:
+    """The width, m, at which push and weight have the same moment about the rear edge; mistakes change one of them.
+
+    press, weight: N.
+    below: what of the tool's height over the floor does not count, m.
+    ahead: how far ahead of the middle the weight acts, m.
+    """
+    state = _on_the_plate()
+    height, weight = state.point("tool0")[2] - below, state.robot.weight if weight is None else weight
+    return float(2 * (press * height / weight - (state.com[0] if ahead is None else ahead)))
+
+
+def _in_proportion() -> float:
+    """The width, m, if what a plate holds were proportional to its width."""
+    twice = 2 * _on_the_plate().com[0]
+    return float(PLATE[0] * (_by_levers() + twice) / (PLATE[0] + twice))
 
 
 def _judge_thrust(answer: Any) -> Verdict:
@@ -163,13 +197,50 @@ EXERCISES = (
         name="01.4",
         statement="A design: go2 floats in its standing posture with a thruster at every foot. Choose the forces, shape "
         "(4, 3), N, world, in the order of `contacts.names`, so that they add up to 200 N straight up and turn nothing. "
-        "`contacts.positions(state)` and `state.com` are known.",
+        "Row i of `levers` is x_i - x_c.",
         stub="thrust = np.tile([0.0, 0.0, 50.0], (4, 1))  # N: four equal thrusts are a first guess",
-        solution="lever = contacts.positions(state) - state.com\n"
-        "G = np.vstack([np.tile(np.eye(3), 4), np.hstack([np.cross(np.eye(3), -r).T for r in lever])])\n"
+        solution="moments = [np.cross(np.eye(3), -lever).T for lever in levers]\n"
+        "G = np.vstack([np.tile(np.eye(3), 4), np.hstack(moments)])\n"
         "thrust = np.linalg.lstsq(G, [0, 0, 200, 0, 0, 0], rcond=None)[0].reshape(4, 3)",
         judge=Shaped(_judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}),
         explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; least squares gives the "
         "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, (20) and (21).",
+    ),
+    Exercise(
+        name="01.5",
+        statement="The arm on its plate is to press with 120 N. How wide, in m, must the square plate be, at least? `at_rest` "
+        'has .com and .point("tool0"), `standing.weight` is the weight. The plate has no weight; all else stays as it was.',
+        stub="width = 0.4  # m: replace this number by an expression",
+        solution='lever = at_rest.point("tool0")[2]\nwidth = 2 * (120 * lever / standing.weight - at_rest.com[0])',
+        judge=Numeric(
+            right=_held_width,
+            praise="A harder push needs a wider plate. A robot that walks has no wider plate; it puts a foot there in time.",
+            mistakes={
+                "That is the distance from the middle to the rear edge. The plate goes as far to the front.": (
+                    lambda: _held_width() / 2
+                ),
+                "The plate tips about an edge on the floor; the tool's height counts from there, not from the base.": (
+                    lambda: _by_levers(below=PLATE[1])
+                ),
+                "Where does the weight act? The centre of mass is not above the middle of the plate.": (
+                    lambda: _by_levers(ahead=0.0)
+                ),
+                "The centre of mass is ahead of the middle, and the plate tips about its rear edge: is that good or bad?": (
+                    lambda: _by_levers(ahead=-_on_the_plate().com[0])
+                ),
+                "That is the plate as it is, and with 120 N it tips.": lambda: PLATE[0],
+                "What a plate holds does not grow in proportion to its width: part of the lever is there without a plate.": (
+                    _in_proportion
+                ),
+                "That holds 60 N. The arm is to press with 120 N.": lambda: _by_levers(60.0),
+                "That takes the mass for the weight: a force needs one more factor.": (
+                    lambda: _by_levers(weight=_on_the_plate().robot.mass)
+                ),
+                "Height and distance from the edge are exchanged: which lever belongs to the push, which to the weight?": (
+                    lambda: _by_levers(_on_the_plate().robot.weight, weight=120.0)
+                ),
+            },
+        ),
+        explanation="About the rear edge: 120 N × height = weight × (half the width + how far the centre of mass is ahead).",
     ),
 )

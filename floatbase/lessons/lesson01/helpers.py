@@ -1,4 +1,4 @@
-"""Lesson 01, the arm without bolts: paths of its joints, physics without gravity, and how far its base turned."""
+"""Lesson 01: the smallest robot; the arm without bolts: paths of its joints, no gravity, how far its base turned."""
 
 from __future__ import annotations
 
@@ -11,6 +11,19 @@ import floatbase as fb
 from floatbase._arrays import Array, read_only
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
+
+# the URDF of the smallest robot: a box of 5 kg that slides up and down a rail, 2 m high
+LIFT = """
+<robot name="lift">
+  <link name="rail"/>
+  <link name="box">
+    <inertial> <mass value="5"/> <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/> </inertial>
+  </link>
+  <joint name="slide" type="prismatic">
+    <parent link="rail"/> <child link="box"/> <axis xyz="0 0 1"/> <limit lower="0" upper="2" effort="200" velocity="1"/>
+  </joint>
+</robot>
+"""
 
 
 def turn(joint: int, angle: float, duration: float) -> Callable[[float], Array]:

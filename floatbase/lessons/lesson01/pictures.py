@@ -11,6 +11,7 @@ import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.lessons.exercises import vector_text
 from floatbase.lessons.panels import SliderPanel, slider_panel
+from floatbase.lessons.rounding import about
 from floatbase.objectives import Task, momentum_rate
 from floatbase.robots import PLATE
 from floatbase.simulation import Rollout
@@ -64,10 +65,12 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
             extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06, plate=False)
             extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06, plate=False)
         view.show(state, com=False, extra=extra)
-        tau = state.h - state.frame_jacobian("tool0")[:3].T @ force
+        tau, limits = abs(state.h - state.frame_jacobian("tool0")[:3].T @ force), state.robot.torque_limits
+        busiest = int(np.argmax(tau / limits))
         return (
-            f"wall on tool <b>{-press:.0f} N</b>, bolts on base <b>{press:+.0f} N</b> and "
-            f"<b>{np.linalg.norm(moment):.0f} N·m</b>; largest motor torque {abs(tau).max():.0f} N·m"
+            f"wall on tool <b>{about(-press, 'N', 3)}</b>, bolts on base <b>{about(press, 'N', 3)}</b> and "
+            f"<b>{np.linalg.norm(moment):.0f} N·m</b>; busiest motor: {state.robot.joint_names[busiest]}, "
+            f"{tau[busiest]:.0f} of {limits[busiest]:.0f} N·m"
         )
 
     return slider_panel(view, draw, press=(0.0, 60.0, 120.0, "N"))
@@ -94,11 +97,28 @@ def play_floating(view: Viewer, record: Rollout) -> Viewer:
     """The arm without bolts, gravity and ground, with axes on its base; a veil stays where it was first."""
 
     def picture(state: fb.State, i: int) -> Picture:
-        drawn = _free_arm(view, state, first=record.state(0))
-        return {path: item for path, item in drawn.items() if path not in ("ground", "com/line", "com/projection")}
+        return _afloat(_free_arm(view, state, first=record.state(0)))
 
     centre = tuple(float(x) for x in record.state(0).com)
     return _play(view, record, picture, View(40.0, 25.0, 1.0, around=(centre, 0.6)))  # type: ignore[arg-type]
+
+
+def centre_panel(view: Viewer, state: fb.State) -> SliderPanel:
+    """go2 in the air: a slider swings its legs. The base, with its axes, stays, and the centre of mass does not (note 3)."""
+    first = state.robot.nv - state.robot.d
+    swing = np.zeros(state.robot.nv)
+    swing[[first + i for i, name in enumerate(state.robot.joint_names) if "thigh" in name]] = -1.0
+    pose = state.frame_pose("base")
+    axes = below("axes", marks.frame_axes(pose.homogeneous, 0.2))
+
+    def draw(swing_forwards: float) -> str:
+        now = state.replace(q=state.integrate(swing_forwards * swing))
+        view.draw(_afloat(view.painter.picture(now, extra=axes)))
+        return f"x<sub>c</sub> seen from the base: {vector_text(1e3 * (pose.rotation.T @ (now.com - pose.translation)))} mm"
+
+    panel = slider_panel(view, draw, swing_forwards=(-1.0, 0.0, 1.0, "rad"))
+    view.camera(View(78.0, 8.0, 1.0, around=((0.0, 0.0, 0.24), 0.36)))
+    return panel
 
 
 def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> SliderPanel:
@@ -114,15 +134,15 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slider
         f = command.forces.reshape(-1, 3)
         moment = np.cross(contacts.positions(state) - state.com, f).sum(axis=0)
         view.show(state, contacts, planned=f, wrench=np.concatenate([f.sum(axis=0), moment]))
-        a = state.com_jacobian @ command.qdd
+        newton = state.robot.mass * (state.com_jacobian @ command.qdd - [0, 0, -9.81])
         return (
-            f"f<sub>c</sub> = {vector_text(f.sum(axis=0))} N, "
-            f"m (a - g) = {vector_text(state.robot.mass * (a - [0, 0, -9.81]))} N, τ<sub>c</sub> = {vector_text(moment)} N·m"
+            f"f<sub>c</sub> = {vector_text(f.sum(axis=0))} N, m (ẍ<sub>c</sub> - g) = {vector_text(newton)} N, "
+            f"τ<sub>c</sub> = {vector_text(moment)} N·m"
         )
 
-    along = (-6.0, 0.0, 6.0, "m/s²")
-    panel = slider_panel(view, draw, forwards=(-6.0, 2.0, 6.0, "m/s²"), up=along, turn=(-40.0, 0.0, 40.0, "rad/s²"))
-    view.camera(View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.5), 0.66)))
+    forwards, up = (-6.0, 2.0, 6.0, "m/s²"), (-4.0, 0.0, 4.0, "m/s²")
+    panel = slider_panel(view, draw, forwards=forwards, up=up, turn=(-40.0, 0.0, 40.0, "rad/s²"))
+    view.camera(View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.48), 0.66)))
     return panel
 
 
@@ -140,7 +160,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
         qdd = eom.acceleration(np.zeros(eom.d), f)
         rate = momentum_rate(state, qdd) + np.concatenate([state.robot.mass * gravity, np.zeros(3)])
         picture = view.painter.picture(state, wrench=rate)
-        drawn = {path: item for path, item in picture.items() if not path.startswith(("ground", "com/line", "com/projection"))}
+        drawn = _afloat(picture)
         for name, foot, force in zip(contacts.names, feet, f, strict=True):
             if force.any():
                 vector = view.scale * force
@@ -153,6 +173,11 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
     panel = slider_panel(view, draw, left_feet=each, right_feet=each, twist=(-40.0, 0.0, 40.0, "N"))
     view.camera(View(50.0, 14.0, 1.0, around=((0.0, 0.0, 0.38), 0.6)))
     return panel
+
+
+def _afloat(picture: Picture) -> Picture:
+    """A picture without its ground, and without the shadow of the centre of mass on it."""
+    return {path: item for path, item in picture.items() if not path.startswith(("ground", "com/line", "com/projection"))}
 
 
 def _wall(tool: Array) -> Picture:

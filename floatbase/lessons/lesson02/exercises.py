@@ -223,7 +223,8 @@ EXERCISES = (
         "hold_tau, hold_forces = both[:12], both[12:]",
         judge=_judge_holding,
         names=lambda: {"go2": fb.load("go2"), "eom": _standing_go2()},
-        explanation="Six more unknowns than equations: lstsq takes the smallest. The other answers differ by forces that "
-        "squeeze the robot from within; lesson 03 is about them.",
+        explanation="Six more unknowns than equations: lstsq takes the smallest, by the sum of all squares. That adds N² and "
+        "(N·m)², so another unit would give other forces. The answers differ by forces that squeeze the robot from within; "
+        "lesson 03 is about them.",
     ),
 )

@@ -1,4 +1,4 @@
-"""Lesson 02, experiments: constant torques, feet on pins that collapse, an arm about its tool, a wheel that parks."""
+"""Lesson 02, experiments: constant torques, how far feet and tools stray, a wheel that parks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pinocchio as pin
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase._assets import assets_root
-from floatbase.dynamics import EquationsOfMotion, PointContact, RollingWheel
+from floatbase.dynamics import EquationsOfMotion, RollingWheel
 from floatbase.lessons.controllers import ConstantTorques
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
@@ -39,45 +39,10 @@ def run_constant(
     return fb.rollout(fb.Simulation(robot), ConstantTorques(torques, contacts, by_equation), duration)
 
 
-def pins(robot: Robot) -> fb.Contacts:
-    """A pin through the middle of every foot: contacts of radius 0, which do not roll."""
-    return fb.Contacts([PointContact(foot.frame) for foot in robot.feet])
-
-
-def collapse(
-    state: fb.State, contacts: fb.Contacts, motion: Motion, drift: bool, duration: float = 0.2, step: float = 1e-3
-) -> list[fb.State]:
-    """(7) integrated without torques, a list of states: the robot sinks on its feet.
-
-    state: the first one.
-    contacts: the stance of (7).
-    motion: solves (7), (eom, τ, b) -> (q̈, λ).
-    drift: take b as it is; otherwise b = 0, the drift forgotten.
-    duration, step: s.
-    """
-    tau, states = np.zeros(state.robot.d), [state]
-    for _ in range(round(duration / step)):
-        eom = fb.equations_of_motion(state, contacts)
-        qdd, _ = motion(eom, tau, eom.b if drift else np.zeros_like(eom.b))
-        v = state.v + step * qdd
-        state = state.replace(q=state.integrate(step * (state.v + v) / 2), v=v)
-        states.append(state)
-    return states
-
-
 def strayed(states: Sequence[fb.State], contacts: fb.Contacts) -> Array:
     """Distance of the worst foot from its first position, m, for each state; shape (number of states,)."""
     places = np.array([contacts.positions(state) for state in states])
     return np.asarray(np.linalg.norm(places - places[0], axis=2).max(axis=1))
-
-
-def turning_about_its_tool(arm: Robot, speed: float = 3.0) -> fb.State:
-    """The arm in a motion that leaves the tool's origin at rest, J q̇ = 0. speed: norm of q̇, rad/s."""
-    state = arm.standing()
-    J = state.frame_jacobian("tool0")[:3]
-    elbow_first = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    v = elbow_first - np.linalg.pinv(J) @ (J @ elbow_first)
-    return state.replace(v=speed * v / np.linalg.norm(v))
 
 
 def tool_path(record: Rollout) -> Array:

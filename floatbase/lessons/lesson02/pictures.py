@@ -126,7 +126,7 @@ def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
         way = forgotten.state(i).point("tool0") - home
         length = float(np.linalg.norm(way))
         if length > 2e-3:
-            drawn["way"] = shapes.rod(home, geometry.frame_along(way / length), length, 0.012, GREYS[2])  # light, since the arm is dark
+            drawn["way"] = shapes.rod(home, geometry.frame_along(way / length), length, 0.012, GREYS[2])  # the arm is dark
         pictures.append(drawn)
     view.play_pictures(forgotten.time[rows], pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))

@@ -8,10 +8,12 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._arrays import Array
-from floatbase.dynamics import EquationsOfMotion
+from floatbase.dynamics import EquationsOfMotion, torque_force_matrix, torque_force_space
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
-from floatbase.lessons.lesson03.helpers import standing_go2, tilted_squeeze
-from floatbase.linear_algebra import rank
+from floatbase.lessons.lesson03.helpers import rising_solo8, standing_go2, tilted_squeeze
+from floatbase.linear_algebra import RANK_TOLERANCE, rank
+
+SAME = 1e-5  # part of the largest number by which two solutions may differ: rounding leaves 1e-12, the mistakes 1e-2
 
 
 def _on_diagonal() -> EquationsOfMotion:
@@ -63,7 +65,7 @@ def _wrong_squeezes() -> dict[str, Any]:
 def _standing_forces() -> Array:
     """The smallest forces, shape (12,), N, world, that carry the standing robot."""
     eom = standing_go2()
-    return np.asarray(np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0])
+    return np.asarray(np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=RANK_TOLERANCE)[0])
 
 
 def _judge_unloading(answer: Any) -> Verdict:
@@ -86,6 +88,83 @@ def _judge_unloading(answer: Any) -> Verdict:
     if forces[2::3].min() < 0.0:
         return Verdict(False, "It balances, but some foot would have to pull on the ground.")
     return Verdict(True, "The wobbling table: FL gives up 23 N, RR as well, and the other diagonal takes them.")
+
+
+def _wrong_pairs() -> dict[str, Array]:
+    """Hint -> the shortest pair (τ, λ) that this mistake leads to, shape (20,)."""
+    eom = rising_solo8()
+    C, right_side = torque_force_matrix(eom)
+    J, M, h, S, b = eom.J, eom.M, eom.h, eom.S, eom.b
+    J_M = np.hstack([J @ M @ S, J @ M @ J.T])
+    wrong = {
+        "b is missing on the right of (10): solo8 moves, and its feet must accelerate a little to stay.": (C, right_side - b),
+        "h is missing on the right of (10): this robot has no weight.": (C, b),
+        "The sign of h: in (8) and (10) it comes to the right as + J M⁻¹ h.": (C, 2.0 * b - right_side),
+        "The sign of b: it stands on the right of (10) as in (7), with a plus.": (C, right_side - 2.0 * b),
+        "M is not inverted: a force is divided by the inertia, so J M⁻¹ it is, not J M.": (J_M, b + J @ M @ h),
+    }
+    return {hint: np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ y for hint, (A, y) in wrong.items()}
+
+
+def _same(x: Array, y: Array) -> bool:
+    return bool(np.max(np.abs(x - y)) <= SAME * np.max(np.abs(y)))
+
+
+def _fault_of_pair(pair: Array) -> str:
+    """What is wrong with a shortest pair (τ, λ) of (11), or ""."""
+    eom = rising_solo8()
+    C, right_side = torque_force_matrix(eom)
+    if _same(pair, torque_force_space(eom).b):
+        return ""
+    if not pair.any():
+        return "The first column is still zero, and zero does not solve (10)."
+    if _same(C @ pair, right_side):
+        return (
+            "The first column solves (10), but it is longer than need be: some of the null space is in it. "
+            "Was something divided by a singular value that is only rounding?"
+        )
+    fitting = (hint for hint, wrong in _wrong_pairs().items() if _same(pair, wrong))
+    return next(fitting, "The first column does not solve (10). It is v, shape (20,): first τ, then λ.")
+
+
+def _fault_of_directions(V: Array) -> str:
+    """What is wrong with columns that should be V⊥ of (11), or ""."""
+    C = torque_force_matrix(rising_solo8())[0]
+    orthonormal = np.allclose(V.T @ V, np.eye(V.shape[1]), atol=SAME)
+    if np.max(np.abs(C @ V), initial=0.0) > SAME * np.max(np.abs(C)):
+        if orthonormal:
+            return (
+                "v is right. The other columns are orthonormal, but C takes some of them not to zero. The SVD gives Vᵀ: "
+                "its rows are the directions, those of the null space come last."
+            )
+        return "v is right, but C takes some of the other columns not to zero."
+    if not orthonormal:
+        return "v is right, and the columns lie in the null space, but they are not orthonormal."
+    missing = C.shape[1] - rank(C) - V.shape[1]
+    if missing == C.shape[0] - rank(C):
+        return (
+            "v is right. But these are too few directions: one is taken away for each row of C, and not every row says "
+            "something new. How many singular values are not zero?"
+        )
+    return f"v is right, and so are these directions, but not all are there: {missing} missing." if missing else ""
+
+
+def _judge_all_pairs(answer: Any) -> Verdict:
+    """The shortest pair must be right; behind it any orthonormal columns will do that span the null space."""
+    try:
+        shape = np.shape(answer)
+    except ValueError:  # rows of different lengths
+        shape = ()
+    given = numbers(answer, shape)
+    if isinstance(given, Verdict):
+        return given
+    if given.ndim != 2 or shape[0] != 20 or not shape[1]:
+        rows = "These are rows; pairs (τ, λ) are columns here." if given.ndim == 2 and shape[1] == 20 else ""
+        motions = "34 rows: that is (13) with q̈; in (11) are τ and λ alone." if shape[:1] == (34,) else ""
+        form = "One matrix is asked for, of 20 rows: 8 torques and 12 forces. v is its first column, then comes V⊥."
+        return Verdict(False, rows or motions or form)
+    fault = _fault_of_pair(given[:, 0]) or _fault_of_directions(given[:, 1:])
+    return Verdict(not fault, fault or "Ten directions for eight motors, and nobody typed a 10: the singular values said so.")
 
 
 EXERCISES = (
@@ -136,11 +215,25 @@ EXERCISES = (
         name="03.3",
         statement="Redistribute the forces of the standing robot so that FL carries 20 N and the robot does not move.",
         stub="new_forces = forces.copy()  # replace: shape (12,), N",
-        solution="N = internal_forces(eom)  # (12, 6)\n"
-        "row = N[2]  # what each internal force does to the vertical force of FL\n"
-        "new_forces = forces + N @ row * (20 - forces[2]) / (row @ row)",
+        solution="squeezes = internal_forces(eom)  # (12, 6)\n"
+        "row = squeezes[2]  # what each of them does to the vertical force of FL\n"
+        "new_forces = forces + squeezes @ row * (20 - forces[2]) / (row @ row)",
         judge=_judge_unloading,
         names=lambda: {"forces": _standing_forces()},
         explanation="Every λ = λ₀ + N x keeps the robot still; x is the shortest vector with row x = 20 - λ₀[2].",
+    ),
+    Exercise(
+        name="03.4",
+        statement="Build (11) for a moving solo8: one matrix of 20 rows, first v, then the columns of V⊥.",
+        stub="all_pairs = np.zeros((20, 9))  # replace: v, then V⊥ (8 torques, then 12 forces)",
+        solution="J_Minv = rising.J @ np.linalg.inv(rising.M)\n"
+        "C = np.hstack([J_Minv @ rising.S, J_Minv @ rising.J.T])\n"
+        "U, s, Vt = np.linalg.svd(C)\n"
+        "r = rank(C)\n"
+        "v = Vt[:r].T @ (U[:, :r].T @ (rising.b + J_Minv @ rising.h) / s[:r])\n"
+        "all_pairs = np.column_stack([v, Vt[r:].T])",
+        judge=_judge_all_pairs,
+        explanation="C has 12 rows and rank 10: two of its singular values are zero but for rounding. They belong to no "
+        "direction of V∥, must not be divided by, and leave 20 - 10 directions to V⊥.",
     ),
 )

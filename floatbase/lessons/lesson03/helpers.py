@@ -10,7 +10,7 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion, FeasibleSpace
-from floatbase.linear_algebra import rank
+from floatbase.linear_algebra import RANK_TOLERANCE, null_space
 from floatbase.robots import Robot
 
 
@@ -31,33 +31,42 @@ def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
     return eom, np.concatenate([10.0 * line, np.zeros(6), -10.0 * line])
 
 
+@cache
+def rising_solo8() -> EquationsOfMotion:
+    """(7) of solo8 in its standing posture, moving forwards, upwards and nodding on four feet that stay: b is not zero.
+
+    J has rank 10 of 12 there. All feet move in planes along the body, so b asks for nothing in the lost directions.
+    """
+    robot = fb.load("solo8")
+    contacts = fb.Contacts.points(robot)
+    base = np.array([0.2, 0.0, 0.3, 0.0, 0.5, 0.0])  # m/s, rad/s
+    J = contacts.jacobian(robot.standing())
+    joints = -np.linalg.lstsq(J[:, 6:], J[:, :6] @ base, rcond=RANK_TOLERANCE)[0]
+    return fb.equations_of_motion(robot.standing().replace(v=np.concatenate([base, joints])), contacts)
+
+
 def space_of(robot: Robot, *frames: str) -> FeasibleSpace:
     """The space of motions (13) of a robot in its standing state on the feet of these frames; on all feet without `frames`."""
     contacts = fb.Contacts.points(robot, mu=0.7)
     return fb.feasible_space(fb.equations_of_motion(robot.standing(), contacts.only(*frames) if frames else contacts))
 
 
-def direction(space: FeasibleSpace, base: npt.ArrayLike = (0.0,) * 6, squeeze: npt.ArrayLike | None = None) -> Array:
+def direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
     """The step in β, shape (dimension,), that changes the base's acceleration by `base` and the forces as little as possible.
 
-    base: shape (6,), m/s² and rad/s², base frame. squeeze: internal forces to add, shape (k,), N, world.
+    base: shape (6,), m/s² and rad/s², base frame.
     """
-    rows = space.qdd.A[:6]
-    step = np.linalg.pinv(rows, rcond=1e-9) @ np.asarray(base, dtype=np.float64)
-    free = np.linalg.svd(rows)[2][rank(rows, absolute=True) :].T
-    step -= free @ np.linalg.pinv(space.forces.A @ free, rcond=1e-9) @ (space.forces.A @ step)
-    if squeeze is not None:
-        forces = np.asarray(squeeze, dtype=np.float64)
-        torques = -space.eom.S.T @ space.eom.J.T @ forces
-        step += space.map.A.T @ np.concatenate([np.zeros(space.eom.nv), torques, forces])
-    return step
+    to_base, to_forces = space.qdd.A[:6], space.forces.A
+    step = np.linalg.pinv(to_base, rcond=RANK_TOLERANCE) @ np.asarray(base, dtype=np.float64)
+    idle = null_space(to_base, absolute=True)
+    return step - idle @ np.linalg.pinv(to_forces @ idle, rcond=RANK_TOLERANCE) @ (to_forces @ step)
 
 
 def standing_still(space: FeasibleSpace) -> Array:
     """The β with q̈ = 0 and the smallest forces that allow it, shape (dimension,)."""
     eom = space.eom
     J_base, J_joints = eom.J[:, :6], eom.J[:, 6:]
-    forces = np.linalg.lstsq(J_base.T, eom.h[:6], rcond=1e-9)[0]
+    forces = np.linalg.lstsq(J_base.T, eom.h[:6], rcond=RANK_TOLERANCE)[0]
     return space.coordinates(np.zeros(eom.nv), eom.h[6:] - J_joints.T @ forces, forces)
 
 

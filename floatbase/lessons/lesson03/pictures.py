@@ -26,8 +26,10 @@ BLOCK, GAP = 58, 16  # px: a name of a leg, 11 px high, fits below its three bar
 _Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]  # name, marks of its three numbers, unit
 
 
-def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike) -> str:
+def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike, cones: bool = True) -> str:
     """Draw (q̈, τ, λ) of a β, shape (dimension,): forces as arrows, where q̈ leads from rest as a veil.
+
+    cones: also the friction cones around the forces.
 
     Returns all the numbers as bars, HTML.
     """
@@ -35,7 +37,7 @@ def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike) -> str:
     state = space.eom.state
     ghost = state.replace(q=state.integrate(0.5 * GHOST_TIME**2 * qdd), v=np.zeros(space.eom.nv))
     name = "where q̈ leads in a quarter of a second"
-    view.show(state, contacts=space.eom.contacts, planned=forces, ghost=ghost, ghost_name=name)
+    view.show(state, contacts=space.eom.contacts, planned=forces, cones=cones, ghost=ghost, ghost_name=name)
     return bars(qdd, tau, forces)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._arrays import Array
+from floatbase.dynamics import EquationsOfMotion, internal_forces
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson04.helpers import DESIRED, tilted
@@ -41,14 +42,14 @@ def _gradients() -> dict[str, Callable[[], Any]]:
     return {
         "There is nothing there yet: at a minimum the gradient is zero, but τ = 0 is none.": lambda: np.zeros(12),
         "The sign: residual = actual - desired, and the gradient points uphill.": lambda: -right(),
-        "The drift is forgotten: the centre of mass accelerates by J q̈ + J̇ q̇.": gradient(drift=0.0),
+        "The drift is forgotten: the centre of mass accelerates by J_c q̈ + J̇_c q̇.": gradient(drift=0.0),
         "The drift has the wrong sign.": gradient(drift=-1.0),
-        "η has an offset: with the motors off the robot accelerates too, by b.": gradient(offset=0.0),
+        "η has an offset: with the motors off the robot accelerates too, by `eta_moving.b`.": gradient(offset=0.0),
         "The offset of η and the drift are both forgotten.": gradient(drift=0.0, offset=0.0),
-        "The frame: `desired` is in world axes, as are J and the drift; do not turn it.": gradient(turned=1),
+        "The frame: `desired` is in world axes, as Jacobian and drift are; do not turn it.": gradient(turned=1),
         "The frame: `desired` is in world axes already; the base's rotation takes it out of them.": gradient(turned=2),
-        "A gradient comes back by the transpose of A. A pseudo-inverse would bring back points.": gradient(back=np.linalg.pinv),
-        "This is the cost of the standing robot: J and the drift of the moving one are other numbers.": _gradient_of_standing,
+        "A gradient comes back by the transpose of η's matrix; a pseudo-inverse is for points.": gradient(back=np.linalg.pinv),
+        "This is the cost of the standing robot; the moving one has another Jacobian and drift.": _gradient_of_standing,
         "The cost has a ½ in front, so the square's 2 cancels.": lambda: 2 * right(),
     }
 
@@ -61,11 +62,28 @@ def _gradient_of_standing() -> Array:
 
 
 def _flat_on_three_feet() -> int:
-    """By counting singular values of what both costs see, in τ; β on three feet is as long as τ and J has full rank."""
-    contacts = fb.Contacts.points(standing_go2().robot).without("FL_foot")
+    """Flat directions of com + turn on three feet, counted in τ: β is as long as τ there, since J has full rank."""
     state = standing_go2().state
-    eta = fb.accelerations_from_torques(fb.equations_of_motion(state, contacts))
-    return eta.n_in - rank(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]) @ eta.A)
+    return _unseen_by(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]))
+
+
+def _flat_for_com() -> int:
+    return _unseen_by(standing_go2().state.com_jacobian)
+
+
+def _unseen_by(rows: Array) -> int:
+    eta = fb.accelerations_from_torques(_on_three_feet())
+    return eta.n_in - rank(rows @ eta.A)
+
+
+def _squeezes_on_three_feet() -> int:
+    return internal_forces(_on_three_feet()).shape[1]
+
+
+def _on_three_feet() -> EquationsOfMotion:
+    """(7) of go2 standing on all feet but FL."""
+    standing = standing_go2()
+    return fb.equations_of_motion(standing.state, standing.contacts.without("FL_foot"))
 
 
 def _first_costs() -> dict[str, Any]:
@@ -119,9 +137,10 @@ def _rounded(a: Array) -> list[float]:
 EXERCISES = (
     Exercise(
         name="04.1",
-        statement="The gradient at τ = 0 of ½‖J q̈ + J̇ q̇ - desired‖², seen from the torques.",
-        stub="gradient = np.zeros(12)  # replace: from A, b, J, drift and desired",
-        solution="gradient = A.T @ J.T @ (J @ b + drift - desired)",
+        statement="The gradient at τ = 0 of ½‖J_c q̈ + J̇_c q̇ - desired‖², seen from the torques.",
+        stub="gradient = np.zeros(12)  # replace: from eta_moving, J_moving, drift_moving, desired",
+        solution="residual = J_moving @ eta_moving.b + drift_moving - desired\n"
+        "gradient = eta_moving.A.T @ J_moving.T @ residual",
         judge=Shaped(
             Numeric(
                 right=_gradient_by_newton,
@@ -139,22 +158,26 @@ EXERCISES = (
     ),
     Exercise(
         name="04.2",
-        statement="On three feet: how many directions of β are flat for the sum of both costs?",
-        stub="flat = 9  # replace this number by what you find",
+        statement="On three feet: how many independent ones of the flat directions of com + turn, in β, move the free foot?",
+        stub="moving = 6  # replace this number by what you find",
         solution='three = fb.feasible_space(fb.equations_of_motion(state, contacts.without("FL_foot")))\n'
-        "flat = three.dimension - rank((com + turn).pullback(three.qdd).H)",
+        "flat = null_space((com + turn).pullback(three.qdd).H)\n"
+        'moving = rank(state.frame_jacobian("FL_foot")[:3] @ three.qdd.A @ flat)',
         judge=Numeric(
             count=True,
-            right=_flat_on_three_feet,
-            praise="Again 6, but others: three squeezes, and three ways to move the free foot.",
+            right=lambda: _flat_on_three_feet() - _squeezes_on_three_feet(),
+            praise="Three squeezes are left on three feet; the other three flat directions take the free foot where you like.",
             mistakes={
-                "That is for the centre of mass alone.": lambda: 9,
-                "Those are the squeezes. Has the free leg nothing to do?": lambda: 3,
-                "That is counted in q̈, where most directions are not possible at all.": lambda: 12,
-                "So it would be with effort; these two costs do not see all that three feet can do.": lambda: 0,
+                "Those are all flat directions. Can three feet still squeeze, and what does that move?": _flat_on_three_feet,
+                "So many are flat for `com` alone, or if squeezes count twice; for com + turn it is six.": _flat_for_com,
+                "Does a free foot have to stay where it is? Neither cost speaks of it.": lambda: 0,
+                "One foot, but a foot can go in more than one direction.": lambda: 1,
+                "Upwards is a direction, too: no ground is in the way.": lambda: 2,
+                "That is all of β. Directions along which the costs are curved do not count.": lambda: _on_three_feet().d,
             },
         ),
-        explanation="β has 12 directions and the two costs bend 6 of them; 9 forces leave 9 - 6 = 3 squeezes.",
+        explanation="Three feet have 9 forces, of which 9 - 6 = 3 are squeezes. They are flat and move nothing. The other "
+        "3 move the free foot, wherever you like, and base and legs follow so that neither wish is missed.",
     ),
     Exercise(
         name="04.3",
@@ -162,7 +185,8 @@ EXERCISES = (
         stub="design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort  # change or add costs",
         solution="from floatbase.objectives import tangential_bias\n\n"
         "friction = tangential_bias(contacts)  # on λ\n"
-        "design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort + 1e-4 * friction.pullback(zeta)",
+        "wishes = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort\n"
+        "design = wishes + 1e-4 * friction.pullback(zeta)",
         judge=_judge_design,
         names=_first_costs,
         explanation="Friction is easy to say in λ, so say it there and bring it to the torques through ζ. Its weight is small "

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 
 import floatbase as fb
 from floatbase._arrays import Array
@@ -38,17 +39,15 @@ def measured_acceleration(record: Rollout) -> Array:
     return change / (record.time[-1] - record.time[first])
 
 
-def counted_in(space: FeasibleSpace, newtons: float) -> FeasibleSpace:
-    """The same space of motions with another β: the one that results where the unit of force is `newtons` N.
+def counted_in(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
+    """The same space of motions with another β: v and V⊥ of (13) as they are where a length is ‖W (q̈, τ, λ)‖.
 
-    The maps still give q̈, τ and λ in SI units.
+    W: shape (nv + d + k, nv + d + k), invertible. The maps give q̈, τ and λ in SI units as before.
     """
-    units = np.ones(space.map.n_out)
-    units[space.map.blocks["forces"]] = 1.0 / newtons
-    V = np.linalg.qr(units[:, None] * space.map.A)[0]
-    v = units * space.map.b
+    W = np.asarray(W, dtype=np.float64)
+    V, v = np.linalg.qr(W @ space.map.A)[0], W @ space.map.b
     v = v - V @ (V.T @ v)
-    return FeasibleSpace(space.eom, fb.Affine(V / units[:, None], v / units, space.map.blocks))
+    return FeasibleSpace(space.eom, fb.Affine(np.linalg.solve(W, V), np.linalg.solve(W, v), space.map.blocks))
 
 
 @cache

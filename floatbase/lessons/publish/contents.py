@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 from floatbase.lessons.publish.notebooks import read
@@ -24,7 +23,6 @@ PLANNED = {
 }
 _BEGIN = "<!-- lessons: made by `python -m floatbase.lessons.publish map` -->\n"
 _END = "<!-- end of lessons -->\n"
-_EQUATIONS = re.compile(r"\bequations? ((?:\(\d+\)(?:-|, )?)+)|\b(App\. [ABC])\b")
 
 
 def lesson_table(folder: Path = FOLDER) -> str:
@@ -49,20 +47,24 @@ def readme_with_table(text: str) -> str:
 
 def title_of(source: Path) -> str:
     """The first heading of a lesson or of a text in Markdown."""
-    heading = re.search(r"^# (.+)$", next(texts_of(source), ""), re.MULTILINE)
+    if source.suffix == ".ipynb":
+        text = next((cell.source for cell in read(source).cells if cell.cell_type == "markdown"), "")
+    else:
+        text = source.read_text(encoding="utf-8")
+    heading = re.search(r"^# (.+)$", text, re.MULTILINE)
     return heading[1] if heading else source.stem
 
 
+def taught_in(lesson: Path) -> set[str]:
+    """The equations and appendices of the document that a lesson teaches, "(9)" or "App. A": what its cells say as metadata."""
+    return {equation for cell in read(lesson).cells for equation in cell.metadata.get("teaches", [])}
+
+
 def equations_of(lesson: Path) -> str:
-    """The equations of the document that a lesson names as its source, such as "(8)-(13), (16)"; none is ""."""
-    source = next((line for text in texts_of(lesson) for line in text.splitlines() if line.startswith("**Source**")), "")
-    found = _EQUATIONS.search(source)
-    return (found[1] or found[2]).strip(", ") if found else ""
-
-
-def texts_of(source: Path) -> Iterator[str]:
-    """What a lesson says in words, cell by cell; all of a text in Markdown."""
-    if source.suffix != ".ipynb":
-        yield source.read_text(encoding="utf-8")
-        return
-    yield from (cell.source for cell in read(source).cells if cell.cell_type == "markdown")
+    """The equations that a lesson teaches, in short: "(8)-(13), (16), App. A"; none is ""."""
+    taught = taught_in(lesson)
+    numbers = sorted(int(equation.strip("()")) for equation in taught if not equation.startswith("App."))
+    first = [n for n in numbers if n - 1 not in numbers]
+    last = [n for n in numbers if n + 1 not in numbers]
+    spans = [f"({a})-({b})" if b > a + 1 else f"({a}), ({b})" if b > a else f"({a})" for a, b in zip(first, last, strict=True)]
+    return ", ".join([*spans, *sorted(equation for equation in taught if equation.startswith("App."))])

@@ -1,7 +1,8 @@
 """The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; never written by hand.
 
 A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as in "App. A: …", stands for
-them. Public is what a room exports. A test counts where it names that function.
+them. Public is what a room exports. A test counts where it names that function, a lesson where the metadata of a cell says that
+it teaches the equation.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 import floatbase
-from floatbase.lessons.publish.contents import texts_of
+from floatbase.lessons.publish.contents import taught_in
 from floatbase.lessons.publish.workspace import FOLDER
 
 TITLES = {
@@ -91,7 +92,7 @@ def entries() -> list[Entry]:
 def table() -> str:
     """The map as a page of Markdown."""
     found = entries()
-    texts = {path.name: "\n".join(texts_of(path)) for path in sorted(FOLDER.glob("*.ipynb"))}
+    taught = {path.name: taught_in(path) for path in sorted(FOLDER.glob("*.ipynb"))}
     lines = [
         "# The map: equation → function → test → lesson",
         "",
@@ -105,8 +106,7 @@ def table() -> str:
         here = [entry for entry in found if equation in entry.equations]
         functions = "<br>".join(f"`{entry.path}`" for entry in here)
         tests = sorted({test.split("::")[0] for entry in here for test in entry.tests})
-        names = [name for name, text in texts.items() if equation in text or equation.replace("App.", "Appendix") in text]
-        lessons = ", ".join(f"[{name.split('_')[0]}]({name})" for name in names)
+        lessons = ", ".join(f"[{name.split('_')[0]}]({name})" for name, those in taught.items() if equation in those)
         lines.append(f"| {equation} | {title} | {functions} | {', '.join(tests)} | {lessons} |")
     return "\n".join(lines) + "\n"
 

@@ -26,6 +26,7 @@ _NOTICE = (
     "floatbase, a course on robots that are not bolted to the ground. This is a page to read; in the live lesson pictures "
     "answer to sliders and exercises check themselves."
 )
+_CLAIMS = "claims of the text above, as code that fails if one is wrong"
 _WIDGET = "application/vnd.jupyter.widget-view+json"
 _WIDGETS = "application/vnd.jupyter.widget-state+json"
 _TERMINAL = re.compile(r"\x1b\[[0-9;]*m")
@@ -61,9 +62,11 @@ def _cell(cell: Any, widgets: dict[str, Any], pictures: Pictures) -> str:
     if cell.cell_type != "code":
         return f"<section>{to_html(cell.source)}</section>"
     tags = cell.metadata.get("tags", [])
-    # what a check says about the placeholder is nothing to read
-    shown = "" if "check" in tags else _outputs(cell.outputs, widgets, pictures)
-    kind = "cell exercise" if "exercise" in tags else "cell"
+    if "claims" in tags:
+        return f'<details class="cell"><summary>{_CLAIMS}</summary>{coloured(cell.source)}</details>'
+    # what a check says about the placeholder, and a prediction that nobody has made, are nothing to read
+    shown = "" if {"check", "predict"} & set(tags) else _outputs(cell.outputs, widgets, pictures)
+    kind = "cell exercise" if {"exercise", "predict"} & set(tags) else "cell"
     return f'<div class="{kind}">{coloured(cell.source)}{shown}</div>'
 
 

@@ -1,0 +1,176 @@
+"""Predictions: a learner says what a cell will show before it runs; afterwards both stand side by side.
+
+What was said is kept in the learner's progress file, on this machine alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from floatbase._arrays import LARGEST, plain_numbers
+from floatbase.errors import InputError
+from floatbase.lessons import progress
+from floatbase.lessons.rounding import about
+
+_SAID = 6  # digits of what the learner said: as it was typed
+_RIGHT = "right"
+# of this process: units of what was asked, and what could not be kept
+_units: dict[str, str] = {}
+_unkept: dict[str, dict[str, Any]] = {}
+
+
+def predict(name: str, *answer: Any, unit: str = "", choices: Sequence[str] = (), count: int = 1) -> None:
+    """Say what will happen before a cell shows it. Prints a line; what is no answer is told in words and not kept.
+
+    name: of the lesson and the prediction, "02.c".
+    answer: a number; a list of `count` numbers; one of `choices`, of which the beginning is enough; `...` or none skips it.
+    unit: of the number.
+    choices: the texts to choose from; without them the answer is a number.
+    count: how many numbers.
+    """
+    _units[name] = unit
+    stored = progress.predictions().get(name, {})
+    given = answer[0] if len(answer) == 1 else list(answer) or ...
+    if given is None or given is Ellipsis:
+        before = (stored | _unkept.get(name, {})).get("said")
+        told = f"you said {_quoted(before, unit)}, and that stands." if before is not None else "skipped. Running on is fine."
+        print(f"{name}: {told}")
+        return
+    try:
+        said = _chosen(given, tuple(choices)) if choices else _numbers(given, unit, count)
+    except InputError as error:
+        print(f"{name}: {error} Or leave ... there and run on.")
+        return
+    print(f"{name}: you say {_quoted(said, unit)}.")
+    if obstacle := _keep(name, {"said": said, "unit": unit}, stored):
+        print(obstacle)
+
+
+def compare(name: str, value: Any) -> None:
+    """Print the result of what was to be predicted, beside what was said, if anything was; with that it is kept.
+
+    name: as in `predict`. value: a number, several, or a text: what the cell has computed. A whole number is printed whole, any
+    other with two significant digits. Raises `InputError` for anything else.
+    """
+    result: Any = value if isinstance(value, str) else _rounded(value)
+    stored = progress.predictions().get(name, {})
+    known = stored | _unkept.get(name, {})
+    unit = _units.get(name, known.get("unit", ""))
+    shown = value if isinstance(value, str) else _as_result(value, unit)
+    if "said" not in known:
+        print(f"{name}: {shown}")
+        return
+    off = _how_far(known["said"], result, unit)
+    beside = f"; you said {_quoted(known['said'], unit)}{off and f', {off}'}"
+    print(f"{name}: {shown}{', as you said' if off == _RIGHT else beside}")
+    if isinstance(value, str) or np.all(np.isfinite(result)):
+        _keep(name, {"is": result}, stored)
+
+
+def review(lesson: str = "") -> None:
+    """Print what was predicted in a lesson, such as "02", or in all of them: name, what was said, what it is, how far off."""
+    stored = progress.predictions()
+    known = {name: stored.get(name, {}) | _unkept.get(name, {}) for name in sorted({*stored, *_unkept})}
+    rows = [("", "you said", "it is", "")]
+    for name, entry in known.items():
+        if "said" in entry and lesson in ("", name.split(".")[0]):
+            said, result, unit = entry["said"], entry.get("is"), entry.get("unit", "")
+            shown, off = ("not seen yet", "") if result is None else (_as_result(result, unit), _how_far(said, result, unit))
+            rows.append((name, _as_said(said, unit), shown, off))
+    if len(rows) == 1:
+        print(f"Nothing was predicted{f' in lesson {lesson}' if lesson else ''} yet.")
+        return
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("   ".join(f"{part:{width}}" for part, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _how_far(said: Any, result: Any, unit: str) -> str:
+    """How far what was said is from the result, in words; "" where that cannot be told."""
+    if isinstance(said, str) or isinstance(result, str):
+        return _RIGHT if str(said).casefold() == str(result).casefold() else ""
+    if np.shape(said) != np.shape(result):
+        return ""
+    if isinstance(result, list):
+        right = [_how_far(a, b, unit) for a, b in zip(said, result, strict=True)].count(_RIGHT)
+        return _RIGHT if right == len(result) else f"{right} of {len(result)} right"
+    if isinstance(result, int) and not unit:  # a count
+        missed = about(abs(said - result), digits=_SAID)
+        return _RIGHT if said == result else f"{missed} too {'many' if said > result else 'few'}"
+    texts = (about(said), about(result))
+    if texts[0] == texts[1]:
+        return _RIGHT
+    if "0" in texts or not np.isfinite(result):
+        return ""
+    part = about(said / result)
+    if said / result < 0:
+        return "the other way"
+    return "nearly" if part == "1" else f"{part} of it" if said / result < 1 else f"{part} times as much"
+
+
+def _keep(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
+    """Keep what is new. Where it cannot be kept it lives as long as this process; what prevented it, or ""."""
+    entry = _unkept.pop(name, {}) | entry
+    if all(stored.get(key) == value for key, value in entry.items()):
+        return ""
+    obstacle = progress.keep(name, entry)
+    if obstacle:
+        _unkept[name] = entry
+    return obstacle
+
+
+def _chosen(answer: Any, choices: Sequence[str]) -> str:
+    """The one of `choices` that an answer means."""
+    listed = ", ".join(f'"{choice}"' for choice in choices)
+    if not isinstance(answer, str) or not answer.strip():
+        raise InputError(f"choose one of {listed}, in quotes.")
+    wanted = answer.strip().casefold()
+    meant = [choice for choice in choices if choice.casefold() == wanted]
+    meant = meant or [choice for choice in choices if choice.casefold().startswith(wanted)]
+    if len(meant) == 1:
+        return meant[0]
+    fault = "fits more than one of" if meant else "is none of"
+    raise InputError(f'"{answer.strip()[:40]}" {fault} {listed}.')
+
+
+def _numbers(answer: Any, unit: str, count: int) -> Any:
+    """A learner's number, or list of numbers."""
+    given = plain_numbers(answer)
+    wanted = "one number" if count == 1 else f"a list of {count} numbers"
+    form = "12.5" if count == 1 else f"[{', '.join(['12.5'] * count)}]"
+    right = f"write {wanted}{f', in {unit}' if unit else ''}, as {form}."
+    if given is None:
+        raise InputError(f"{'a text' if isinstance(answer, str) else 'this'} is no prediction here: {right}")
+    if given.ndim > 1 or given.size != count:
+        raise InputError(f"{given.size} {'number is' if given.size == 1 else 'numbers are'} no prediction here: {right}")
+    if not np.all(np.abs(given) <= LARGEST):
+        raise InputError(f"this is not finite, or far too large: {right}")
+    said = [int(x) if x.is_integer() else x for x in given.ravel().tolist()]
+    return said if count > 1 else said[0]
+
+
+def _rounded(value: Any) -> Any:
+    """A result as it is kept: whole numbers whole, others to six digits, which are the same on every processor; lists flat."""
+    given = plain_numbers(value)
+    if given is None:
+        raise InputError(f"value must be a number, several, or a text, not of the kind {type(value).__name__}.")
+    whole = np.asarray(value).dtype.kind in "iu"
+    kept = [int(x) if whole else float(f"{x:.6g}") for x in np.ravel(given).tolist()]
+    return kept if np.ndim(given) else kept[0]
+
+
+def _as_result(value: Any, unit: str) -> str:
+    if isinstance(value, str):
+        return value
+    return about(value, unit, digits=12 if np.asarray(value).dtype.kind in "iu" else 2)
+
+
+def _as_said(said: Any, unit: str) -> str:
+    return said if isinstance(said, str) else about(said, unit, digits=_SAID, floor=0.0)
+
+
+def _quoted(said: Any, unit: str) -> str:
+    return f'"{said}"' if isinstance(said, str) else _as_said(said, unit)

@@ -1,0 +1,212 @@
+"""Rows of one's own and bounds of normal forces: kept on both paths, told when they conflict, refused where they do not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.control import Rows
+from floatbase.dynamics import PointContact
+from floatbase.errors import InfeasibleError, InputError, UnknownNameError
+from floatbase.qp import solve
+from floatbase.robots import Robot
+
+# rows ----------------------------------------------------------------------------------------------------------------------
+
+
+def own_rows(robot: Robot, contacts: fb.Contacts) -> list[Rows]:
+    """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with time."""
+    E, up = np.eye(robot.nv)[robot.nv - robot.d :], np.zeros((1, contacts.k))
+    up[0, contacts.point_entries[2::3]] = 1.0
+    turns = np.resize([1.0, -1.0], (1, robot.d))
+    sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
+    return [
+        Rows("acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides),
+        Rows("total force", "forces", (up, [1.05 * robot.weight])),
+        Rows(
+            "joined torques", "tau", lambda eom, t: (np.vstack([turns, -turns]), np.full(2, (0.01 - 0.002 * t) * robot.weight))
+        ),
+    ]
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12", "talos"])
+def test_rows_of_ones_own_hold_and_have_their_names_on_both_paths(name: str) -> None:
+    robot = judges.load(name)
+    contacts = judges.stance(robot)
+    rows = own_rows(robot, contacts)
+    compiled, readable = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=rows)
+    kinds: set[str] = set()
+    for i, state in enumerate(judges.near_and_far(name, 6)):
+        t = 0.1 * i
+        assert judges.difference(compiled, readable, state, t) < judges.agreement(robot)
+        try:
+            command, expected = compiled(state.q, state.v, t), readable(state.q, state.v, t)
+        except InfeasibleError:
+            continue
+        eom = fb.equations_of_motion(state, contacts)
+        for each in rows:
+            G, h = each.at(eom, t)
+            assert np.all(G @ command.solution[each.block] <= h + 1e-6)
+        if name != "talos":  # four corners share one wrench: rows can depend on one another
+            assert command.active == expected.active
+        kinds |= {row.kind for row in command.active} | {row.owner for row in command.active}
+    assert {"acceleration limit", "total force", "joined torques"} <= kinds
+
+
+def test_rows_of_ones_own_against_cvxpy() -> None:
+    robot = judges.load("go2")
+    contacts = judges.stance(robot)
+    controller = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=own_rows(robot, contacts))[0]
+    for state in judges.states("go2", 4, 0.1):
+        command, judge = controller(state.q, state.v), solve(controller.qp(state), "cvxpy")
+        assert command.path == "compiled"
+        assert np.max(np.abs(command.tau - judge["tau"])) < 1e-4 * np.max(robot.torque_limits)
+
+
+def test_rows_in_conflict_are_told_by_their_names() -> None:
+    robot = judges.load("go2")
+    light = Rows("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
+    for controller in judges.pair(robot, judges.stance(robot), [], rows=[light], min_normal_force=10.0):
+        with pytest.raises(InfeasibleError, match="light feet") as caught:
+            controller(robot.standing().q, np.zeros(18))
+        row = next(row for row in caught.value.rows if row == "light feet")
+        assert (row.kind, row.owner, row.number) == ("rows", "light feet", 0)
+        assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
+
+
+# forces over time ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
+    robot = judges.load("go2")
+    share = 0.25 * robot.weight
+    windows = {
+        "min_normal_force": {"RR_foot": 12.0, "RL_foot": lambda t: 5.0 * t},
+        "max_normal_force": {"FL_foot": lambda t: share * (1.0 - t), "RR_foot": 2.0 * share},
+    }
+    contacts = judges.stance(robot)
+    both = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
+    for t in (0.0, 0.25, 0.5, 1.0):
+        command = both[0](robot.standing().q, np.zeros(18), t)
+        normal = dict(zip(contacts.point_names, command.forces.reshape(-1, 3)[:, 2], strict=True))
+        assert normal["FL_foot"] <= share * (1.0 - t) + 1e-6 and normal["RR_foot"] >= 12.0 - 1e-6
+        assert normal["RL_foot"] >= 5.0 * t - 1e-6
+        assert t == 0.0 or "FL_foot largest normal force" in command.active
+        assert command.active == both[1](robot.standing().q, np.zeros(18), t).active
+        assert max(judges.difference(*both, state, t) for state in judges.near_and_far("go2", 3)) < judges.agreement(robot)
+    row = next(row for row in command.active if row.endswith("largest normal force"))
+    assert (row.kind, row.owner) == ("largest normal force", "FL_foot")
+
+
+def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners() -> None:
+    robot = judges.load("talos")
+    contacts = fb.Contacts.flat_feet(robot)
+    windows = {"min_normal_force": {contacts.names[0]: 40.0}, "max_normal_force": 150.0}
+    both = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
+    normal = both[0](robot.standing().q, np.zeros(robot.nv)).forces[2::3]
+    assert np.all(normal[:4] >= 40.0 - 1e-6) and np.all(normal <= 150.0 + 1e-6)
+    assert max(judges.difference(*both, state) for state in judges.near_and_far("talos", 3)) < judges.agreement(robot)
+
+
+class Heel(PointContact):
+    """A contact with a name of its own, which is no frame's."""
+
+    name = "heel"
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(path: str) -> None:
+    robot = judges.load("go2")
+    state, tasks = robot.random_state(1, 0.1), list(fb.standing_tasks(robot.standing()))
+    stand = fb.Contacts.points(robot).without("RL_foot") + fb.Contacts([Heel("RL_foot", radius=0.022)])
+    swing = stand.without("FL_foot", "heel")
+
+    def torques(contacts: fb.Contacts, **bounds: object) -> np.ndarray:
+        return fb.WholeBodyController(robot, contacts, tasks, path=path, **bounds)(state.q, state.v, 0.1).tau
+
+    bounds = {"min_normal_force": {"heel": 15.0, "RR_foot": 12.0}, "max_normal_force": {"FL_foot": lambda t: 20.0 + t}}
+    standing = fb.WholeBodyController(robot, stand, tasks, path=path, **bounds)
+    lifted = standing.replace(contacts=swing)
+    other = lifted.replace(limits=replace(lifted.limits, torque_limits=robot.torque_limits))
+    for each in (lifted, other):
+        assert each.path == path
+        assert np.array_equal(each(state.q, state.v, 0.1).tau, torques(swing, min_normal_force={"RR_foot": 12.0}))
+        back = each.replace(contacts=stand)(state.q, state.v, 0.1)
+        assert np.array_equal(back.tau, standing(state.q, state.v, 0.1).tau)
+        assert "FL_foot largest normal force" in back.active
+    assert np.array_equal(lifted(state.q, state.v, 0.1).tau, torques(swing, **bounds | {"min_normal_force": {"RR_foot": 12.0}}))
+    with pytest.raises(UnknownNameError, match="unknown contact in min_normal_force 'heel'"):
+        torques(swing, **bounds)  # a new controller knows the robot's feet, and no other contact that is not there
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_bound_that_is_a_function_is_asked_once_at_a_time(path: str) -> None:
+    robot = judges.load("go2")
+    asked: list[float] = []
+    bound = {"FL_foot": lambda t: asked.append(t) or 50.0}
+    controller = fb.WholeBodyController(robot, judges.stance(robot), [], max_normal_force=bound, path=path)
+    assert asked == [0.0]
+    controller(robot.standing().q, np.zeros(18), 0.5)
+    assert asked == [0.0, 0.5]
+    controller.replace(limits=controller.limits)
+    assert asked == [0.0, 0.5, 0.0]
+    controller.replace(contacts=controller.contacts.without("FL_foot"))
+    assert asked == [0.0, 0.5, 0.0]
+
+
+# words ---------------------------------------------------------------------------------------------------------------------
+
+
+def make(**options: object) -> Callable[[], object]:
+    robot = judges.load("go2")
+    return lambda: fb.WholeBodyController(robot, judges.stance(robot), [], **options)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "text"),
+    [
+        (make(max_normal_force=-1.0), InputError, "max_normal_force is -1; it must be ≥ 0 N"),
+        (make(max_normal_force={"FL_foot": -1.0}), InputError, "max_normal_force of FL_foot is -1; it must be ≥ 0 N"),
+        (make(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "unknown contact in min_normal_force 'FL_fot'; .*FL_foot"),
+        (make(min_normal_force={"FL_foot": lambda t: -1.0}), InputError, "min_normal_force of FL_foot is -1; it must be ≥ 0 N"),
+        (make(rows=Rows("r", "tau", (np.eye(12), np.ones(12)))), InputError, "rows must be a list of Rows, not a Rows"),
+        (make(rows=[np.eye(12)]), InputError, "each of rows must be a Rows, as floatbase.control.Rows"),
+        (lambda: Rows("r", "lambda", (np.eye(12), np.ones(12))), InputError, "rows 'r' have block 'lambda'; it must be"),
+        (lambda: Rows("r", "tau", np.eye(12)), InputError, r"rows 'r' must be G and h, as in \(G, h\), not an array"),
+        (
+            lambda: Rows("r", "tau", (np.eye(12), np.ones(3))),
+            InputError,
+            r"h of r has shape \(3,\); it must have shape \(12,\)",
+        ),
+        (make(rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]), InputError, r"G of r has shape \(3, 3\); .* \(any, 12\)"),
+        (make(rows=[Rows("r", "tau", lambda eom, t: 3.0)]), InputError, "rows 'r' must be G and h"),
+        (make(rows=[Rows("r", "tau", (np.eye(12), np.ones(12)), ["a"])]), InputError, "rows 'r' have 1 owners and 12 rows"),
+        (make(rows=2 * [Rows("r", "tau", (np.eye(12), np.ones(12)))]), InputError, "inequality name 'r 0' stands twice"),
+    ],
+)
+def test_bad_rows_and_bounds_are_told_what_would_be_right(call: Callable[[], object], kind: type[Exception], text: str) -> None:
+    with pytest.raises(kind, match=text):
+        call()
+
+
+def test_a_bound_that_goes_wrong_is_told_in_the_words_of_the_readable_path() -> None:
+    robot = judges.load("go2")
+    bound = {"FL_foot": lambda t: 50.0 if t < 1.0 else np.nan}
+    for controller in judges.pair(robot, judges.stance(robot), [], max_normal_force=bound):
+        assert controller(robot.standing().q, np.zeros(18)).path == controller.path
+        with pytest.raises(InputError, match="max_normal_force of FL_foot is nan; it must be ≥ 0 N"):
+            controller(robot.standing().q, np.zeros(18), 1.0)
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_replaced_controller_is_checked(path: str) -> None:
+    controller = judges.controller_of("go2", path=path)
+    with pytest.raises(InputError, match=r"G of r has shape \(3, 3\)"):
+        controller.replace(limits=replace(controller.limits, rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]))
+    with pytest.raises(UnknownNameError, match="unknown contact in max_normal_force 'FL_fot'; near names: FL_foot"):
+        controller.replace(limits=replace(controller.limits, max_normal_force={"FL_fot": 1.0}))

@@ -1,0 +1,232 @@
+"""Predictions: kept in the learner's file, shown beside the result, and never a reason for an error."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from floatbase.errors import InputError
+from floatbase.lessons import check, compare, predict, progress, review
+
+CHOICES = ["in the push", "at rest", "in the first millisecond"]
+
+
+@pytest.fixture(autouse=True)
+def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Of a learner who has just begun."""
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def said(capsys: pytest.CaptureFixture[str]) -> Any:
+    """What was printed since it was last asked for."""
+    return lambda: capsys.readouterr().out.splitlines()
+
+
+def lines(home: Path) -> list[Any]:
+    """What stands in the learner's file."""
+    text = (home / "progress.jsonl").read_text() if (home / "progress.jsonl").exists() else ""
+    return [json.loads(line) for line in text.split("\n") if line]
+
+
+def test_a_prediction_is_shown_beside_the_result(said: Any) -> None:
+    predict("02.c", 40, unit="mm")
+    compare("02.c", 69.2)
+    assert said() == ["02.c: you say 40 mm.", "02.c: 69 mm; you said 40 mm, 0.58 of it"]
+
+
+@pytest.mark.parametrize("skipped", [(), (...,), (None,)])
+def test_a_prediction_may_be_skipped_and_leaves_nothing_behind(home: Path, said: Any, skipped: tuple[Any, ...]) -> None:
+    predict("02.c", *skipped, unit="mm")
+    compare("02.c", 69.2)
+    review("02")
+    assert said() == [
+        "02.c: skipped. Running on is fine.", "02.c: 69 mm", "Nothing was predicted in lesson 02 yet.",
+    ]  # fmt: skip
+    assert list(home.iterdir()) == []
+
+
+def test_what_was_said_stands_in_a_new_copy_of_the_lesson(said: Any) -> None:
+    predict("02.c", 40, unit="mm")
+    predict("02.c", ..., unit="mm")
+    compare("02.c", 69.2)
+    assert said()[1:] == ["02.c: you said 40 mm, and that stands.", "02.c: 69 mm; you said 40 mm, 0.58 of it"]
+
+
+@pytest.mark.parametrize(
+    ("number", "result", "beside"),
+    [
+        (400, 69.2, "69 mm; you said 400 mm, 5.8 times as much"), (70, 69.2, "69 mm; you said 70 mm, nearly"),
+        (69, 69.2, "69 mm, as you said"), (-40, 69.2, "69 mm; you said -40 mm, the other way"),
+        (0, 69.2, "69 mm; you said 0 mm"), (3, 1e-12, "0 mm; you said 3 mm"), (0, -1e-12, "0 mm, as you said"),
+        (157.76, 1.0, "1 mm; you said 157.76 mm, 160 times as much"), (3, np.nan, "not a number; you said 3 mm"),
+        (3, np.inf, "infinite; you said 3 mm"), (5, 6, "6 mm; you said 5 mm, 0.83 of it"),
+    ],
+)  # fmt: skip
+def test_how_far_off_is_said_in_words(said: Any, number: float, result: float, beside: str) -> None:
+    predict("02.c", number, unit="mm")
+    compare("02.c", result)
+    assert said()[1] == f"02.c: {beside}"
+
+
+def test_a_count_is_printed_whole_and_compared_by_difference(said: Any) -> None:
+    predict("03.a", 5)
+    for result in (np.int64(6), 5, 123, 4):
+        compare("03.a", result)
+    assert said()[1:] == [
+        "03.a: 6; you said 5, 1 too few", "03.a: 5, as you said", "03.a: 123; you said 5, 118 too few",
+        "03.a: 4; you said 5, 1 too many",
+    ]  # fmt: skip
+
+
+def test_several_numbers_are_compared_one_by_one(said: Any) -> None:
+    predict("03.d", [1, 2], unit="N", count=2)
+    predict("03.d", 1, 2, unit="N", count=2)  # without brackets
+    compare("03.d", np.array([1.01, 3.3]))
+    compare("03.d", [1.0, 2.0])
+    compare("03.d", [1.0, 2.0, 3.0])  # of a lesson that has changed
+    assert said() == [
+        *["03.d: you say (1, 2) N."] * 2, "03.d: (1, 3.3) N; you said (1, 2) N, 1 of 2 right", "03.d: (1, 2) N, as you said",
+        "03.d: (1, 2, 3) N; you said (1, 2) N",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("answer", ["in the f", "IN THE FIRST MILLISECOND", " In The First ", "in the first millisecond"])
+def test_a_choice_is_known_by_its_beginning(said: Any, answer: str) -> None:
+    predict("00.b", answer, choices=CHOICES)
+    compare("00.b", CHOICES[2])
+    compare("00.b", CHOICES[1])
+    assert said() == [
+        f'00.b: you say "{CHOICES[2]}".', f"00.b: {CHOICES[2]}, as you said", f'00.b: at rest; you said "{CHOICES[2]}"',
+    ]  # fmt: skip
+
+
+def test_a_choice_that_is_the_beginning_of_another_is_meant_when_it_is_said(said: Any) -> None:
+    predict("00.b", "less", choices=["less", "less than half"])
+    assert said() == ['00.b: you say "less".']
+
+
+@pytest.mark.parametrize(
+    ("answer", "fault"),
+    [
+        ("in", "fits more than one"),
+        ("rest", "is none of"),
+        ("", "choose one"),
+        (3, "choose one"),
+        (["at rest"] * 2, "choose one"),
+    ],
+)
+def test_what_is_no_choice_is_told_with_all_choices(home: Path, said: Any, answer: Any, fault: str) -> None:
+    predict("00.b", answer, choices=CHOICES)
+    (line,) = said()
+    assert fault in line and all(choice in line for choice in CHOICES)
+    assert lines(home) == []
+
+
+UNUSABLE = {
+    "text": "40 mm", "truth": True, "not a number": np.nan, "endless": np.inf, "huge": 10**400, "complex": 1j, "function": abs,
+    "empty": [], "ragged": [[1.0], [1.0, 2.0]], "object": object(), "dictionary": {}, "decimal comma": (0, 58),
+    "matrix": np.eye(1), "five": np.ones(5), "generator": (x for x in (1, 2)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", UNUSABLE)
+@pytest.mark.parametrize("count", [1, 3])
+def test_what_is_no_prediction_is_told_in_one_line(home: Path, said: Any, kind: str, count: int) -> None:
+    predict("02.c", UNUSABLE[kind], unit="mm", count=count)
+    (line,) = said()
+    assert "in mm, as " in line and line.endswith("Or leave ... there and run on.")
+    assert lines(home) == []
+
+
+def test_the_same_again_adds_no_line_and_another_does(home: Path) -> None:
+    for _ in range(3):
+        predict("02.c", 40, unit="mm")
+        compare("02.c", 69.2)
+        compare("02.c", 69.2 * (1 + 1e-12))  # of another processor
+    assert lines(home) == [{"02.c": {"said": 40, "unit": "mm"}}, {"02.c": {"is": 69.2}}]
+    predict("02.c", 50, unit="mm")
+    assert lines(home)[2:] == [{"02.c": {"said": 50, "unit": "mm"}}]
+
+
+def test_predictions_are_no_tries_and_tries_no_predictions(home: Path) -> None:
+    predict("00.a", 40, unit="mm")
+    check("00.1", 3.0)
+    assert list(progress.load()) == ["00.1"]
+    assert progress.predictions() == {"00.a": {"said": 40, "unit": "mm"}}
+
+
+def test_a_lesson_is_reviewed_and_all_of_them_are(said: Any) -> None:
+    predict("02.c", 40, unit="mm")
+    compare("02.c", 69.2)
+    predict("02.a", "at", choices=CHOICES)
+    compare("02.a", CHOICES[1])
+    predict("03.d", [1, 2], unit="N", count=2)
+    said()
+    review("02")
+    table = said()
+    review()
+    assert [line.split() for line in table] == [
+        ["you", "said", "it", "is"], ["02.a", "at", "rest", "at", "rest", "right"],
+        ["02.c", "40", "mm", "69", "mm", "0.58", "of", "it"],
+    ]  # fmt: skip
+    assert len({line.index(word) for line, word in zip(table, ("it is", "at rest   right", "69 mm"), strict=True)}) == 1
+    assert [line.split()[0] for line in said()] == ["you", "02.a", "02.c", "03.d"]
+
+
+DAMAGED = (
+    "null", "5", "[1]", '"a"', "\0", "[" * 100_000, '{"02.c": 5}', '{"02.c": {}}', '{"02.c": {"said": null}}',
+    '{"02.c": {"said": NaN, "is": Infinity}}', '{"02.c": {"said": [], "unit": 3}}', '{"02.c": {"said": [1, "a"]}}',
+    '{"02.c": {"said": true}}', '{"02.c": {"said": 1e400}}', '{"02.c": {"said": {"is": 1}}}', '{"02.c": {"said": "\\ud800"}}',
+    '{"\\ud800": {"said": 1}}', '{"02.c": {"said": 1' + "0" * 400 + "}}", '{"02.c": {"said": 4',
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("text", DAMAGED)
+def test_damage_is_left_out_and_left_as_it_is(home: Path, said: Any, text: str) -> None:
+    (home / "progress.jsonl").write_text(text)
+    compare("02.c", 69.2)
+    review()
+    predict("02.c", 40, unit="mm")
+    compare("02.c", 69.2)
+    review()
+    printed = said()
+    assert printed[0].startswith("02.c: 69") and printed[1] == "Nothing was predicted yet."
+    assert printed[3] == "02.c: 69 mm; you said 40 mm, 0.58 of it"
+    assert (home / "progress.jsonl").read_text().startswith(text)
+
+
+@pytest.mark.parametrize("before", ["a text", [1, 2]])
+def test_what_was_said_to_another_question_of_that_name_does_no_harm(said: Any, before: Any) -> None:
+    progress.keep("02.c", {"said": before, "unit": "mm"})
+    compare("02.c", 69.2)
+    review()
+    assert said()[0].startswith("02.c: 69 mm; you said ")
+
+
+def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process_and_a_line_says_why(
+    home: Path, monkeypatch: pytest.MonkeyPatch, said: Any
+) -> None:
+    (home / "file").write_text("")
+    monkeypatch.setenv("FLOATBASE_HOME", str(home / "file"))
+    predict("05.u", 40, unit="mm")
+    assert [line[:33] for line in said()] == ["05.u: you say 40 mm.", "Tries and predictions cannot be k"]
+    compare("05.u", 69.2)
+    review("05")
+    assert said()[0] == "05.u: 69 mm; you said 40 mm, 0.58 of it"
+    assert progress.predictions() == {}
+
+    monkeypatch.setenv("FLOATBASE_HOME", str(home))  # as soon as it can be kept, it is
+    compare("05.u", 69.2)
+    assert progress.predictions() == {"05.u": {"said": 40, "unit": "mm", "is": 69.2}}
+
+
+@pytest.mark.parametrize("nothing", [None, True, {}, 1j])
+def test_a_result_that_is_none_is_refused(nothing: Any) -> None:
+    with pytest.raises(InputError, match="value must be a number"):
+        compare("02.c", nothing)
