@@ -103,6 +103,8 @@ def test_wrong_shapes_of_j_get_their_hint() -> None:
         ((14, 9), "transpose"),
         ((3, 14), "three feet touch"),
         ((12, 14), "not four"),
+        ((9, 12), "lifted leg"),
+        ((6, 14), "three components"),
         ((9, 18), "go2's"),
         (9 * 14, "a single number"),
         (None, "no answer yet"),
@@ -115,7 +117,7 @@ def test_wrong_generalised_forces_get_their_hint(moving: fb.State) -> None:
     J = moving.frame_jacobian("FL_foot")
     force = J[:3].T @ PUSH
     assert right("02.2", force)
-    R = moving.frame_pose("base").rotation
+    R, contacts = moving.frame_pose("base").rotation, fb.Contacts.points(moving.robot)
     wrong = [
         (-force, "sign"),
         (np.concatenate([R @ force[:3], R @ force[3:6], force[6:]]), "world axes"),
@@ -126,6 +128,9 @@ def test_wrong_generalised_forces_get_their_hint(moving: fb.State) -> None:
         (np.zeros(18), "does nothing"),
         (moving.robot.standing().frame_jacobian("FL_foot")[:3].T @ PUSH, "another posture"),
         (J[3:].T @ PUSH, "angular rows"),
+        (fb.equations_of_motion(moving.robot.standing(), contacts).J[:3].T @ PUSH, "J of `eom`"),
+        (fb.equations_of_motion(moving, contacts).J[:3].T @ PUSH, "acts at the frame's origin"),
+        (J[:3].T @ (R.T @ PUSH), "nothing has to be turned"),
         (None, "no answer yet"),
         (force[:, None], "shape (18, 1)"),
     ]
@@ -144,6 +149,7 @@ def test_wrong_drifts_get_their_hint(moving: fb.State) -> None:
         (-b, "which sign has b"),
         (np.zeros(3), "forgets the drift"),
         (R.T @ b, "foot's axes"),
+        (fb.equations_of_motion(moving, fb.Contacts.points(moving.robot)).b[:3], "a ball that rolls"),
         (-spatial, "ω × v is missing"),
         (moving.frame_velocity("FL_foot")[:3], "velocity of the foot"),
         (-moving.frame_drift("FL_foot")[3:], "angular rows"),

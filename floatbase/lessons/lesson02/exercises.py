@@ -123,7 +123,8 @@ def _judge_holding(answer: Any) -> Verdict:
 EXERCISES = (
     Exercise(
         name="02.1",
-        statement="solo8 (two joints a leg) stands on three point feet. What is the shape of J, as (rows, columns)?",
+        statement="solo8 has four legs with two joints each. It lifts one and stands on three point feet. What is the shape of J, "
+        "as (rows, columns)?",
         stub="shape_of_J = (3, 8)  # replace this",
         solution="shape_of_J = (9, 14)",
         judge=Numeric(
@@ -145,6 +146,8 @@ EXERCISES = (
                 "Three rows would be one foot. And the base has columns too.": lambda: (3, 8),
                 "Three rows would be one foot; three feet touch.": lambda: (3, 14),
                 "Three feet touch, not four.": lambda: (12, 14),
+                "The lifted leg's joints are directions, too: their columns are zero.": lambda: (9, 12),
+                "A foot's velocity has three components, however many joints its leg has.": lambda: (6, 14),
                 "18 columns are go2's, with three joints in each leg; solo8 has two.": lambda: (9, 18),
             },
         ),
@@ -178,6 +181,19 @@ EXERCISES = (
                     "This is the Jacobian of the standing robot; `moving` has another posture, so another J.": (
                         lambda: fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T @ [10.0, -5.0, 40.0]
                     ),
+                    "This is the J of `eom`: for the standing robot, and for the points that touch the ground.": (
+                        lambda: _standing_go2().J[:3].T @ [10.0, -5.0, 40.0]
+                    ),
+                    "This pushes at the point that touches the ground; `push` acts at the frame's origin, 2 cm off.": (
+                        lambda: fb.equations_of_motion(*_scene()).J[:3].T @ [10.0, -5.0, 40.0]
+                    ),
+                    "`push` is in world axes, and so are the rows of frame_jacobian: nothing has to be turned.": (
+                        lambda: (
+                            _scene()[0].frame_jacobian("FL_foot")[:3].T
+                            @ _scene()[0].frame_pose("base").rotation.T
+                            @ [10.0, -5.0, 40.0]
+                        )
+                    ),
                     "These are the angular rows of the Jacobian; a force at a point takes the linear ones, which come first.": (
                         lambda: _scene()[0].frame_jacobian("FL_foot")[3:].T @ [10.0, -5.0, 40.0]
                     ),
@@ -200,6 +216,9 @@ EXERCISES = (
                     lambda: np.zeros(3)
                 ),
                 "This is J̇ q̇ itself. J q̈ + J̇ q̇ = 0: which sign has b?": lambda: -_drift(),
+                "This b is for the point that touches the ground, of a ball that rolls; asked is the frame's origin.": (
+                    lambda: fb.equations_of_motion(*_scene()).b[:3]
+                ),
                 "The right vector in the foot's axes; (5) is written in world axes here.": _drift_in_the_foots_frame,
                 "ω × v is missing: the acceleration of a point is not the spatial acceleration of its body.": (
                     _drift_of_a_spatial_acceleration

@@ -88,14 +88,12 @@ def plot_both(record: Rollout, title: str) -> Axes:
     names = list(record.contacts.names)
     for foot, where in (("FL_foot", "front"), ("RL_foot", "rear")):
         row = 3 * names.index(foot) + 2
-        axis.plot(
-            record.time, record.planned[:, row], color=hexadecimal(PLANNED), linewidth=4, alpha=0.7, label=f"(7), {where}"
-        )
-        axis.plot(record.time, record.measured[:, row], color=hexadecimal(MEASURED), label=f"MuJoCo, {where}")
+        (by_equation,) = axis.plot(record.time, record.planned[:, row], color=hexadecimal(PLANNED), linewidth=4, alpha=0.7)
+        (by_engine,) = axis.plot(record.time, record.measured[:, row], color=hexadecimal(MEASURED))
         axis.annotate(f"each {where} foot", (record.time[90], record.measured[90, row]), (0, 8), textcoords="offset points")
     axis.set(xlabel="time [s]", ylabel="vertical force [N]", title=title)
     axis.grid(alpha=0.25)
-    axis.legend(ncols=2, fontsize="small")
+    axis.legend([by_equation, by_engine], ["(7)", "MuJoCo"], fontsize="small")
     return axis
 
 
