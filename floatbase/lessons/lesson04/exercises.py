@@ -126,7 +126,7 @@ def _judge_design(answer: Any) -> Verdict:
         )
     if friction > 6.0:
         most = f"one foot leans on friction with {friction:.1f} N"
-        return Verdict(False, f"It moves as desired, but {most}. Effort does not mind; who would?")
+        return Verdict(False, f"It moves as desired, but {most}. Effort does not mind; a cost on λ does, pulled back to τ.")
     return Verdict(True, "Three costs, each in the space where it is easy to say, added in the space where the motors are.")
 
 
