@@ -1,8 +1,8 @@
 """The problems on which floatbase and its C++ peers are compared: one optimum, in words that each of them has.
 
 Common to all: keep standing on all feet (centre of mass, base orientation, posture, with the gains and weights of
-`fb.standing_tasks`, but for the posture's weight, 0.1), four friction facets |f_x|, |f_y| ≤ μ f_z, no pull, torque limits. What the peers cannot say, the
-problem does without:
+`fb.standing_tasks`, but for the posture's weight, 0.1), four friction facets |f_x|, |f_y| ≤ μ f_z, no pull, torque limits. What
+the peers cannot say, the problem does without:
 
 - contacts are at the foot frames themselves, not at the balls' lowest points; normals point up;
 - the peers' friction pyramids touch the cone from outside (`inside=False`) and turn with a flat foot, so Talos' soles are level

@@ -97,7 +97,7 @@ def _wrong_pairs() -> dict[str, Array]:
     J, M, h, S, b = eom.J, eom.M, eom.h, eom.S, eom.b
     J_M = np.hstack([J @ M @ S, J @ M @ J.T])
     wrong = {
-        "b is missing on the right of (10): solo8 moves, and its feet must accelerate a little to stay.": (C, right_side - b),
+        "b is missing on the right of (10): solo8 moves, and its feet stay only with J q̈ = b, not 0.": (C, right_side - b),
         "h is missing on the right of (10): this robot has no weight.": (C, b),
         "The sign of h: in (8) and (10) it comes to the right as + J M⁻¹ h.": (C, 2.0 * b - right_side),
         "The sign of b: it stands on the right of (10) as in (7), with a plus.": (C, right_side - 2.0 * b),
