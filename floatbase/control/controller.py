@@ -23,7 +23,7 @@ from floatbase.robots import Robot, State, torque_limits_of
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
 _ANOTHER = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
-_OPTIONS = ("facets", "inside", "min_normal_force", "max_normal_force", "torque_limits", "rows", "solver", "path")
+_OPTIONS = ("facets", "inside", "turn", "min_normal_force", "max_normal_force", "torque_limits", "rows", "solver", "path")
 
 
 class WholeBodyController(Fixed):
@@ -33,7 +33,7 @@ class WholeBodyController(Fixed):
     contacts: its contacts with the ground.
     tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none acts on forces, or
         none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added, so that the optimum is unique.
-    facets, inside: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
+    facets, inside, turn: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
     min_normal_force, max_normal_force: N, at every contact point; one number, or a mapping from the name of a contact to a
         number or a function of t: a foot that is unloaded. The name of a foot that does not stand bounds nothing until it
         does, so that `replace(contacts=…)` may lift it; other names that are no contact's are errors.
@@ -67,6 +67,7 @@ class WholeBodyController(Fixed):
         *,
         facets: int = 4,
         inside: bool = True,
+        turn: float = 0.0,
         min_normal_force: NormalForces = 0.0,
         max_normal_force: NormalForces | None = None,
         torque_limits: npt.ArrayLike | None = None,
@@ -76,7 +77,7 @@ class WholeBodyController(Fixed):
     ):
         of_kind("robot", robot, Robot)
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
-        bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows)
+        bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows, turn)
         problem = Problem(robot, contacts, tasks, bounds)
         bounds.check_names(contacts.names, _feet(robot))
         problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop

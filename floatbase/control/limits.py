@@ -92,6 +92,7 @@ class Limits(Value):
     torque_limits: shape (d,), N·m, +inf where there is none.
     facets: number of facets of the friction polyhedron (28) of every contact point.
     inside: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
+    turn: rad, by which its facets are turned about the normal.
     min_normal_force, max_normal_force: N, bounds of normal · f at every contact point: one number for all, or a mapping from
         the name of a contact to a number or a function of the time t in s; 0 and none where it has none. The bound of a name
         that is not among the contacts waits until it is: a foot that has lifted will stand again.
@@ -106,6 +107,7 @@ class Limits(Value):
     min_normal_force: NormalForces = 0.0
     max_normal_force: NormalForces | None = None
     rows: Sequence[Rows] = ()
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
         limits = plain_numbers(self.torque_limits)
@@ -114,13 +116,18 @@ class Limits(Value):
         object.__setattr__(
             self, "max_normal_force", _kept("max_normal_force", {} if self.max_normal_force is None else self.max_normal_force)
         )
-        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, self.facets, self.inside)
-        for name in ("facets", "inside"):
+        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, *self.cut)
+        for name in ("facets", "inside", "turn"):
             object.__setattr__(self, name, getattr(polyhedron, name))
         if isinstance(self.rows, Rows) or not isinstance(self.rows, Sequence):
             raise InputError(f"rows must be a list of Rows, not {said(self.rows)}.")
         example = "floatbase.control.Rows(name, block, (G, h))"
         object.__setattr__(self, "rows", tuple(of_kind("each of rows", rows, Rows, example) for rows in self.rows))
+
+    @property
+    def cut(self) -> tuple[int, bool, float]:
+        """How friction cones are cut into facets: what `FrictionPolyhedron` takes after normal and mu."""
+        return self.facets, self.inside, self.turn
 
     @cached_property
     def move(self) -> bool:
@@ -200,7 +207,7 @@ def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[RowLabe
     names: list[RowLabel] = []
     G = np.zeros((per_point * contacts.n_points, contacts.k))
     for i, point in enumerate(contacts.point_names):
-        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], limits.facets, limits.inside)
+        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], *limits.cut)
         G[per_point * i : per_point * (i + 1), contacts.point_entries[3 * i : 3 * i + 3]] = np.vstack([cone.rows, -cone.normal])
         names += [RowLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
         names.append(RowLabel(f"{point} normal force", "normal force", point))

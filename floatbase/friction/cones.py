@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, cached_property, checked, flag, positive, read_only, unit_vector, whole
+from floatbase._arrays import Array, Value, cached_property, checked, flag, number, positive, read_only, unit_vector, whole
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
 MOST_FACETS = 1000  # they miss the cone by 5e-6 of μ, which nobody knows as well
@@ -118,16 +118,19 @@ class FrictionPolyhedron(Value):
     facets: n ≥ 3.
     inside: whether the polyhedron lies inside the cone (safe: it allows no force that slips) or outside it, touching it
         (optimistic). Inside, the middle of a facet allows μ cos(π/n) and only the edges reach μ.
+    turn: rad, by which all facets are turned about the normal: facet 0 faces t1 of `tangents` without it.
     """
 
     normal: Array
     mu: float
     facets: int = 4
     inside: bool = True
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("normal", self.normal))
         object.__setattr__(self, "mu", positive("friction coefficient mu", self.mu))
+        object.__setattr__(self, "turn", number("turn of the facets", self.turn, "rad"))
         object.__setattr__(self, "facets", whole("facets", self.facets, 3, MOST_FACETS, "μ is not known better"))
         object.__setattr__(self, "inside", flag("inside", self.inside))
 
@@ -146,7 +149,7 @@ class FrictionPolyhedron(Value):
     def rows(self) -> Array:
         """Rows, shape (n, 3), with rows @ f ≤ 0 for f in the polyhedron; each is d_i - μ_facet · normal.
 
-        d_i is the unit tangent that facet i faces; facet 0 faces t1 of `tangents`. Together they imply normal · f ≥ 0.
+        d_i is the unit tangent that facet i faces. Together they imply normal · f ≥ 0.
         """
         return read_only(self._directions(0.0) - self.mu_facet * self.normal)
 
@@ -191,7 +194,7 @@ class FrictionPolyhedron(Value):
 
     def _directions(self, shift: float) -> Array:
         """Unit tangents, shape (n, 3), turned by `shift` of a facet's angle."""
-        angles = 2.0 * np.pi * (np.arange(self.facets) + shift) / self.facets
+        angles = self.turn + 2.0 * np.pi * (np.arange(self.facets) + shift) / self.facets
         t1, t2 = tangents(self.normal)
         return np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
 

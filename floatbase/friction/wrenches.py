@@ -210,13 +210,19 @@ class WrenchSet(Value):
 
 
 def wrench_set(
-    state: State, contacts: Contacts, *, facets: int = 4, inside: bool = True, max_normal_force: npt.ArrayLike | None = None
+    state: State,
+    contacts: Contacts,
+    *,
+    facets: int = 4,
+    inside: bool = True,
+    turn: float = 0.0,
+    max_normal_force: npt.ArrayLike | None = None,
 ) -> WrenchSet:
     """(20)(21)(28) The wrenches about the centre of mass that a state's contacts can produce.
 
     state: where the robot is.
     contacts: its contacts, each with a friction cone.
-    facets, inside: the friction polyhedron of every point (see `FrictionPolyhedron`); by default the controller's.
+    facets, inside, turn: the friction polyhedron of every point (see `FrictionPolyhedron`); by default the controller's.
     max_normal_force: N, one number or one for each contact point; no limit by default.
 
     Raises `InputError` where there is no contact, or one whose forces have no cone. Source: the document, §3.1, §4.2.
@@ -226,7 +232,8 @@ def wrench_set(
     coneless = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
     if coneless:
         raise InputError(f"{', '.join(coneless)} has forces without a cone; leave it out: contacts.without(…).")
-    cones = tuple(FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True))
+    shapes = zip(contacts.normals, contacts.mus, strict=True)
+    cones = tuple(FrictionPolyhedron(n, mu, facets, inside, turn) for n, mu in shapes)
     limits: Any = np.inf if max_normal_force is None else max_normal_force
     number = plain_numbers(limits)
     limits = np.repeat(number, len(cones)) if number is not None and number.ndim == 0 else limits

@@ -64,16 +64,31 @@ def com_wrench(state: State, contacts: Contacts) -> Affine:
     return Affine.stack(force=Affine.linear(force_sum(contacts)), moment=Affine.linear(moment_sum(state, contacts)))
 
 
-def wrench_objective(state: State, contacts: Contacts, force: npt.ArrayLike, moment: npt.ArrayLike) -> Quadratic:
-    """(22) ½ ‖f̃_c - G_f λ‖² + ½ ‖τ̃_c - G_τ λ‖² as a cost on λ.
+def wrench_objective(
+    state: State,
+    contacts: Contacts,
+    force: npt.ArrayLike,
+    moment: npt.ArrayLike,
+    *,
+    force_weight: float = 1.0,
+    moment_weight: float = 1.0,
+) -> Quadratic:
+    """(22) w_f ½ ‖f̃_c - G_f λ‖² + w_τ ½ ‖τ̃_c - G_τ λ‖² as a cost on λ.
+
+    The document adds N² and (N·m)² as they come, w_f = w_τ = 1. Where the feet cannot give the whole wrench, the weights decide
+    which part is missed; w_τ = 1e6 is the same as counting moments in N·mm.
 
     state: where the robot is.
     contacts: whose forces are λ, shape (k,).
     force: f̃_c, shape (3,), N, world: what the ground should do to the robot; to stand still, its weight upwards.
     moment: τ̃_c, shape (3,), N·m, world, about the centre of mass.
+    force_weight, moment_weight: w_f and w_τ, ≥ 0.
     """
+    sizes = {"force_weight": force_weight, "moment_weight": moment_weight}
+    weights = np.repeat([positive(name, value, allow_zero=True) for name, value in sizes.items()], 3)
     desired = np.concatenate([checked("force", force, (3,), "N"), checked("moment", moment, (3,), "N·m")])
-    return Quadratic.of(com_wrench(state, contacts) - desired)
+    missed = com_wrench(state, contacts) - desired
+    return Quadratic.of(Affine.linear(np.diag(np.sqrt(weights))) @ missed)
 
 
 def desired_wrench(

@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property, checked, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, read_only, texts
 from floatbase.affine import Affine, block_slices
-from floatbase.errors import InfeasibleError
+from floatbase.errors import InfeasibleError, unknown_name
 from floatbase.linear_algebra import ranked_svd, row_lengths
 from floatbase.qp.conflicts import conflicting_rows
 from floatbase.qp.labels import row_labels
@@ -70,6 +70,19 @@ class QP(Value):
         values["inequality_names"] = row_labels(self.inequality_names, len(G), "inequality")
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def without(self, *kinds: str) -> QP:
+        """The same problem without the inequality rows of these kinds, such as "friction" or "normal force".
+
+        The kind of a row is `RowLabel.kind`; a text that is no `RowLabel` is its own. Raises `UnknownNameError` for others.
+        """
+        there = {label.kind: None for label in self.inequality_names}
+        for kind in texts("kinds", kinds):
+            if kind not in there:
+                raise unknown_name("kind of rows", kind, there)
+        kept = [i for i, label in enumerate(self.inequality_names) if label.kind not in kinds]
+        names = tuple(self.inequality_names[i] for i in kept)
+        return QP(self.H, self.g, self.A, self.b, self.G[kept], self.h[kept], self.equality_names, names, self.blocks)
 
     @property
     def n(self) -> int:

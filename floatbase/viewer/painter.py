@@ -51,7 +51,7 @@ class Painter:
     robot: the robot.
     requested_scale: length of a drawn force, m/N; None for one that fits the robot.
     facets: number of facets of the friction polyhedra; None draws round cones.
-    inside: whether the polyhedra lie inside the cones.
+    inside, turn: as for `FrictionPolyhedron`.
     ground: the ground; None for the plane that the contacts stand on.
     lines, text, paper: colours of the ground's lines, of text, and of the background.
     """
@@ -60,6 +60,7 @@ class Painter:
     requested_scale: float | None
     facets: int | None
     inside: bool
+    turn: float
     ground: Plane | None
     lines: RGB
     text: RGB
@@ -227,7 +228,7 @@ class Painter:
         if self.facets is None:
             status = "idle" if judged is None else _friction_cone(tuple(normal.tolist()), mu).status(judged)
             return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
-        polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inside)
+        polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inside, self.turn)
         status = "idle" if judged is None else polyhedron.status(judged)
         status = "inside" if status == "active" else status  # an active facet has a colour of its own
         active = () if judged is None else polyhedron.active_facets(judged)
@@ -316,9 +317,9 @@ def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
 
 
 @lru_cache(maxsize=256)
-def _polyhedron(normal: tuple[float, ...], mu: float, facets: int, inside: bool) -> FrictionPolyhedron:
+def _polyhedron(normal: tuple[float, ...], mu: float, facets: int, inside: bool, turn: float) -> FrictionPolyhedron:
     """The polyhedron with these values. There are few different ones, so each is made once."""
-    return FrictionPolyhedron(np.array(normal), mu, facets, inside)
+    return FrictionPolyhedron(np.array(normal), mu, facets, inside, turn)
 
 
 def nice(value: float) -> float:

@@ -149,7 +149,7 @@ def friction_polyhedron(
     """
     positive("height of a friction polyhedron", height, "m")
     matrix = placed(position, _surface_frame(polyhedron.normal), height)
-    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside))
+    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside), float(polyhedron.turn))
     picture = {"/sides": Item(_unit_polyhedron(*key), matrix, cone_colour(status))}
     for facet in np.atleast_1d(np.asarray(active, dtype=int)):
         picture[f"/facet {facet}"] = Item(_facet(*key, int(facet)), matrix)
@@ -277,15 +277,15 @@ def _unit_cone() -> Shape:
 
 
 @lru_cache(maxsize=64)
-def _unit_polyhedron(mu: float, facets: int, inside: bool) -> Shape:
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside).rays
+def _unit_polyhedron(mu: float, facets: int, inside: bool, turn: float) -> Shape:
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside, turn).rays
     return lowering.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True)
 
 
 @lru_cache(maxsize=256)
-def _facet(mu: float, facets: int, inside: bool, facet: int) -> Shape:
+def _facet(mu: float, facets: int, inside: bool, turn: float, facet: int) -> Shape:
     """One side of the polyhedron: facet i lies between rays i - 1 and i."""
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside).rays
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside, turn).rays
     corners = [np.zeros(3), rays[facet - 1], rays[facet]]
     return lowering.mesh(*geometry.fan(corners), WARNING, opacity=FACET_ALPHA, flat=True)
 

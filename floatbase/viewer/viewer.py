@@ -48,7 +48,7 @@ class Viewer:
     scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's weight about twice as long as
         its centre of mass is high.
     facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
-    inside: whether the polyhedra lie inside the cones, as in `FrictionPolyhedron`.
+    inside, turn: as for `FrictionPolyhedron`.
     ground: (3,), world, normal of the ground, a plane through the origin; None takes the plane that the contacts stand on
         when they share a normal, else a level ground.
     port: port of the page; 0 takes a free one.
@@ -68,18 +68,19 @@ class Viewer:
         scale: float | None = None,
         facets: int | None = None,
         inside: bool = True,
+        turn: float = 0.0,
         ground: npt.ArrayLike | None = None,
         port: int = 0,
     ):
         of_kind("robot", robot, Robot)
         if not isinstance(background, str) or background not in BACKGROUNDS:
             raise InputError(f"background is {said(background)}; it must be one of {', '.join(BACKGROUNDS)}.")
-        FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inside)  # raises InputError for wrong ones
+        cut = FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inside, turn)  # raises for wrong ones
         self.robot, self.background = robot, background
         self.height = whole("height", height, 1, _MOST_PIXELS, "pixels")
         requested = None if scale is None else positive("scale", scale, "m/N")
         paper, _, lines, text = BACKGROUNDS[background]
-        self.painter = Painter(robot, requested, facets, inside, _plane(ground), lines, text, paper)
+        self.painter = Painter(robot, requested, facets, cut.inside, cut.turn, _plane(ground), lines, text, paper)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
         self._moving = False

@@ -139,7 +139,7 @@ def test_one_flat_foot_points_and_no_contact_at_all() -> None:
 def test_any_number_of_facets_on_tilted_ground(facets: int, inside: bool) -> None:
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot, mu=0.4, normals=judges.random_normals(4, facets))
-    both = judges.pair(robot, contacts, facets=facets, inside=inside, min_normal_force=2.0)
+    both = judges.pair(robot, contacts, facets=facets, inside=inside, turn=0.3 * facets, min_normal_force=2.0)
     assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 4)) < TORQUE
 
 

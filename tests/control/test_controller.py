@@ -163,6 +163,26 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
             assert f"{point} facet 1" in command.active or f"{point} normal force" in command.active
 
 
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(path: str) -> None:
+    """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides, out of which forwards is one."""
+    robot = judges.load("go2")
+    state, contacts = robot.standing(), fb.Contacts.points(robot, mu=0.3)
+    others = fb.standing_tasks(state)[1:]
+
+    def reached(direction: float, turn: float) -> float:
+        towards = np.array([np.cos(direction), np.sin(direction), 0.0])
+        wish = fb.CoMTask(state.com, acceleration=4.0 * towards)
+        forces = fb.WholeBodyController(robot, contacts, [wish, *others], turn=turn, path=path)(state.q, state.v).forces
+        f = forces.reshape(-1, 3).sum(axis=0)
+        return float(f @ towards / f[2])
+
+    quarter = np.pi / 4
+    for turn in (0.0, quarter):
+        assert reached(turn, turn) == pytest.approx(0.3 * np.cos(quarter), abs=1e-3)
+        assert reached(turn + quarter, turn) == pytest.approx(0.3, abs=1e-3)
+
+
 def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> None:
     """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges, neither holds the other."""
     for state in judges.states("go2", 5, 0.3):

@@ -47,6 +47,8 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: FrictionPolyhedron([0.0, 0.0, 0.0], 0.7), InputError, "normal is the zero vector; it must have a direction"),
         (lambda: FrictionPolyhedron(UP, 0.7).margin([1.0]), InputError, r"force has shape \(1,\); .*\(3,\) \(N\)"),
         (lambda: controller(facets=2), InputError, "facets is 2"),
+        (lambda: controller(turn=np.nan), InputError, "turn of the facets is nan"),
+        (lambda: controller().qp(STATE).without("frictions"), UnknownNameError, "near names: friction"),
         (lambda: controller(min_normal_force=-1.0), InputError, "min_normal_force is -1; it must be ≥ 0 N"),
         (lambda: controller(torque_limits=[1.0, 2.0]), InputError, r"torque_limits must be one number > 0 or 12 of them"),
         (lambda: controller(torque_limits=0.0), InputError, r"torque_limits must be one number > 0 or 12 of them \(N·m\)"),

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
 
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
@@ -174,6 +175,18 @@ def test_facet_0_looks_along_the_worlds_x_and_the_next_one_along_y() -> None:
     cone = FrictionPolyhedron([0.0, 0.0, 1.0], 1.0, 4, inside=False)
     assert np.allclose(cone.rows[0], [1.0, 0.0, -1.0])
     assert np.allclose(cone.rows[1], [0.0, 1.0, -1.0])
+
+
+@given(seeds, facets, mus, st.booleans(), st.floats(-10.0, 10.0))
+def test_turned_facets_are_the_facets_turned_about_the_normal(seed: int, n: int, mu: float, inside: bool, turn: float) -> None:
+    normal = any_normal(np.random.default_rng(seed))
+    turned, straight = (FrictionPolyhedron(normal, mu, n, inside, angle) for angle in (turn, 0.0))
+    about = Rotation.from_rotvec(turn * normal).as_matrix()
+    size = 1.0 + mu
+    assert np.allclose(turned.rows, straight.rows @ about.T, rtol=0, atol=1e-9 * size)
+    assert np.allclose(turned.rays, straight.rays @ about.T, rtol=0, atol=1e-9 * size / np.cos(np.pi / n))
+    whole = FrictionPolyhedron(normal, mu, n, inside, turn + 2 * np.pi / n)
+    assert np.allclose(np.roll(turned.rows, -1, axis=0), whole.rows, rtol=0, atol=1e-9 * size)
 
 
 @given(seeds)

@@ -152,6 +152,24 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name:
         assert np.allclose(rate[3:], spin, atol=1e-4 * state.robot.weight)
 
 
+def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
+    """(22) adds N² and (N·m)²: counted in N·mm, a moment weighs a million times as much. solo8 cannot push sideways alone."""
+    state = judges.load("solo8").standing()
+    contacts = fb.Contacts.points(state.robot)
+    zeta = fb.forces_from_torques(fb.equations_of_motion(state, contacts))
+    force, moment = objectives.desired_wrench(state, [5.0 / state.robot.mass, 0.0, 0.0])
+    force = force[[1, 0, 2]]  # 5 N sideways
+    got = {}
+    for weight in (1.0, 1e6):
+        cost = objectives.wrench_objective(state, contacts, force, moment, moment_weight=weight).pullback(zeta)
+        got[weight] = objectives.com_wrench(state, contacts)(zeta(cost.minimiser()))
+    missed = {weight: wrench - np.concatenate([force, moment]) for weight, wrench in got.items()}
+    assert np.linalg.norm(missed[1.0][:3]) < 0.1 < 0.15 < np.linalg.norm(missed[1.0][3:])
+    assert np.linalg.norm(missed[1e6][3:]) < 1e-3 and np.linalg.norm(missed[1e6][:3]) > 4.9
+    only_moment = objectives.wrench_objective(state, contacts, force, moment, force_weight=0.0)
+    assert np.linalg.matrix_rank(only_moment.H) == 3
+
+
 def test_the_wrench_objective_has_the_value_of_its_formula() -> None:
     """On one foot and on two, six numbers cannot all be had: the minimum is above zero."""
     rng = np.random.default_rng(0)

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import floatbase as fb
 from floatbase.affine import Affine
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.qp import (
@@ -198,6 +199,24 @@ def test_labels_are_texts_that_know_their_kind_owner_and_number() -> None:
     qp = QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=(label, "roof"))
     assert [name.kind for name in qp.inequality_names] == ["friction", "other rows"]
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]
+
+
+def test_rows_can_be_left_out_by_kind() -> None:
+    """Facets say already that no foot pulls, for their rows add up to -n μ' nᵀ f ≤ 0; without both kinds a foot does pull."""
+    controller = judges.controller_of("go2")
+    state = controller.robot.standing()
+    pushed = fb.CoMTask(state.com, acceleration=[0.0, 12.0, 0.0])
+    qp = controller.replace(tasks=[pushed, *controller.tasks[1:]]).qp(state)
+    smaller = qp.without("normal force")
+    assert len(qp.G) - len(smaller.G) == 4 and "FL_foot normal force" not in smaller.inequality_names
+    assert smaller.inequality_names[4].kind == "friction" and np.array_equal(smaller.A, qp.A)
+
+    def least(*kinds: str) -> float:
+        return float(solve(qp.without(*kinds))["forces"][2::3].min())
+
+    assert least("normal force") == pytest.approx(least(), abs=1e-6)
+    assert least("friction", "normal force") < -20.0
+    assert least("friction") == pytest.approx(0.0, abs=1e-6)
 
 
 def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_name() -> None:

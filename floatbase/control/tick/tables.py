@@ -46,6 +46,7 @@ BLOCKS = {"qdd": QDD, "tau": TAU, "forces": FORCES}
 _SPARE = 4  # Pinocchio's results that are kept for the next tick: as many as threads are likely to tick at once
 _POSE = 12  # numbers of a pose: rotation column by column, then position
 Indices: TypeAlias = npt.NDArray[np.int64]
+Cut: TypeAlias = tuple[int, bool, float]  # facets, inside and turn of a `FrictionPolyhedron`
 
 
 class Dynamics:
@@ -134,7 +135,7 @@ def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Mo
 def _contact_tables(problem: Problem) -> tuple[Any, ...]:
     """Contacts (C, 6), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P (F + 1), 5)."""
     limits = problem.limits
-    found = [_contact_numbers(problem.robot, contact, limits.facets, limits.inside) for contact in problem.contacts]
+    found = [_contact_numbers(problem.robot, contact, limits.cut) for contact in problem.contacts]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
     tables = np.array(table, np.int64).reshape(-1, 6)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
@@ -143,31 +144,31 @@ def _contact_tables(problem: Problem) -> tuple[Any, ...]:
     )
 
 
-def _contact_numbers(robot: Robot, contact: Contact, facets: int, inside: bool) -> tuple[tuple[int, ...], Array, Array, Array]:
+def _contact_numbers(robot: Robot, contact: Contact, cut: Cut) -> tuple[tuple[int, ...], Array, Array, Array]:
     """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
-        return _known_contact(robot, cast(Any, contact), facets, inside)
+        return _known_contact(robot, cast(Any, contact), cut)
     n = len(contact.point_names)
     row = (0, OWN, 0, n, len(contact.row_names), contact.k)
-    return row, np.zeros((1, _POSE + 4)), np.zeros((n, 3)), _cones(contact, facets, inside)
+    return row, np.zeros((1, _POSE + 4)), np.zeros((n, 3)), _cones(contact, cut)
 
 
 @lru_cache(maxsize=256)
 def _known_contact(
-    robot: Robot, contact: PointContact | FlatFootContact, facets: int, inside: bool
+    robot: Robot, contact: PointContact | FlatFootContact, cut: Cut
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
     joint, pose = _frame(robot, contact.frame)
     radius, points = (contact.radius, contact.centre) if isinstance(contact, PointContact) else (0.0, contact.corners)
     points = np.array(points).reshape(-1, 3)
     row = (joint, CONTACT_KINDS[type(contact)], 0, len(points), len(contact.row_names), contact.k)
-    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, _cones(contact, facets, inside)
+    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, _cones(contact, cut)
 
 
-def _cones(contact: Contact, facets: int, inside: bool) -> Array:
+def _cones(contact: Contact, cut: Cut) -> Array:
     """Facets and -normal of each point of a contact with their lengths, and a zero, (p (F + 1), 5)."""
     if not contact.point_names:
         return np.zeros((0, 5))
-    polyhedron = FrictionPolyhedron(contact.normal, contact.mu, facets, inside)
+    polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *cut)
     rows = np.vstack([polyhedron.rows, -polyhedron.normal])
     cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])
     return np.tile(cones, (len(contact.point_names), 1))

@@ -20,8 +20,6 @@ from floatbase.viewer import MEASURED, Item, Picture, View, Viewer, below, marks
 PRESSING = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
 
 
-
-
 PRESSING_VIEW = View(66.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
 
 
@@ -203,9 +201,7 @@ def _free_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> P
     return drawn
 
 
-def _play(
-    view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Picture], look: View, speed: float = 1.0
-) -> Viewer:
+def _play(view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Picture], look: View, speed: float = 1.0) -> Viewer:
     """Play a record as pictures, 30 a second. picture: (state, row of the record) -> `Picture`."""
     rows = recording.thinned(record.time, 30.0)
     pictures = [picture(record.state(int(i)), int(i)) for i in rows]

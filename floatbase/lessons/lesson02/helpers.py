@@ -20,9 +20,7 @@ Motion = Callable[[EquationsOfMotion, Array, Array], tuple[Array, Array]]  # (eo
 DISC_RADIUS = 0.2  # m, of assets/models/disc.urdf
 
 
-def run_constant(
-    robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike, motion: Motion, duration: float = 0.2
-) -> Rollout:
+def run_constant(robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike, motion: Motion, duration: float = 0.2) -> Rollout:
     """MuJoCo under constant torques; `planned` holds the λ of (7) at every millisecond, `measured` the engine's.
 
     contacts: the stance of (7).
