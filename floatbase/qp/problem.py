@@ -74,14 +74,15 @@ class QP(Value):
     def without(self, *kinds: str) -> QP:
         """The same problem without the inequality rows of these kinds, such as "friction" or "normal force".
 
-        The kind of a row is `RowLabel.kind`; a text that is no `RowLabel` is its own. Raises `UnknownNameError` for others.
+        The kind of a row is `RowLabel.kind`, "other rows" where its name is a plain text. Raises `UnknownNameError` for a kind
+        that no row has.
         """
-        there = {label.kind: None for label in self.inequality_names}
+        labels = row_labels(self.inequality_names, len(self.G), "inequality")
         for kind in texts("kinds", kinds):
-            if kind not in there:
+            if kind not in (there := {label.kind: None for label in labels}):
                 raise unknown_name("kind of rows", kind, there)
-        kept = [i for i, label in enumerate(self.inequality_names) if label.kind not in kinds]
-        names = tuple(self.inequality_names[i] for i in kept)
+        kept = [i for i, label in enumerate(labels) if label.kind not in kinds]
+        names = tuple(labels[i] for i in kept)
         return QP(self.H, self.g, self.A, self.b, self.G[kept], self.h[kept], self.equality_names, names, self.blocks)
 
     @property
