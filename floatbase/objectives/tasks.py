@@ -142,7 +142,7 @@ def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
             moves = True
         elif name != first and callable(target):
             raise InputError(f"{what} cannot be a function: let {first} be one, and give {_ALL_THREE}.")
-        elif target is not None or (name == first and task.block == "qdd"):
+        elif target is not None or getattr(type(task), name, ...) is not None:  # None counts where it is the default
             found = flat_forces(target, None, what) if task.block == "forces" else checked(what, target, shape)
             kept[name] = nearest_rotation(task.name, found) if name == "rotation" else found
             if moves and np.any(found):
