@@ -2,7 +2,7 @@
 
 from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
 from floatbase.dynamics.contact import UP, Contact, FlatFootContact, PointContact, grasp_matrix
-from floatbase.dynamics.contacts import Contacts
+from floatbase.dynamics.contacts import Contacts, motion_of
 from floatbase.dynamics.equations import Block, EquationsOfMotion, equations_of_motion
 from floatbase.dynamics.fictitious import (
     bias_forces,
@@ -33,6 +33,6 @@ __all__ = [
     "FlatFootContact", "LinearConstraint", "PointContact", "RollingWheel", "accelerations_from_torques", "bias_forces",
     "contact_inertia_inverse", "contact_space", "coriolis_matrix", "dimensions", "equations_of_motion", "feasible_space",
     "fixed_frame", "forces_from_torques", "grasp_matrix", "inertia_rate", "internal_forces", "inward_acceleration",
-    "motion_matrix", "moving_frame", "power_identity", "resolved_motion", "seen_from_turning_frame", "torque_force_matrix",
-    "torque_force_space", "undetermined_forces",
+    "motion_matrix", "motion_of", "moving_frame", "power_identity", "resolved_motion", "seen_from_turning_frame",
+    "torque_force_matrix", "torque_force_space", "undetermined_forces",
 ]

@@ -139,10 +139,10 @@ class Contacts(Value):
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
     def _jacobian_and_constraint(self, state: State, t: float) -> tuple[Array, Array, Array]:
-        """J of (4) with A and b of (5); a contact whose J is its A, as that of a point, is asked once."""
+        """J of (4) with A and b of (5)."""
         of_kind("state", state, State)
         t = number("t", t, "s")
-        parts = [_motion(contact, state, t) for contact in self.items]
+        parts = [motion_of(contact, state, t) for contact in self.items]
         A, b = self._stacked(state, [part[0] for part in parts]), np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return A if all(J is A for A, _, J in parts) else self._stacked(state, [part[2] for part in parts]), A, read_only(b)
 
@@ -198,13 +198,21 @@ class Contacts(Value):
         return f"Contacts({', '.join(self.names)}; k={self.k})"
 
 
-def _motion(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
-    """A, b and J of a contact; J is A where that is so by definition, which a class of one's own may change."""
-    A, b = contact.constraint(state, t)
-    kind: Any = type(contact)
+def motion_of(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
+    """A, shape (m, nv), and b, shape (m,), of (5) and J, shape (k, nv), of (4) of one contact; read-only, at time t in s.
+
+    J is A where that is so by definition, as for a point: such a contact is asked once. Raises `InputError` for other shapes.
+    """
+    A, b = map(read_only, contact.constraint(state, t))  # one's own may write to its arrays again
+    kind: Any = type(contact)  # one derived from ours may have another Jacobian
     held = isinstance(contact, OnePoint) and (kind.jacobian, kind.constraint) == (OnePoint.jacobian, OnePoint.constraint)
     is_linear = getattr(kind, "jacobian", None) is LinearConstraint.jacobian
-    return A, b, A if held or is_linear else contact.jacobian(state, t)
+    J = A if held or is_linear else read_only(contact.jacobian(state, t))
+    m, nv = len(contact.row_names), state.robot.nv
+    if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
+        required = f"they must have ({m}, {nv}), ({m},) and ({contact.k}, {nv})"
+        raise InputError(f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}; {required}.")
+    return A, b, J
 
 
 def _contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:

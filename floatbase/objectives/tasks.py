@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, flat_forces, number, of_kind, positive, read_only, text
+from floatbase._arrays import Array, Value, checked, flat_forces, number, of_kind, plain_numbers, positive, read_only, text
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
@@ -87,26 +88,35 @@ def targets_at(task: Task, robot: Robot, k: int, t: float) -> list[Array]:
     values = [getattr(task, name) for name in shapes]
     moves = callable(values[0])
     if moves:
-        values = _together(values[0](t), *shapes.values())
+        values = _together(task.name, values[0](t), *shapes.values())
+    else:
+        values = [_zeros(shape) if value is None else value for value, shape in zip(values, shapes.values(), strict=True)]
     found = [_value(f"{name} of {task.name}", value, shapes[name]) for name, value in zip(shapes, values, strict=True)]
     if isinstance(task, OrientationTask) and moves:
         found[0] = nearest_rotation(task.name, found[0])
     if isinstance(task, PostureTask):
-        check_unit_lengths(robot.model, "q of posture", found[0], first=2 if robot.is_floating else 1)
+        check_unit_lengths(robot.model, f"q of {task.name}", found[0], first=2 if robot.is_floating else 1)
     return found
 
 
-def _together(value: Any, shape: tuple[int, ...], *others: tuple[int, ...]) -> list[Any]:
+def _together(name: str, value: Any, shape: tuple[int, ...], *others: tuple[int, ...]) -> list[Any]:
     """What a function of time gave, with zeros for velocity and acceleration unless it gave all three."""
-    if others and isinstance(value, Sequence | np.ndarray) and len(value) == 3 and np.ndim(value[0]) == len(shape):
+    several = others and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim)) and len(value) > 1
+    first = plain_numbers(value[0]) if several else None
+    if first is None or first.ndim != len(shape):
+        return [value, *map(_zeros, others)]
+    if len(value) == 3:
         return list(value)
-    return [value, *(None for _ in others)]
+    raise InputError(f"the function of {name} gave {len(value)} targets; it must give one, or {_ALL_THREE}.")
+
+
+@lru_cache(maxsize=64)
+def _zeros(shape: tuple[int, ...]) -> Array:
+    return read_only(np.zeros(shape))
 
 
 def _value(name: str, target: Any, shape: tuple[int, ...]) -> Array:
-    """A target, zero by default. One that does not move was checked when its task was made, but for a robot's own shape."""
-    if target is None:
-        return np.zeros(shape)
+    """A target. One that does not move was checked when its task was made, but for a robot's own shape."""
     if type(target) is np.ndarray and target.shape == shape and not target.flags.writeable:
         return target
     return checked(name, target, shape)
@@ -132,7 +142,7 @@ def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
             moves = True
         elif name != first and callable(target):
             raise InputError(f"{what} cannot be a function: let {first} be one, and give {_ALL_THREE}.")
-        elif target is not None or (name == first and task.block == "qdd"):
+        elif target is not None or getattr(type(task), name, ...) is not None:  # None counts where it is the default
             found = flat_forces(target, None, what) if task.block == "forces" else checked(what, target, shape)
             kept[name] = nearest_rotation(task.name, found) if name == "rotation" else found
             if moves and np.any(found):

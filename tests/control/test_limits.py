@@ -210,3 +210,5 @@ def test_a_replaced_controller_is_checked(path: str) -> None:
         controller.replace(limits=replace(controller.limits, rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]))
     with pytest.raises(UnknownNameError, match="unknown contact in max_normal_force 'FL_fot'; near names: FL_foot"):
         controller.replace(limits=replace(controller.limits, max_normal_force={"FL_fot": 1.0}))
+    with pytest.raises(InputError, match=r"q of arm has shape \(5,\)"):
+        controller.replace(tasks=[fb.PostureTask(np.zeros(5), name="arm")])

@@ -345,6 +345,44 @@ def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows() -> None:
     assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 4)) < judges.agreement(robot)
 
 
+class Reuses(PointContact):
+    """A contact that writes all its answers into the same arrays; its rows are twice those of a point, and hold the same."""
+
+    rows, right_side = np.zeros((3, 18)), np.zeros(3)
+
+    def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        A, b = super().constraint(state, t)
+        self.rows[:], self.right_side[:] = 2.0 * A, 2.0 * b
+        return self.rows, self.right_side
+
+    def jacobian(self, state: State, t: float = 0.0) -> np.ndarray:
+        self.rows[:] = super().jacobian(state, t)
+        return self.rows
+
+
+def test_contacts_of_ones_own_may_write_into_the_same_arrays_again() -> None:
+    robot = judges.load("go2")
+    others, frames = fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"]), ("FL_foot", "FR_foot")
+    own = fb.Contacts([Reuses(frame, radius=0.022) for frame in frames])
+    same = fb.Contacts([PointContact(frame, radius=0.022) for frame in frames])
+    known, _ = judges.pair(robot, others + same)
+    for controller in judges.pair(robot, others + own):
+        for state in judges.near_and_far("go2", 3):
+            assert judges.difference(controller, known, state) < judges.agreement(robot)
+
+
+@pytest.mark.parametrize("path", ["compiled", "readable"])
+def test_a_contact_of_ones_own_whose_shapes_do_not_fit_together_is_told_so(path: str) -> None:
+    class Short(PointContact):
+        def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+            A, b = super().constraint(state, t)
+            return A[:2], b
+
+    robot = judges.load("go2")
+    with pytest.raises(InputError, match=r"A, b and J of 'FL_foot' have shapes \(2, 18\), .* they must have \(3, 18\), \(3,\)"):
+        fb.WholeBodyController(robot, fb.Contacts([Short("FL_foot")]), [], path=path)
+
+
 def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones() -> None:
     class MyPoint(PointContact):
         """A subclass: of another kind, so the tick asks it as it asks a user's."""

@@ -329,6 +329,8 @@ def test_contacts_whose_forces_act_where_nothing_is_held_are_refused() -> None:
     """A thruster is no contact: the rows must hold what the forces act along."""
 
     class Thruster(PointContact):
+        row_names = ("x", "y")
+
         def constraint(self, state: fb.State, t: float = 0.0) -> tuple[Array, Array]:
             A, b = super().constraint(state, t)
             return A[:2], b[:2]

@@ -19,8 +19,8 @@ import numpy as np
 from floatbase._arrays import Array
 from floatbase.control.problem import Problem, assemble_qp, residual_of
 from floatbase.control.tick.own import Given, Own
-from floatbase.control.tick.tables import dynamics_of, tables_of
-from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, TorqueTask, target_shapes, targets_at
+from floatbase.control.tick.tables import TASK_KINDS, dynamics_of, tables_of
+from floatbase.objectives import target_shapes, targets_at
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
@@ -81,7 +81,7 @@ class Compiled:
     the array of numbers that `tick.tick` fills, how many rows are active, and what else the tick was given.
 
     qdd, tau, forces: where these are among the numbers.
-    unknown: tasks of which the tables cannot tell whether they fit: those of one's own, moving ones, and postures.
+    unknown: tasks of which the tables cannot tell whether they fit: those of one's own, and moving ones.
     arguments: what `tick.tick` takes after q, v and `Given.numbers`, but for the answer and the parts to run.
     given: as it is without a state, zeros for what moves and nothing of one's own.
     workspace: real and whole numbers, memory of the tick.
@@ -96,8 +96,7 @@ class Compiled:
         self._problem, self.dynamics = problem, dynamics_of(robot)
         *tables, targets, self._moving = tables_of(problem)
         self.own, moving = Own(problem, self.dynamics), {each.number for each in self._moving}
-        still = (CoMTask, OrientationTask, FrameTask, ForceTask, TorqueTask)
-        self.unknown = [task for i, task in enumerate(problem.tasks) if i in moving or type(task) not in still]
+        self.unknown = [task for i, task in enumerate(problem.tasks) if i in moving or type(task) not in TASK_KINDS]
         self.given, self.n_targets = self.own.nothing(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)

@@ -14,7 +14,7 @@ from floatbase.affine import Affine
 from floatbase.control.problem import Problem, residual_of
 from floatbase.control.tick.moment import TickEquations, TickState
 from floatbase.control.tick.tables import BLOCKS, CONTACT_KINDS, TASK_KINDS, Dynamics
-from floatbase.dynamics import Contact, EquationsOfMotion, LinearConstraint, equations_of_motion
+from floatbase.dynamics import EquationsOfMotion, equations_of_motion, motion_of
 from floatbase.errors import InputError
 from floatbase.robots import State
 
@@ -67,7 +67,7 @@ class Own:
         eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)
         contacts, residuals, rows, inequalities = [], {}, 0, []
         for contact in self._contacts:
-            A, b, J = _motion(contact, eom.state, t)
+            A, b, J = motion_of(contact, eom.state, t)
             contacts.append((A, b, J))
             parts += A.ravel(), b, J.ravel()
         for i, task, block in self._tasks:
@@ -91,21 +91,10 @@ class Own:
         if not self._contacts:
             return equations_of_motion(state, contacts, t)
         own = iter(given.contacts)
-        rows = [_motion(contact, state, t) if type(contact) in CONTACT_KINDS else next(own) for contact in contacts]
+        rows = [motion_of(contact, state, t) if type(contact) in CONTACT_KINDS else next(own) for contact in contacts]
         A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))
         return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)
 
 
 def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
     return bounds[0], np.minimum(bounds[1], NO_LIMIT)
-
-
-def _motion(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
-    """A, b and J of a contact. Raises `InputError` where they do not have the shapes that the contact says."""
-    A, b = map(read_only, contact.constraint(state, t))  # it may write to its own arrays in the next tick
-    is_linear = getattr(type(contact), "jacobian", None) is LinearConstraint.jacobian  # then its function is asked once
-    J = A if is_linear else read_only(contact.jacobian(state, t))
-    m, nv = len(contact.row_names), state.robot.nv
-    if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
-        raise InputError(f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}.")
-    return A, b, J
