@@ -271,6 +271,22 @@ def unit_vector(name: str, value: Any) -> Array:
     return read_only(vector / length)
 
 
+def half_spaces(name: str, normal: Any, offset: Any) -> tuple[Array, Array]:
+    """Planes normal · x = offset as unit normals, shape (n, 3), and offsets, shape (n,), m, checked.
+
+    normal: (3,) for one plane, (n, 3) for several. offset: m, one number for all, or (n,).
+    """
+    found = plain_numbers(normal)
+    if found is None or found.ndim != 2 or found.shape[1] != 3 or not len(found):
+        normals = unit_vector(f"normal of {name}", normal)[None]
+    else:
+        normals = np.array([unit_vector(f"normal {i} of {name}", row) for i, row in enumerate(found)])
+    distance = plain_numbers(offset)
+    shape = () if distance is None or distance.ndim == 0 else (len(normals),)
+    offsets = np.broadcast_to(checked(f"offset of {name}", offset, shape, "m"), len(normals))
+    return read_only(normals), read_only(offsets)
+
+
 def cross(a: Array, b: Array) -> Array:
     """a × b of two vectors, shape (3,); numpy's own takes twenty times as long on three numbers."""
     (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()

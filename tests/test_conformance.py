@@ -140,6 +140,7 @@ EXAMPLES: dict[str, Any] = {
     "minimum": (0.5, 1.0), "moment": UP, "mu": 0.7, "N": np.eye(12)[:, :3], "n": 3, "Command.force.name": "FL_foot",
     "Contacts.__getitem__.name": "FL_foot", "Contacts.force_of.name": "FL_foot", "Contacts.force_slice.name": "FL_foot",
     "load.name": "go2", "load_urdf.name": "arm", "name": "posture", "names": "FL_foot", "normal": NORMAL, "normals": NORMAL,
+    "Ground.offset": 0.1, "standing.offset": 0.1,
     "offset": UP, "omega": UP, "omega_rate": UP, "package_dirs": (), "parts": fb.Affine(np.eye(12), ZERO),
     "joint_servo.path": lambda t: ZERO, "load_urdf.path": str(judges.load("ur5").urdf), "path": "readable",
     "save.path": f"{FOLDER}/view.html", "paused": True, "pictures": [PICTURE, PICTURE], "Viewer.play.planned": True,

@@ -227,15 +227,19 @@ class Robot(Value):
 
         return State(self, pin.neutral(self.model))
 
-    def standing(self, height: float | None = None) -> State:
-        """A state at rest with every foot on the ground z = 0.
+    def standing(
+        self, height: float | None = None, normal: npt.ArrayLike | None = None, offset: npt.ArrayLike | None = None
+    ) -> State:
+        """A state at rest with every foot on the ground, and the base turned as the posture has it.
 
-        height: how far above the ground the base's origin should be, m; by default as the posture has it. Raises `InputError`
-        when the feet cannot get there. A fixed-base robot, or one without feet, gets its posture.
+        height: how far above z = 0 the base's origin should be, m; by default as the posture has it.
+        normal: (3,), world, of the ground, upwards by default; (n, 3) for several planes, all solid, as the sides of a valley.
+        offset: m, of the points normal · x = offset of a plane: one number for all, or (n,); 0 by default.
+        Raises `InputError` when the feet cannot get there. A fixed-base robot, or one without feet, gets its posture.
         """
         from floatbase.robots.standing import stand
 
-        return self._standing if height is None else stand(self, height)
+        return self._standing if height is normal is offset is None else stand(self, height, normal, offset)
 
     @cached_property
     def _standing(self) -> State:

@@ -1,6 +1,6 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-Only the ground's plane and balls at the feet touch. Links that are welded together are one body, which has all their inertia.
+Only the ground's planes and balls at the feet touch. Links that are welded together are one body, which has all their inertia.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, positive, unit_vector
+from floatbase._arrays import Array, Value, half_spaces, positive, read_only
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
@@ -31,14 +32,39 @@ _ROUNDING = 1e-9  # relative: a thin plate meets the triangle inequality of prin
 
 @dataclass(frozen=True, eq=False)
 class Ground(Value):
-    """The ground: a plane through the origin. normal: (3,), world, made unit. mu: coefficient of friction with the feet."""
+    """The ground: a plane, or several planes that all are solid below, as the two sides of a valley.
+
+        valley = fb.Ground(normal=[[0, -0.34, 0.94], [0, 0.34, 0.94]])
+
+    mu: coefficient of friction with the feet.
+    normal: world, out of the ground, made unit: (3,) for one plane, (n, 3) for several.
+    offset: m, of the points normal · x = offset of a plane: one number for all planes, or (n,); 0 goes through the origin.
+    """
 
     mu: float = 1.0
     normal: Array = field(default_factory=lambda: UP)
+    offset: float | Array = 0.0
 
     def __post_init__(self) -> None:
+        normals, offsets = half_spaces("the ground", self.normal, self.offset)
+        one = np.ndim(self.normal) == 1
         object.__setattr__(self, "mu", positive("friction coefficient mu of the ground", self.mu))
-        object.__setattr__(self, "normal", unit_vector("normal of the ground", self.normal))
+        object.__setattr__(self, "normal", normals[0] if one else normals)
+        object.__setattr__(self, "offset", float(offsets[0]) if one else offsets)
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals of all planes, shape (n, 3), world."""
+        return np.atleast_2d(self.normal)
+
+    @property
+    def offsets(self) -> Array:
+        """Offsets of all planes, shape (n,), m."""
+        return read_only(np.atleast_1d(self.offset))
+
+    def clearances(self, points: npt.ArrayLike) -> Array:
+        """Distances of points from each plane, shape (…, n), m, negative below it. points: (…, 3), m, world."""
+        return np.asarray(points) @ self.normals.T - self.offsets
 
 
 def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
@@ -65,9 +91,10 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         motor.set_to_motor()
         if np.isfinite(limit):
             motor.ctrlrange = [-limit, limit]
-    plane = spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0)
-    plane.size[2] = 0.05  # MuJoCo wants one, and does not use it
-    mujoco.mju_quatZ2Vec(plane.quat, np.array(ground.normal))
+    for normal, offset in zip(ground.normals, ground.offsets, strict=True):
+        plane = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0, pos=offset * normal)
+        plane.size[2] = 0.05  # MuJoCo wants one, and does not use it
+        mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
         _add_foot(spec, foot, feet.point_names)
     try:

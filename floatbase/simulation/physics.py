@@ -79,7 +79,7 @@ class Simulation(Fixed):
     """A robot on the ground in MuJoCo, driven by joint torques.
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat foot one at each corner),
-    each joint a torque motor with the robot's limit and rotor inertia, the ground a plane with friction. Joint friction and
+    each joint a torque motor with the robot's limit and rotor inertia, the ground planes with friction. Joint friction and
     damping are off, as in (1)-(7); the URDF's joint limits are on. Only feet and ground touch.
 
     robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s. `model` and
@@ -102,9 +102,10 @@ class Simulation(Fixed):
         self._convert = Conversion(robot, self.model)
         self._motors = np.array([self.model.actuator(name).id for name in robot.joint_names], dtype=int)
         self._balls = np.array([self.model.geom(name).id for name in self.point_names], dtype=int)
-        self._contact_frame: Array | None = None  # known from the first contact on
-        self._up = self.ground.normal.tolist()
-        self._below = self.model.geom_size[self._balls, :1] * self.ground.normal
+        # of each plane, which is a geom; known from its first contact on
+        self._contact_frames, self._frameless = np.zeros((self.model.ngeom, 3, 3)), set(range(len(self.ground.normals)))
+        self._planes = list(zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True))
+        self._radii = self.model.geom_size[self._balls, :1]
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._watch()
         self.reset()
@@ -169,7 +170,10 @@ class Simulation(Fixed):
         return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < _FALLEN_COSINE
 
     def reset(self, state: State | None = None) -> None:
-        """Put the robot into a state, standing upright on the ground's plane by default, at time 0."""
+        """Put the robot into a state, standing on the ground by default, at time 0.
+
+        By default it is turned with a slope; on a ground of several planes its base is as the posture has it.
+        """
         state = self._standing() if state is None else of_kind("state", state, State)
         if state.robot != self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
@@ -220,26 +224,30 @@ class Simulation(Fixed):
             for i, wrench in enumerate(numbers):
                 mujoco.mj_contactForce(self.model, data, i, wrench)
             numbers = numbers[:, :3].ravel()
-        if self._contact_frame is None and len(geoms):  # one plane, so one frame for all contacts at all times
-            self._contact_frame = contact.frame[0].reshape(3, 3).copy()
+        if self._frameless and len(geoms):  # all contacts with a plane have one frame at all times
+            for i, plane in enumerate(geoms[:, 0].tolist()):
+                self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
+                self._frameless.discard(plane)
         return geoms, numbers
 
     def _forces_of(self, geoms: npt.NDArray[np.int32], numbers: Array) -> Array:
         """`contact_forces` of N instants, shape (N, n_points, 3), N, from their `_raw_contacts`, with geom 0 for none."""
-        n, balls = len(geoms), geoms[:, :, 1]
-        forces = np.zeros((n, self.model.ngeom, 3))
-        if self._contact_frame is not None:  # its rows are normal and tangents
-            world = numbers.reshape(-1, 3) @ self._contact_frame
-            forces[np.arange(n)[:, None], balls] = world.reshape(n, -1, 3)
+        n, planes, balls = len(geoms), geoms[:, :, 0], geoms[:, :, 1]
+        forces, world = np.zeros((n, self.model.ngeom, 3)), numbers.reshape(*balls.shape, 3)
+        for plane in range(len(self._planes)):
+            rows, columns = np.nonzero(planes == plane)  # no ball touches a plane twice, so nothing is added to a sum twice
+            forces[rows, balls[rows, columns]] += world[rows, columns] @ self._contact_frames[plane]  # rows: normal, tangents
         return forces[:, self._balls]
 
     def contact_positions(self) -> Array:
-        """World positions of the points, shape (n_points, 3), m: the lowest point of each ball along the ground's normal."""
+        """World positions of the points, shape (n_points, 3), m: the point of each ball that is nearest to the ground."""
         return self._lowest_points(self.data.geom_xpos)
 
     def _lowest_points(self, geom_positions: Array) -> Array:
         """`contact_positions` for MuJoCo's positions of all its geoms, shape (…, geoms, 3), m."""
-        return geom_positions[..., self._balls, :] - self._below
+        centres = geom_positions[..., self._balls, :]
+        nearest = np.argmin(self.ground.clearances(centres), axis=-1)
+        return centres - self._radii * self.ground.normals[nearest]
 
     def pushed_body(self, push: Push) -> int:
         """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted to the ground."""
@@ -262,16 +270,21 @@ class Simulation(Fixed):
 
     def _standing(self) -> State:
         """The robot standing on the ground; on a slope turned with it, so that every foot touches."""
+        if len(self._planes) > 1:
+            return self.robot.standing(normal=self.ground.normals, offset=self.ground.offsets)
         state = self.robot.standing()
         if not self.robot.is_floating:
             return state
-        turn = pin.Quaternion.FromTwoVectors(np.array(UP), np.array(self.ground.normal))
+        normal, offset = self.ground.normals[0], self.ground.offsets[0]
+        turn = pin.Quaternion.FromTwoVectors(np.array(UP), np.array(normal))
         attitude = (turn * pin.Quaternion(*state.q[[6, 3, 4, 5]])).normalized()
-        return state.replace(q=np.concatenate([turn.matrix() @ state.q[:3], attitude.coeffs(), state.q[7:]]))
+        position = turn.matrix() @ state.q[:3] + offset * normal
+        return state.replace(q=np.concatenate([position, attitude.coeffs(), state.q[7:]]))
 
     def _base_height(self) -> float:
-        """Height of the base's origin over the ground, m."""
-        return _dot(self._up, self._base_position.tolist())
+        """Height of the base's origin over the nearest plane of the ground, m."""
+        at = self._base_position.tolist()
+        return min(_dot(normal, at) - offset for normal, offset in self._planes)
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"

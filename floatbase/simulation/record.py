@@ -119,8 +119,9 @@ class Recorder:
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force  # views of its memory
         self._geoms, self._steps = np.empty((ticks, sim.model.ngeom, 3)), 0
         self._actuators = np.empty((ticks * substeps, sim.model.nu))
-        self._touching = np.zeros((ticks * substeps, points, 2), dtype=np.int32)
-        self._forces = np.zeros((ticks * substeps, 3 * points))
+        touching = points * len(sim.ground.normals)  # at most: in the bottom of a valley a ball touches two planes
+        self._touching = np.zeros((ticks * substeps, touching, 2), dtype=np.int32)
+        self._forces = np.zeros((ticks * substeps, 3 * touching))
         self._stances: list[Contacts] = []
         self._plans = np.empty((ticks, stance.k))
         self._with_plan: list[int] = []  # the rows of those

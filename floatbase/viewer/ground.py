@@ -1,4 +1,4 @@
-"""The ground in the picture: level, a given slope, or the slope on which the contacts stand."""
+"""The ground in the picture: level, given planes, or the slope on which the contacts stand."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 
 from floatbase._arrays import Array
 from floatbase.friction import tangents
+from floatbase.viewer import lowering
 from floatbase.viewer.colours import RGB
-from floatbase.viewer.shapes import Item, ground, placed
+from floatbase.viewer.shapes import Item, grid_lines, ground, placed
 
 STEEPEST = 0.2  # least vertical part of a normal of the ground: contacts with less stand on walls
 STEP = 0.01  # m; the height of the ground is rounded to this, so that it does not tremble with the feet
@@ -30,6 +31,20 @@ class Plane(NamedTuple):
     def lines(self, colour: RGB) -> Item:
         """The lines of the plane's grid."""
         return _lines(self, colour)
+
+
+class Planes(NamedTuple):
+    """Several planes that all are solid below, as the two sides of a valley: what is seen of each lies above the others."""
+
+    planes: tuple[Plane, ...]
+
+    def height(self, point: Array) -> float:
+        """z of the ground, m, below or above a point, shape (3,), m."""
+        return max(plane.height(point) for plane in self.planes)
+
+    def lines(self, colour: RGB) -> Item:
+        """The lines of all planes' grids, each as far as it is seen."""
+        return _lines_of_all(self, colour)
 
 
 LEVEL = Plane((0.0, 0.0, 1.0))
@@ -52,6 +67,33 @@ def plane_under(normals: Array, positions: Array) -> Plane:
 
 @lru_cache(maxsize=64)
 def _lines(plane: Plane, colour: RGB) -> Item:
+    return Item(ground(colour).shape, _pose(plane))
+
+
+@lru_cache(maxsize=16)
+def _lines_of_all(ground: Planes, colour: RGB) -> Item:
+    seen: list[Array] = []
+    for plane in ground.planes:
+        pose = _pose(plane)
+        ends: Array = (grid_lines() @ pose[:3, :3].T + pose[:3, 3]).reshape(-1, 2, 3)
+        for other in ground.planes:
+            if other != plane:
+                ends = _above(other, ends)
+        seen.append(ends.reshape(-1, 3))
+    return Item(lowering.lines(np.vstack(seen), colour), np.eye(4))
+
+
+def _above(plane: Plane, ends: Array) -> Array:
+    """The parts of lines above a plane. ends: shape (n, 2, 3), m, world; so is the answer, with fewer lines or as many."""
+    clear = ends @ np.array(plane.normal) - plane.offset
+    seen = clear.max(axis=1) > 0.0
+    low, lines = np.maximum(-clear[seen], 0.0), ends[seen]
+    cut = low / np.where(low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0)  # part of the line, at each end
+    return np.asarray(lines + cut[:, :, None] * (lines[:, ::-1] - lines))
+
+
+def _pose(plane: Plane) -> Array:
+    """Where the plane's grid stands, (4, 4)."""
     t1, t2 = tangents(plane.normal)
     normal = np.array(plane.normal)
-    return Item(ground(colour).shape, placed(plane.offset * normal, np.stack([t1, t2, normal], axis=1)))
+    return placed(plane.offset * normal, np.stack([t1, t2, normal], axis=1))

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from floatbase._arrays import checked, positive
 from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
-from floatbase.viewer.ground import LEVEL, Plane
+from floatbase.viewer.ground import LEVEL, Plane, Planes
 from floatbase.viewer.lowering import Shape
 from floatbase.viewer.shapes import ARROW, Item, Picture, arrow, arrow_width, directed, flat_polygon, label, placed
 
@@ -63,10 +63,10 @@ def push(
     return Item(shape, placed(np.asarray(position) - vector, rotation, (width / 2, width / 2, length)))
 
 
-def support_region(positions: npt.ArrayLike, lift: float, ground: Plane = LEVEL) -> Picture:
+def support_region(positions: npt.ArrayLike, lift: float, ground: Plane | Planes = LEVEL) -> Picture:
     """The convex hull of contact points, seen from above; nothing for fewer than three points, or for points on a line.
 
-    positions: (n, 3), m, world. lift: m, how far above the ground it is drawn. ground: the plane on which it lies.
+    positions: (n, 3), m, world. lift: m, how far above the ground it is drawn. ground: where its corners lie.
     """
     points = np.asarray(positions, dtype=np.float64)[:, :2]
     try:

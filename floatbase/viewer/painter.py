@@ -18,7 +18,7 @@ from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.robots import Robot, State
 from floatbase.viewer import lowering, marks, shapes
 from floatbase.viewer.colours import GHOST, MEASURED, PLANNED, RGB
-from floatbase.viewer.ground import LEVEL, Plane, plane_under
+from floatbase.viewer.ground import LEVEL, Plane, Planes, plane_under
 from floatbase.viewer.meshes import JointMesh, robot_meshes
 from floatbase.viewer.shapes import Item, Picture
 
@@ -61,7 +61,7 @@ class Painter:
     facets: int | None
     inside: bool
     turn: float
-    ground: Plane | None
+    ground: Plane | Planes | None
     lines: RGB
     text: RGB
     paper: RGB
@@ -267,16 +267,16 @@ class Painter:
     def _patch_radius(self) -> float:
         return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
 
-    def _scale_bar(self, ground: Plane) -> Picture:
+    def _scale_bar(self, ground: Plane | Planes) -> Picture:
         if ground not in self._scale_bars:
             self._scale_bars[ground] = self._scale_bar_on(ground)
         return self._scale_bars[ground]
 
     @cached_property
-    def _scale_bars(self) -> dict[Plane, Picture]:
+    def _scale_bars(self) -> dict[Plane | Planes, Picture]:
         return {}
 
-    def _scale_bar_on(self, ground: Plane) -> Picture:
+    def _scale_bar_on(self, ground: Plane | Planes) -> Picture:
         """A bar as long as a force of about a quarter of the weight is drawn, on the ground at the left of the feet.
 
         It starts behind a tall robot, because the picture of one shows little ground in front.
@@ -289,7 +289,7 @@ class Painter:
         at[2] = ground.height(at + [0.5 * length, 0.0, 0.0]) + 0.01 * self.size
         return below("scale", shapes.scale_bar(at, force, length, self.size, self.text))
 
-    def _ground(self, contacts: Contacts | None, positions: Array) -> Plane:
+    def _ground(self, contacts: Contacts | None, positions: Array) -> Plane | Planes:
         if self.ground is not None or contacts is None:
             return self.ground or LEVEL
         return plane_under(contacts.normals, positions)

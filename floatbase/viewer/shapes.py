@@ -234,6 +234,16 @@ def ground(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
     return Item(_grid(colour, step, half), np.eye(4))
 
 
+def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
+    """The lines of `ground` in pieces, two ends each, shape (2 n, 3), m. step, half: as there."""
+    at = np.arange(-half, half + step / 2, step)
+    # each line in pieces of one step: software renderers lose lines that begin far behind the camera
+    start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
+    along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
+    points = np.vstack([along_x, along_x[:, ::-1]])
+    return np.hstack([points, np.zeros((len(points), 1))])
+
+
 def _surface_frame(normal: npt.ArrayLike) -> Array:
     """Axes of a contact, (3, 3): the two tangents that the friction rows use, and the normal."""
     x, y, z = np.asarray(normal, dtype=np.float64).tolist()
@@ -302,9 +312,4 @@ def _polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float
 
 @lru_cache(maxsize=8)
 def _grid(colour: RGB, step: float, half: float) -> Shape:
-    at = np.arange(-half, half + step / 2, step)
-    # each line in pieces of one step: software renderers lose lines that begin far behind the camera
-    start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
-    along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
-    points = np.vstack([along_x, along_x[:, ::-1]])
-    return lowering.lines(np.hstack([points, np.zeros((len(points), 1))]), colour)
+    return lowering.lines(grid_lines(step, half), colour)

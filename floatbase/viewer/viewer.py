@@ -19,14 +19,14 @@ from floatbase.viewer import page, recording, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, hexadecimal
-from floatbase.viewer.ground import STEEPEST, Plane
+from floatbase.viewer.ground import STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, kinds
 from floatbase.viewer.place import kernel_is_remote
 from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.window import Window
 
 if TYPE_CHECKING:
-    from floatbase.simulation import Rollout
+    from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
 _MOST_PIXELS = 10_000  # of a picture's height
@@ -49,8 +49,8 @@ class Viewer:
         its centre of mass is high.
     facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
     inside, turn: as for `FrictionPolyhedron`.
-    ground: (3,), world, normal of the ground, a plane through the origin; None takes the plane that the contacts stand on
-        when they share a normal, else a level ground.
+    ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin; None takes the plane that the
+        contacts stand on when they share a normal, else a level ground.
     port: port of the page; 0 takes a free one.
     Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
 
@@ -69,7 +69,7 @@ class Viewer:
         facets: int | None = None,
         inside: bool = True,
         turn: float = 0.0,
-        ground: npt.ArrayLike | None = None,
+        ground: Ground | npt.ArrayLike | None = None,
         port: int = 0,
     ):
         of_kind("robot", robot, Robot)
@@ -80,7 +80,7 @@ class Viewer:
         self.height = whole("height", height, 1, _MOST_PIXELS, "pixels")
         requested = None if scale is None else positive("scale", scale, "m/N")
         paper, _, lines, text = BACKGROUNDS[background]
-        self.painter = Painter(robot, requested, facets, cut.inside, cut.turn, _plane(ground), lines, text, paper)
+        self.painter = Painter(robot, requested, facets, cut.inside, cut.turn, _ground(ground), lines, text, paper)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
         self._moving = False
@@ -349,11 +349,16 @@ def _check_texts(**texts: str | None) -> None:
         text(name, "" if value is None and name == "title" else value)
 
 
-def _plane(ground: npt.ArrayLike | None) -> Plane | None:
-    """The plane through the origin with this normal; None for None."""
+def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
+    """The ground as it is drawn; None for None."""
     if ground is None:
         return None
-    x, y, z = (float(c) for c in unit_vector("ground", ground))
-    if z < STEEPEST:
-        raise InputError(f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] does.")
-    return Plane((x, y, z))
+    from floatbase.simulation import Ground  # loads MuJoCo, which no picture of a level ground needs
+
+    made = ground if isinstance(ground, Ground) else Ground(normal=unit_vector("ground", ground))
+    planes = []
+    for (x, y, z), offset in zip(made.normals.tolist(), made.offsets.tolist(), strict=True):
+        if z < STEEPEST:
+            raise InputError(f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] does.")
+        planes.append(Plane((x, y, z), offset))
+    return planes[0] if len(planes) == 1 else Planes(tuple(planes))

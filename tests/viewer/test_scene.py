@@ -190,6 +190,25 @@ def test_the_ground_is_level_where_contacts_do_not_say_otherwise(go2: Robot, sta
     viewer.close()
 
 
+def test_a_valley_is_drawn_where_it_is_and_nothing_of_a_side_below_the_other(go2: Robot) -> None:
+    ground = Ground(normal=[[0.0, -0.4, 1.0], [0.1, 0.4, 1.0]], offset=[0.1, 0.0])
+    state = Simulation(go2, ground).state
+    viewer = Viewer(go2, ground=ground)
+    viewer.show(state, Contacts.points(go2), support=True)
+    item = viewer.canvas.picture["ground"]
+    points = item.shape.lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data
+    points = np.frombuffer(points, "<f4").reshape(-1, 3)
+    clearances = ground.clearances(points)
+    np.testing.assert_allclose(clearances.min(axis=1), 0.0, atol=1e-5)
+    assert np.all(np.sum(clearances < 1e-5, axis=0) > 1000)
+    shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
+    np.testing.assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
+    assert ground.clearances(shadow).min() == pytest.approx(0.0, abs=1e-5)
+    viewer.close()
+    with pytest.raises(InputError, match="must point upwards"):
+        Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
+
+
 def test_the_feet_fill_the_picture_of_the_feet() -> None:
     filled = {}
     for robot in (robot for robot in map(load, catalogue()) if robot.feet):
