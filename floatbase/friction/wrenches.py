@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, cached_property, checked, of_kind, plain_numbers, positive, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, of_kind, plain_numbers, positive, read_only, whole
 from floatbase.dynamics import Contacts, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction.cones import FrictionPolyhedron
@@ -23,6 +23,7 @@ from floatbase.qp import INFEASIBLE, UNBOUNDED, linear_program
 from floatbase.robots import State
 
 TOLERANCE = 1e-6  # N, by which `contains` lets contact forces pass their facets: what a linear program leaves
+_MOST_DIRECTIONS = 3600  # a tenth of a degree apart; each takes a linear program
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +132,21 @@ class WrenchSet(Value):
         if result.status == INFEASIBLE:
             raise InfeasibleError("no wrench start + s · direction can be produced, however large or small s is.")
         return np.inf if result.status == UNBOUNDED else -float(result.fun) / scale
+
+    def horizontal_reach(self, n: int = 72) -> tuple[Array, Array]:
+        """The largest horizontal force that goes with the full weight and no moment about the CoM, in each of n directions.
+
+        Angles, shape (n,), rad, from the world's x axis towards y, evenly spaced, and forces, shape (n,), N: `reach` of that
+        direction from (0, 0, weight, 0, 0, 0). Over `weight` they are the parts of g by which the CoM can be accelerated;
+        facets and the height of the CoM end them. +inf where there is no end. Raises `InfeasibleError` where the contacts
+        cannot carry the weight without moment.
+        """
+        angles = 2.0 * np.pi * np.arange(whole("number of directions n", n, 1, _MOST_DIRECTIONS)) / n
+        carried = np.array([0.0, 0.0, self.weight, 0.0, 0.0, 0.0])
+        if not self.contains(carried):
+            raise InfeasibleError("these contacts cannot carry the weight without a moment about the centre of mass.")
+        forces = [self.reach([np.cos(angle), np.sin(angle), 0.0, 0.0, 0.0, 0.0], carried) for angle in angles]
+        return read_only(angles), read_only(forces)
 
     def torques(self, force: npt.ArrayLike | None = None) -> Array:
         """The slice at a total force: vertices, shape (k, 3), N·m, of the torques τ_c that can go with it.

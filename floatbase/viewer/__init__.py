@@ -1,8 +1,8 @@
 """The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and saves them.
 
 `Viewer` draws. `View` says from where it looks. `shapes`, `marks` and `props` make further items for a picture, `plots` makes
-figures of a rollout, `roses` shows push roses, and `FIGURES` are the document's figures. `page` and `wire` are for programs
-that write web pages.
+figures of a rollout, `roses` shows push roses and compasses, and `FIGURES` are the document's figures. `page` and `wire` are
+for programs that write web pages.
 """
 
 from floatbase.viewer import geometry, marks, page, plots, props, recording, roses, shapes, wire

@@ -52,6 +52,7 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("rose", MEASURED, "largest push survived"),
     ("capture", CALM, "theory: capture point"),
     ("steady", WARNING, "theory: steady push"),
+    ("compass", COM, "reachable horizontal force"),
     ("ghost", GHOST, GHOST_NAME),
 )
 

@@ -1,18 +1,19 @@
-"""A push rose as a polar plot, and drawn on the ground below the robot."""
+"""Push roses and the compass of the reachable force, as polar plots and drawn on the ground below the robot."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.projections.polar import PolarAxes
 
-from floatbase._arrays import Array, positive
+from floatbase._arrays import Array, of_kind, positive
 from floatbase.errors import InputError
+from floatbase.friction import WrenchSet
 from floatbase.viewer import geometry, lowering
-from floatbase.viewer.colours import CALM, LEGEND, LIMIT, MEASURED, RGB, WARNING
+from floatbase.viewer.colours import CALM, COM, LEGEND, LIMIT, MEASURED, RGB, WARNING
 from floatbase.viewer.painter import nice
 from floatbase.viewer.shapes import Item, Picture, label, placed
 
@@ -23,6 +24,8 @@ _FILL = 0.15  # opacity of what lies inside the measured curve
 _LIFT = 0.004  # m above the ground: no flicker with its lines, no gap to be seen
 _SIDES = 72  # of a ring
 
+_Curve: TypeAlias = tuple[str, Array, RGB, str]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
+
 
 def plot(rose: PushRose, axis: Axes | None = None, theory: bool = True) -> Axes:
     """The largest pushes that were survived, N, over their directions, seen from above: x points up, y to the left.
@@ -32,22 +35,8 @@ def plot(rose: PushRose, axis: Axes | None = None, theory: bool = True) -> Axes:
     theory: whether to draw the curves of the capture point and of a steady push too.
     Raises `InputError` for axes that are not polar.
     """
-    if axis is None:
-        axis = plt.subplots(figsize=(6, 6.6), subplot_kw={"projection": "polar"})[1]
-    if not isinstance(axis, PolarAxes):
-        raise InputError('a rose needs polar axes: plt.subplots(subplot_kw={"projection": "polar"}).')
-    axis.set_theta_zero_location("N")
-    for kind, values, colour, style in _curves(rose, theory):
-        axis.plot(_closed(rose.directions), _closed(values), style, color=colour, linewidth=2, markersize=4, label=_name(kind))
-    axis.fill(rose.directions, rose.pushes, color=MEASURED, alpha=_FILL)
-    axis.set_rlim(0.0, 1.1 * max(values.max() for _, values, _, _ in _curves(rose, theory)))
-    axis.set_rlabel_position(34.0)  # beside the ticks, and beside the directions of 8 and 16
-    axis.tick_params(axis="y", labelsize="small", labelcolor=LIMIT)
-    axis.set_xticks(np.pi / 4 * np.arange(8), ["x", "45°", "y", "135°", "-x", "225°", "-y", "315°"])
-    axis.grid(alpha=0.35)
-    axis.set_title(f"{rose.state.robot.name}: pushes of {rose.duration:g} s at {rose.frame} [N]", pad=14)
-    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), fontsize="small", ncols=3)
-    return axis
+    title = f"{rose.state.robot.name}: pushes of {rose.duration:g} s at {rose.frame} [N]"
+    return _plot(rose.directions, _curves(rose, theory), title, axis)
 
 
 def picture(rose: PushRose, scale: float | None = None, theory: bool = True) -> Picture:
@@ -59,35 +48,93 @@ def picture(rose: PushRose, scale: float | None = None, theory: bool = True) -> 
     scale: length of a drawn push, m/N; None makes its widest curve half as wide again as the stance.
     theory: as for `plot`.
     """
-    positions = rose.contacts.positions(rose.state)
-    centre = np.array([*rose.state.frame_pose(rose.frame).translation[:2], positions[:, 2].mean() + _LIFT])
-    span = float(np.linalg.norm((positions - centre)[:, :2], axis=1).max())
-    largest = max(float(values.max()) for _, values, _, _ in _curves(rose, theory))
+    middle = rose.state.frame_pose(rose.frame).translation
+    return _picture(rose.directions, _curves(rose, theory), middle, rose.contacts.positions(rose.state), scale)
+
+
+def plot_compass(wrenches: WrenchSet, axis: Axes | None = None, n: int = 72) -> Axes:
+    """The horizontal forces that a stance can make at full weight without moment, N, over their directions, seen from above.
+
+    wrenches: of the stance, as from `floatbase.friction.wrench_set`.
+    axis: as for `plot`.
+    n: number of directions.
+    Raises `InputError` where a force has no end, `InfeasibleError` where the stance cannot carry the weight.
+    """
+    return _plot(*_compass(wrenches, n), "horizontal force at full weight without moment [N]", axis)
+
+
+def compass(wrenches: WrenchSet, scale: float | None = None, n: int = 72) -> Picture:
+    """The compass of `plot_compass` on level ground below the centre of mass, with rings: items for `extra` of `Viewer.show`.
+
+        view.show(state, contacts, extra=roses.compass(wrench_set(state, contacts)))
+
+    wrenches, n: as for `plot_compass`. scale: length of a drawn force, m/N; None makes it half as wide again as the stance.
+    """
+    return _picture(*_compass(wrenches, n), wrenches.about, wrenches.points, scale)
+
+
+def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None) -> Axes:
+    """Curves over directions, rad, on polar axes."""
+    if axis is None:
+        axis = plt.subplots(figsize=(6, 6.6), subplot_kw={"projection": "polar"})[1]
+    if not isinstance(axis, PolarAxes):
+        raise InputError('a rose needs polar axes: plt.subplots(subplot_kw={"projection": "polar"}).')
+    axis.set_theta_zero_location("N")
+    for kind, values, colour, style in curves:
+        axis.plot(_closed(directions), _closed(values), style, color=colour, linewidth=2, markersize=4, label=_name(kind))
+    _, first, colour, _ = curves[0]
+    axis.fill(directions, first, color=colour, alpha=_FILL)
+    axis.set_rlim(0.0, 1.1 * max(values.max() for _, values, _, _ in curves))
+    axis.set_rlabel_position(34.0)  # beside the ticks, and beside the directions of 8 and 16
+    axis.tick_params(axis="y", labelsize="small", labelcolor=LIMIT)
+    axis.set_xticks(np.pi / 4 * np.arange(8), ["x", "45°", "y", "135°", "-x", "225°", "-y", "315°"])
+    axis.grid(alpha=0.35)
+    axis.set_title(title, pad=14)
+    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), fontsize="small", ncols=3)
+    return axis
+
+
+def _picture(directions: Array, curves: list[_Curve], middle: Array, feet: Array, scale: float | None) -> Picture:
+    """Curves over directions, rad, around a point, shape (3,), on the ground below, where the feet, shape (n, 3), m, stand."""
+    centre = np.array([*middle[:2], feet[:, 2].mean() + _LIFT])
+    span = float(np.linalg.norm((feet - centre)[:, :2], axis=1).max())
+    largest = max(float(values.max()) for _, values, _, _ in curves)
     scale = 1.5 * span / largest if scale is None else positive("scale", scale, "m/N")
     items: Picture = {}
-    for height, (kind, values, colour, _) in enumerate(reversed(_curves(rose, theory))):
-        tips = scale * values[:, None] * rose.unit_vectors
+    for height, (kind, values, colour, _) in enumerate(reversed(curves)):
+        tips = scale * values[:, None] * _horizontal(directions)
         items[f"{kind}/line"] = _loop(centre + [0.0, 0.0, height * _LIFT / 2], tips, 0.015 * span, colour)
-    tips = scale * rose.pushes[:, None] * rose.unit_vectors
-    # a fan from the middle, for the rose is not convex
-    inside = lowering.mesh(*geometry.fan(np.vstack([np.zeros(3), tips, tips[:1]])), MEASURED, opacity=_FILL, lit=False)
-    items["rose/inside"] = Item(inside, placed(centre))
-    angles = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
-    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(_SIDES)], axis=1)
+    # a fan from the middle, for a rose is not convex; kind, tips and colour are those of the first curve
+    inside = lowering.mesh(*geometry.fan(np.vstack([np.zeros(3), tips, tips[:1]])), colour, opacity=_FILL, lit=False)
+    items[f"{kind}/inside"] = Item(inside, placed(centre))
+    circle = _horizontal(2.0 * np.pi * np.arange(_SIDES) / _SIDES)
     step = nice(largest / 3)
     for force in step * np.arange(1, int(largest / step) + 1):
-        items[f"rose/ring {force:g} N"] = _loop(centre, scale * force * circle, 0.006 * span, LIMIT)
-        at = centre + scale * force * np.array([np.cos(-np.pi / 8), np.sin(-np.pi / 8), 0.0])
-        items[f"rose/label {force:g} N"] = label(at, f"{force:g} N", 0.09 * span)
+        items[f"{kind}/ring {force:g} N"] = _loop(centre, scale * force * circle, 0.006 * span, LIMIT)
+        at = centre + scale * force * _horizontal(-np.pi / 8)
+        items[f"{kind}/label {force:g} N"] = label(at, f"{force:g} N", 0.09 * span)
     return items
 
 
-def _curves(rose: PushRose, theory: bool) -> list[tuple[str, Array, RGB, str]]:
-    """Kind as in `LEGEND`, values (n,) in N, colour and style of each curve, the measured one first."""
+def _curves(rose: PushRose, theory: bool) -> list[_Curve]:
+    """The measured curve first."""
     curves = [("rose", rose.pushes, MEASURED, "o-")]
     if theory:
         curves += [("capture", rose.capture, CALM, "--"), ("steady", rose.steady, WARNING, ":")]
     return curves
+
+
+def _compass(wrenches: WrenchSet, n: int) -> tuple[Array, list[_Curve]]:
+    """Directions, rad, and the one curve."""
+    angles, forces = of_kind("wrenches", wrenches, WrenchSet).horizontal_reach(n)
+    if not np.isfinite(forces).all():
+        raise InputError("the forces of this stance have no end in some direction: give its wrench_set max_normal_force.")
+    return angles, [("compass", forces, COM, "-")]
+
+
+def _horizontal(angles: Array | float) -> Array:
+    """Horizontal unit vectors, shape (…, 3), at angles from the x axis, rad."""
+    return np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
 
 
 def _name(kind: str) -> str:

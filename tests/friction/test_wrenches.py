@@ -221,6 +221,26 @@ def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight()
         wrenches.reach([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
+def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
+    """A facet allows μ cos(π/n) and an edge μ; with the edges out of the way, the outer feet carry all."""
+    state = judges.load("go2").standing()
+    contacts = fb.Contacts.points(state.robot, mu=0.7)
+    feet, com = contacts.positions(state), state.com
+    rear, half = (com[0] - feet[:, 0].min()) / com[2], feet[:, 1].max() / com[2]
+    facet = 0.7 * np.cos(np.pi / 4)
+    for facets, turn, forwards, diagonally, sideways in (
+        (4, 0.0, facet, 0.7, facet),  # facets face forwards
+        (4, np.pi / 4, rear, facet, half),  # edges do
+        (16, 0.0, rear, 0.7 * np.cos(np.pi / 16), half),
+    ):
+        wrenches = wrench_set(state, contacts, facets=facets, turn=turn)
+        angles, forces = wrenches.horizontal_reach(8)
+        assert np.allclose(angles, np.pi / 4 * np.arange(8))
+        assert forces[[0, 1, 2, 6, 7]] / wrenches.weight == pytest.approx(
+            [forwards, diagonally, sideways, sideways, diagonally], rel=1e-6
+        )
+
+
 # the slice at the centre of mass
 
 
@@ -429,6 +449,7 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
         (lambda: wrench_set(state, contacts).margin(np.zeros(3)), r"wrench has shape \(3,\)"),
         (lambda: wrench_set(state, contacts).reach([np.nan] * 6), "direction holds nan"),
         (lambda: wrench_set(state, contacts).reach(np.zeros(6)), "direction is the zero wrench"),
+        (lambda: wrench_set(state, contacts).horizontal_reach(0), "number of directions n is 0"),
         (lambda: wrench_set(state, contacts).torques([1.0]), r"force has shape \(1,\)"),
         (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "one FrictionPolyhedron for each of the 2"),
     ]

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import umsgpack
 
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError
+from floatbase.errors import InfeasibleError, InputError
+from floatbase.friction import wrench_set
 from floatbase.robots import Robot, State
 from floatbase.viewer import (
     BACKGROUNDS,
@@ -26,6 +28,7 @@ from floatbase.viewer import (
     geometry,
     marks,
     props,
+    roses,
     shapes,
 )
 
@@ -207,6 +210,28 @@ def test_figures(screen: Screen) -> None:
         viewer.close()
         image = picture(screen.page, name)
         assert (np.abs(image - image[150, 2]).sum(axis=2) > 60).mean() > 0.03, name
+
+
+def test_the_compass_is_plotted_and_drawn_to_scale(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+    wrenches = wrench_set(standing, contacts)
+    forces = wrenches.horizontal_reach(8)[1]
+    axis = roses.plot_compass(wrenches, n=8)
+    np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["reachable horizontal force"]
+    plt.close(axis.figure)
+    near, far = (roses.compass(wrenches, scale, n=8) for scale in (0.001, 0.002))
+    assert {path.split("/")[0] for path in near} == {"compass"} and near.keys() == far.keys()
+    ring = next(path for path in near if "label" in path)
+    ends = [picture[ring].matrix[:2, 3] - standing.com[:2] for picture in (near, far)]
+    np.testing.assert_allclose(np.linalg.norm(ends, axis=1), float(ring.split()[-2]) * np.array([0.001, 0.002]))
+    np.testing.assert_allclose(near["compass/line"].matrix[:2, 3], standing.com[:2])
+    viewer.show(standing, contacts, extra=near)
+    inwards = {name: [0.0, -1.0 if name[1] == "L" else 1.0, 0.1] for name in contacts.names}
+    walls = Contacts.points(standing.robot, normals=inwards)
+    with pytest.raises(InputError, match="no end in some direction"):
+        roses.plot_compass(wrench_set(standing, walls, inside=False, facets=8), n=8)
+    with pytest.raises(InfeasibleError, match="cannot carry the weight"):
+        roses.compass(wrench_set(standing, contacts.only("FL_foot")))
 
 
 def test_figure_1_adds_up() -> None:
