@@ -1,4 +1,4 @@
-"""Marks in the picture: wrenches, pushes, support regions, frames."""
+"""Marks in the picture: wrenches, pushes, support regions, prices of friction, frames."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
 from floatbase._arrays import checked, positive
+from floatbase.dynamics import Contacts
+from floatbase.errors import InputError
+from floatbase.qp import RowLabel, Solution
 from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.ground import LEVEL, Plane, Planes
 from floatbase.viewer.lowering import Shape
 from floatbase.viewer.shapes import ARROW, Item, Picture, arrow, arrow_width, directed, flat_polygon, label, placed
 
+_AT_CONES = ("friction", "normal force", "largest normal force")  # kinds of the rows whose prices are shown
 OUTLINE = 0.6  # width of the outline of a push, over the radius of its shaft
 
 
@@ -77,6 +81,33 @@ def support_region(positions: npt.ArrayLike, lift: float, ground: Plane | Planes
         return {}
     flat = np.round([[*corner, ground.height(corner)] for corner in corners], 3)
     return {"": Item(flat_polygon(flat, CALM, 0.22), placed([0.0, 0.0, lift]))}
+
+
+def prices(positions: npt.ArrayLike, contacts: Contacts, solution: Solution, height: float, size: float) -> Picture:
+    """The multiplier of each active friction and normal-force row, two significant digits, at the middle of its facet.
+
+    A normal-force row has no facet: its label stands on the cone's axis, at the top.
+    positions: (n, 3), m, world, of the n contact points.
+    contacts: the contacts that the problem was made for.
+    solution: of a `QP` with a block of forces; its rows say where their facets are.
+    height: of the drawn cones, m. size: size of the robot, m, from which letters have their height.
+    Raises `InputError` where the problem has no forces at these contacts.
+    """
+    qp, found = solution.qp, solution.multipliers
+    forces = qp.blocks.get("forces", slice(0, 0))
+    rows = [row for row in zip(qp.inequality_names, qp.G[:, forces], strict=True) if row[0] in found]
+    labels = [(name, row) for name, row in rows if isinstance(name, RowLabel) and name.kind in _AT_CONES]
+    if forces.stop - forces.start != contacts.k or not {name.owner for name, _ in labels} <= set(contacts.point_names):
+        raise InputError("the solution is not one of these contacts: give contacts and solution of the same command.")
+    picture: Picture = {}
+    for name, row in labels:
+        i = contacts.point_names.index(name.owner)
+        normal, own = contacts.normals[i], row[3 * i : 3 * i + 3]
+        across = own - normal * (normal @ own)  # the tangent that the facet faces, times the row's length
+        to_facet = normal - across * (normal @ own) / (across @ across) if name.kind == "friction" else 1.5 * normal
+        at = np.asarray(positions)[i] + height / 1.5 * to_facet  # the centroid of a triangle with its tip in the point
+        picture[f"/{name.replace('/', '_')}"] = label(at, f"{float(f'{found[name]:.2g}'):g}", 0.05 * size)
+    return picture
 
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:

@@ -14,13 +14,14 @@ from floatbase._arrays import flag, function, number, of_kind, positive, said, t
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
+from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import page, recording, wire
+from floatbase.viewer import marks, page, recording, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, hexadecimal
 from floatbase.viewer.ground import STEEPEST, Plane, Planes
-from floatbase.viewer.painter import Painter, kinds
+from floatbase.viewer.painter import Painter, below, kinds
 from floatbase.viewer.place import kernel_is_remote
 from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.window import Window
@@ -151,6 +152,21 @@ class Viewer:
             self.canvas.set(*self._looking(View(), follow=False))
         self._last = state
         return self
+
+    def prices(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
+        """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle, of a normal force on top.
+
+            view.show(state, contacts, planned=command.forces, extra=view.prices(state, contacts, command.solution))
+
+        A multiplier is what one newton more of room would lower the objective by; two significant digits are shown.
+        state, contacts: those that the controller was given.
+        solution: its answer: `command.solution`, or that of `solve(controller.qp(state))`.
+        Raises `InputError` for a solution of other contacts.
+        """
+        self.painter.check_robot("state", of_kind("state", state, State).robot)
+        positions, height = of_kind("contacts", contacts, Contacts).positions(state), self.painter.cone_height(contacts)
+        drawn = marks.prices(positions, contacts, of_kind("solution", solution, Solution), height, self.painter.size)
+        return below("price", drawn)
 
     def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
         """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove everything else."""

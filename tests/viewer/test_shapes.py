@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 import umsgpack
 
+from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError
-from floatbase.friction import wrench_set
+from floatbase.friction import FrictionPolyhedron, wrench_set
+from floatbase.objectives import CoMTask, standing_tasks
 from floatbase.robots import Robot, State
 from floatbase.viewer import (
     BACKGROUNDS,
@@ -232,6 +234,36 @@ def test_the_compass_is_plotted_and_drawn_to_scale(viewer: Viewer, standing: Sta
         roses.plot_compass(wrench_set(standing, walls, inside=False, facets=8), n=8)
     with pytest.raises(InfeasibleError, match="cannot carry the weight"):
         roses.compass(wrench_set(standing, contacts.only("FL_foot")))
+
+
+@pytest.mark.parametrize(("facets", "turn"), [(4, 0.0), (5, 0.4)])
+def test_prices_stand_at_the_middle_of_their_facets(
+    viewer: Viewer, go2: Robot, standing: State, facets: int, turn: float
+) -> None:
+    slopes = {foot.frame: [0.2, -0.1 if foot.frame[1] == "L" else 0.3, 1.0] for foot in go2.feet}
+    contacts = Contacts.points(go2, mu=0.6, normals=slopes)
+    task = CoMTask(standing.com + [0.0, 0.05, 0.0], acceleration=[4.0, 3.0, 0.0])
+    tasks = [task, *standing_tasks(standing)[1:]]
+    controller = WholeBodyController(go2, contacts, tasks, facets=facets, turn=turn, min_normal_force=20.0, path="readable")
+    answer = controller(standing.q, standing.v).solution
+    picture = viewer.prices(standing, contacts, answer)
+    shown = {name: price for name, price in answer.multipliers.items() if "torque" not in name}
+    assert {path.removeprefix("price/") for path in picture} == set(shown)
+    assert any("facet" in name for name in shown) and any("normal force" in name for name in shown)
+    height = viewer.painter.cone_height(contacts)
+    for name, price in shown.items():
+        i = contacts.point_names.index(name.owner)
+        normal = contacts.normals[i]
+        arm = picture[f"price/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
+        if name.kind == "friction":
+            rays = FrictionPolyhedron(normal, 0.6, facets, turn=turn).rays
+            np.testing.assert_allclose(arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9)
+        else:
+            np.testing.assert_allclose(arm, height * normal, atol=1e-9)
+        assert float(picture[f"price/{name}"].shape.name) == pytest.approx(price, rel=0.05)
+    viewer.show(standing, contacts, extra=picture)
+    with pytest.raises(InputError, match="not one of these contacts"):
+        viewer.prices(standing, contacts.only("FL_foot"), answer)
 
 
 def test_figure_1_adds_up() -> None:
