@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Value, cached_property
+from floatbase._arrays import Value, cached_property, said
 from floatbase.errors import InputError, unknown_name
 
 RESERVED = ("point", "error")  # names of the store's own
@@ -105,6 +105,8 @@ class Store:
         self._path, self._points, self._file = path, points, -1
         if path is None:
             return
+        if not isinstance(path, str | Path):
+            raise InputError(f'to must be the path of a file, such as "rows.jsonl", not {said(path)}.')
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -200,6 +200,7 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.C
         (square, {"y": [1]}, {}, r"the grid gives y; square takes \(x: "),
         (square, [{"x": 1}, {"x": 1, "y": 1}], {}, "the grid gives x, y; square takes"),
         (square, {"x": [square]}, {}, "parameter x cannot be stored: it holds a value of type function"),
+        (square, {"x": [1]}, {"to": 3.5}, r"to must be the path of a file, such as \"rows.jsonl\", not 3.5"),
         (square, {"x": [1]}, {"workers": 0}, "workers is 0; it must be a whole number of processes ≥ 1"),
         (square, {"x": [1]}, {"workers": 1.5}, "workers is 1.5"),
         (square, {"x": [1]}, {"workers": 1, "cluster": "tcp://127.0.0.1:1"}, "Leave one of the two out"),
