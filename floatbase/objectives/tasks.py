@@ -11,13 +11,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, flat_forces, number, of_kind, positive, read_only, text
+from floatbase._arrays import (
+    Array,
+    Value,
+    checked,
+    flat_forces,
+    function,
+    number,
+    of_kind,
+    positive,
+    read_only,
+    sealed,
+    text,
+)
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
@@ -88,7 +101,14 @@ def targets_at(task: Task, robot: Robot, k: int, t: float) -> list[Array]:
     moves = callable(values[0])
     if moves:
         values = _together(values[0](t), *shapes.values())
-    found = [_value(f"{name} of {task.name}", value, shapes[name]) for name, value in zip(shapes, values, strict=True)]
+    try:
+        found = [
+            _value(f"{name} of {task.name}", value, shape, moves)
+            for (name, shape), value in zip(shapes.items(), values, strict=True)
+        ]
+    except InputError as error:
+        forms = f" A function of t gives {next(iter(shapes))} alone, or {', '.join(shapes)} together." if moves else ""
+        raise InputError(f"{error}{forms if len(shapes) > 1 else ''}") from None
     if isinstance(task, OrientationTask) and moves:
         found[0] = nearest_rotation(task.name, found[0])
     if isinstance(task, PostureTask):
@@ -100,16 +120,21 @@ def _together(value: Any, shape: tuple[int, ...], *others: tuple[int, ...]) -> l
     """What a function of time gave, with zeros for velocity and acceleration unless it gave all three."""
     if others and isinstance(value, Sequence | np.ndarray) and len(value) == 3 and np.ndim(value[0]) == len(shape):
         return list(value)
-    return [value, *(None for _ in others)]
+    return [value, *map(_zeros, others)]
 
 
-def _value(name: str, target: Any, shape: tuple[int, ...]) -> Array:
-    """A target, zero by default. One that does not move was checked when its task was made, but for a robot's own shape."""
-    if target is None:
-        return np.zeros(shape)
+def _value(name: str, target: Any, shape: tuple[int, ...], moves: bool) -> Array:
+    """A target, zero where none was given. One that does not move was checked with its task, but for a robot's own shape."""
+    if target is None and not moves:
+        return _zeros(shape)
     if type(target) is np.ndarray and target.shape == shape and not target.flags.writeable:
         return target
     return checked(name, target, shape)
+
+
+@lru_cache
+def _zeros(shape: tuple[int, ...]) -> Array:
+    return sealed(np.zeros(shape))
 
 
 def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
@@ -129,10 +154,10 @@ def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
     for name, shape in shapes.items():
         target, what = getattr(task, name), f"{name} of {task.name}"
         if name == first and callable(target) and not isinstance(target, type):
-            moves = True
+            moves, _ = True, function(what, target, f"{name}(t)")
         elif name != first and callable(target):
             raise InputError(f"{what} cannot be a function: let {first} be one, and give {_ALL_THREE}.")
-        elif target is not None or (name == first and task.block == "qdd"):
+        elif target is not None or getattr(type(task), name, ...) is not None:  # None is no default of it
             found = flat_forces(target, None, what) if task.block == "forces" else checked(what, target, shape)
             kept[name] = nearest_rotation(task.name, found) if name == "rotation" else found
             if moves and np.any(found):
