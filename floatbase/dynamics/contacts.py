@@ -186,7 +186,7 @@ class Contacts(Value):
         return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
-        return Contacts([*self.items, *of_kind("what is added to Contacts", other, Contacts).items])
+        return Contacts([*self.items, *of_kind("what is added to Contacts", other, Contacts, "fb.Contacts([contact])").items])
 
     def __iter__(self) -> Iterator[Contact]:
         return iter(self.items)

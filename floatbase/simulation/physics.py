@@ -229,8 +229,7 @@ class Simulation(Fixed):
         n, balls = len(geoms), geoms[:, :, 1]
         forces = np.zeros((n, self.model.ngeom, 3))
         if self._contact_frame is not None:  # its rows are normal and tangents
-            world = numbers.reshape(-1, 3) @ self._contact_frame
-            forces[np.arange(n)[:, None], balls] = world.reshape(n, -1, 3)
+            forces[np.arange(n)[:, None], balls] = numbers.reshape(*balls.shape, 3) @ self._contact_frame
         return forces[:, self._balls]
 
     def contact_positions(self) -> Array:

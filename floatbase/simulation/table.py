@@ -60,7 +60,7 @@ class Table(Value):
     def __getitem__(self, column: str) -> npt.NDArray[Any]:
         """A column as a read-only array; where a row has no number there is NaN, where it has nothing else None."""
         if not isinstance(column, str) or column not in self.columns:
-            raise unknown_name("column", column, self.columns)
+            raise unknown_name("column", column, self.columns, "table.rows are its rows.")
         values = [row.get(column) for row in self.rows]
         if any(_is_number(value) for value in values):
             values = [np.nan if value is None else value for value in values]
@@ -105,7 +105,7 @@ class Store:
         self._path, self._points, self._file = path, points, -1
         if path is None:
             return
-        if not isinstance(path, str | Path):
+        if not isinstance(path, str | os.PathLike):
             raise InputError(f'to must be the path of a file, such as "rows.jsonl", not {said(path)}.')
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
