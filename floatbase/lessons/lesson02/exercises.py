@@ -123,8 +123,8 @@ def _judge_holding(answer: Any) -> Verdict:
 EXERCISES = (
     Exercise(
         name="02.1",
-        statement="solo8 has four legs with two joints each. It lifts one and stands on three point feet. What is the shape of J, "
-        "as (rows, columns)?",
+        statement="solo8 has four legs with two joints each. It lifts one and stands on three point feet. What is the shape of "
+        "J, as (rows, columns)?",
         stub="shape_of_J = (3, 8)  # replace this",
         solution="shape_of_J = (9, 14)",
         judge=Numeric(
