@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
 from difflib import get_close_matches
@@ -140,10 +141,26 @@ def flag(name: str, value: object) -> bool:
 
 
 def function(name: str, value: Any, call: str) -> Any:
-    """`value`, after checking that it can be called. call: how it is called, for the message."""
-    if callable(value) and not isinstance(value, type):
-        return value
-    raise InputError(f"{name} must be a function, called as {call}, not {said(value)}.")
+    """`value`, after checking that it can be called as `call` says, such as "rows(state, t)"."""
+    if not callable(value) or isinstance(value, type):
+        raise InputError(f"{name} must be a function, called as {call}, not {said(value)}.")
+    given = [part for part in call.partition("(")[2].strip(")").split(",") if part]
+    if fault := misfit(value, *given):
+        raise InputError(f"{name} must be a function that can be called as {call}; {fault}.")
+    return value
+
+
+def misfit(function: Any, *given: object, **named: object) -> str:
+    """What a function takes, and why it cannot be called like this; "" where it can, or hides it, as compiled ones do."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return ""
+    try:
+        signature.bind(*given, **named)
+    except TypeError as error:
+        return f"{getattr(function, '__name__', type(function).__name__)} takes {signature}: {error}"
+    return ""
 
 
 def whole(name: str, value: Any, least: int, most: int, why: str = "") -> int:
@@ -201,7 +218,9 @@ def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = ""
         required = f"numbers of shape {_text(shape)}" if shape else "a number"
         raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {said(value)}.")
     if array.shape != shape and not _fits(array.shape, shape):
-        raise InputError(f"{name} has shape {array.shape}; it must have shape {_text(shape)}{f' ({unit})' if unit else ''}.")
+        required = f"have shape {_text(shape)}" if shape else "be one number"
+        one_row = ": one row alone is rows[:1], not rows[0]" if array.ndim == 1 and shape[:-1] in ((None,), (1,)) else ""
+        raise InputError(f"{name} has shape {array.shape}; it must {required}{f' ({unit})' if unit else ''}{one_row}.")
     # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger, the entries decide
     if not (np.vdot(array, array) <= LARGEST**2 or (usual := np.abs(array) <= LARGEST).all()):
         at = tuple(np.argwhere(~usual)[0].tolist())

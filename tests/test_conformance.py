@@ -121,7 +121,7 @@ EXAMPLES: dict[str, Any] = {
     "WrenchSet.cones": VALUES["WrenchSet"].cones, "cones": True, "contact": "FL_foot", "contacts": CONTACTS,
     "control_period": 0.002, "controller": CONTROLLER, "corners": TALOS.feet[0].corners,
     "cost": fb.Quadratic.zero(SPACE.dimension), "cost_on_qdd": fb.Quadratic.zero(18), "crank": 0.045, "curvature": (1.0, 2.0),
-    "digits": 3,
+    "digits": 3, "force_weight": 1.0, "kinds": QP.inequality_names[0].kind, "moment_weight": 1.0,
     "damping": 10.0, "dead_volume": 8e-6, "direction": np.ones(6), "distance": 1.0, "dt": 1e-3, "duration": 0.002,
     "dv": np.zeros(18), "elevation": 10.0, "eom": EOM, "equality_names": tuple("abcdefghijkl"), "extra": {},
     "f": fb.Affine(np.eye(12), ZERO), "facets": 4, "View.feet": True, "feet": ["FL_foot"], "load_urdf.feet": ["tool0"],

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from floatbase._arrays import LARGEST, Array, Fixed, checked, number, of_kind, plain_numbers, read_only
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, NormalForces, Rows
-from floatbase.control.problem import Problem
+from floatbase.control.problem import Problem, rehearsal
 from floatbase.control.tick import Compiled, Given, cache_warning, obstacle
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, unknown_name
@@ -34,9 +34,10 @@ class WholeBodyController(Fixed):
     tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none acts on forces, or
         none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added, so that the optimum is unique.
     facets, inside, turn: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
-    min_normal_force, max_normal_force: N, at every contact point; one number, or a mapping from the name of a contact to a
-        number or a function of t: a foot that is unloaded. The name of a foot that does not stand bounds nothing until it
-        does, so that `replace(contacts=…)` may lift it; other names that are no contact's are errors.
+    min_normal_force, max_normal_force: N, at every contact point, so at each corner of a flat foot; one number, or a mapping
+        from the name of a contact to a number or a function of t: a foot that is unloaded. The name of a foot that does not
+        stand bounds nothing until it does, so that `replace(contacts=…)` may lift it; other names that are no contact's are
+        errors.
     torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.
     rows: inequality rows of one's own on q̈, τ or λ, see `floatbase.control.Rows`.
     solver: one of `floatbase.qp.solvers()`.
@@ -49,6 +50,9 @@ class WholeBodyController(Fixed):
     and the process that compiled may differ by rounding. Where nothing can be kept, `path_reason` says why. A state that the
     compiled tick cannot answer to the last digits, or that has no answer, is handed to the readable path, and its
     `Command.path` says so.
+
+    Functions of t and objects of one's own are tried once when a controller is made with them, at t = 0, where the robot
+    stands: a trajectory that begins later must give something at 0 too.
 
     Raises `InputError` for arguments that do not fit. A call raises `InfeasibleError` with the rows in conflict.
     """
@@ -80,7 +84,8 @@ class WholeBodyController(Fixed):
         bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows, turn)
         problem = Problem(robot, contacts, tasks, bounds)
         bounds.check_names(contacts.names, _feet(robot))
-        problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
+        with rehearsal():
+            problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
         self._prepare(problem, solver, path)
 
     def _prepare(self, problem: Problem, solver: str, path: Path, warm_up: bool = True) -> None:
@@ -167,7 +172,10 @@ class WholeBodyController(Fixed):
     def replace(
         self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None, limits: Limits | None = None
     ) -> WholeBodyController:
-        """A new controller with other contacts, tasks or limits and everything else as here; cheap enough for the loop."""
+        """A new controller with other contacts, tasks or limits and everything else as here; cheap enough for the loop.
+
+        Other limits: `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
+        """
         new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
         problem = replace(self.problem, **{name: value for name, value in new.items() if value is not None})
         if limits is not None:

@@ -16,6 +16,7 @@ from floatbase._arrays import (
     Value,
     cached_property,
     checked,
+    function,
     of_kind,
     plain_numbers,
     positive,
@@ -42,11 +43,13 @@ class Rows(Value):
 
     name: in messages; of the row, where there is one, else of "name 0", "name 1", …
     block: "qdd", "tau" or "forces".
-    rows: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives them; n is the size of the block. The
-        unit is that of the rows: N for forces, m/s² or rad/s² for accelerations.
+    rows: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives them; n is the size of the block, which
+        for forces goes with the contacts. The unit is that of the rows: N for forces, m/s² or rad/s² for accelerations.
     owners: one text for each row instead of its number, such as the names of joints.
 
     Bounds on joints' accelerations, with E = np.eye(robot.nv)[6:]: `Rows("acceleration", "qdd", (E, np.full(robot.d, 50.0)))`.
+    At most 500 N from all feet, however many stand:
+    `Rows("total", "forces", lambda eom, t: (np.tile([0.0, 0.0, 1.0], (1, eom.k // 3)), [500.0]))`.
     Raises `InputError` for another block; `at` does so for shapes that do not fit.
     """
 
@@ -60,7 +63,9 @@ class Rows(Value):
         if text("block of the rows", self.block) not in BLOCKS:
             raise InputError(f'rows {self.name!r} have block {said(self.block)}; it must be "qdd", "tau" or "forces".')
         object.__setattr__(self, "owners", texts(f"owners of {self.name}", self.owners))
-        if not callable(self.rows) or isinstance(self.rows, type):
+        if callable(self.rows) and not isinstance(self.rows, type):
+            function(f"rows of {self.name}", self.rows, "rows(eom, t)")
+        else:
             object.__setattr__(self, "rows", self._checked(self.rows, None))
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
@@ -81,7 +86,10 @@ class Rows(Value):
     def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
         if not isinstance(given, tuple | list) or len(given) != 2:
             raise InputError(f"rows {self.name!r} must be G and h, as in (G, h), not {said(given)}.")
-        G = checked(f"G of {self.name}", given[0], (None, n))
+        G = checked(f"G of {self.name}", given[0], (None, None))
+        if n is not None and G.shape[1] != n:
+            follows = "; a function of (eom, t) can follow the contacts" if self.block == "forces" else ""
+            raise InputError(f"rows {self.name!r} take {G.shape[1]} numbers; their block {self.block!r} has {n}{follows}.")
         return G, checked(f"h of {self.name}", given[1], (len(G),))
 
 
@@ -93,9 +101,10 @@ class Limits(Value):
     facets: number of facets of the friction polyhedron (28) of every contact point.
     inside: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
     turn: rad, by which its facets are turned about the normal.
-    min_normal_force, max_normal_force: N, bounds of normal · f at every contact point: one number for all, or a mapping from
-        the name of a contact to a number or a function of the time t in s; 0 and none where it has none. The bound of a name
-        that is not among the contacts waits until it is: a foot that has lifted will stand again.
+    min_normal_force, max_normal_force: N, bounds of normal · f at every contact point, so at each corner of a flat foot: one
+        number for all, or a mapping from the name of a contact to a number or a function of the time t in s; 0 and none where
+        it has none. The bound of a name that is not among the contacts waits until it is: a foot that has lifted will stand
+        again.
     rows: rows of one's own.
 
     Raises `InputError` for values that do not fit.
@@ -171,10 +180,16 @@ class Limits(Value):
 def _kept(name: str, given: NormalForces) -> NormalForces:
     """A checked copy of what bounds normal forces."""
     if not isinstance(given, Mapping):
+        one = plain_numbers(given)
+        if one is None or one.ndim:
+            by_name = 'or a mapping from the name of a contact to one or to a function, as {"FL_foot": lambda t: …}'
+            raise InputError(f"{name} must be one number (N), {by_name}, not {said(given)}.")
         return positive(name, given, "N", allow_zero=True)
     return MappingProxyType(
         {
-            contact: value if callable(value) else positive(f"{name} of {contact}", value, "N", allow_zero=True)
+            contact: function(f"{name} of {contact}", value, "force(t)")
+            if callable(value)
+            else positive(f"{name} of {contact}", value, "N", allow_zero=True)
             for contact, value in given.items()
         }
     )

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeAlias, cast
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, of_kind, positive, said
+from floatbase._arrays import Array, Value, function, of_kind, positive, said
 from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
 from floatbase.dynamics import MOTION_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
-from floatbase.errors import InfeasibleError, InputError
+from floatbase.errors import FloatbaseError, InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
 from floatbase.qp import QP, RowLabel
 from floatbase.robots import Robot, State, torque_limits_of
@@ -52,12 +53,13 @@ class Problem(Value):
 
         tasks: those to check, all by default.
         """
-        eom = _standing(self.robot, self.contacts)
-        for task in self.tasks if tasks is None else tasks:
-            residual_of(task, eom)
-        self.limits.normal_forces(self.contacts)
-        for rows in self.limits.rows:
-            rows.labels(len(rows.at(eom)[0]))
+        with rehearsal():
+            eom = _standing(self.robot, self.contacts)
+            for task in self.tasks if tasks is None else tasks:
+                residual_of(task, eom)
+            self.limits.normal_forces(self.contacts)
+            for rows in self.limits.rows:
+                rows.labels(len(rows.at(eom)[0]))
 
 
 def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
@@ -123,6 +125,18 @@ def assemble_qp(
     return QP(H, g, A, np.concatenate([-eom.h, b]), G, h, _equality_names(eom.robot, eom.contacts), names, blocks)
 
 
+@contextmanager
+def rehearsal() -> Iterator[None]:
+    """Tells whose function raises while a controller is made that nothing moves yet."""
+    try:
+        yield
+    except FloatbaseError:
+        raise
+    except Exception as error:
+        error.add_note("Raised while a controller was made: it tries what it is given once, at t = 0, where the robot stands.")
+        raise
+
+
 @lru_cache(maxsize=64)
 def _standing(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
     """(7) where the robot stands."""
@@ -153,7 +167,10 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     try:
         residual = task.residual(eom, t)
     except InputError as error:  # such as an `Affine` that holds NaN: say whose it is
-        raise InputError(f"task {task.name!r}: {error}") from None
+        raise error if f"of {task.name}" in str(error) else InputError(f"task {task.name!r}: {error}") from None
+    except TypeError:
+        function(f"the residual of {task.name!r}", task.residual, "residual(eom, t)")
+        raise
     if not isinstance(residual, Affine):
         form = f"A x + b of its block x as fb.Affine(A, b), not {type(residual).__name__}"
         raise InputError(f"the residual of {task.name!r} must be {form}.")

@@ -24,6 +24,10 @@ class LinearConstraint(Value):
 
     Holonomic constraints φ(q, t) = 0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6). The
     constraint's force is Aᵀ λ with one multiplier λ for each row, in the row's own unit; it has no point and no friction cone.
+    Something must give that force, such as a hinge or a rope: a controller counts on it. What the motors alone should bring
+    about is a task, or a pair of `floatbase.control.Rows`.
+
+    A contact like others: `contacts + fb.Contacts([constraint])`.
 
     name: in messages and as the contact's name.
     m: number of rows.
@@ -39,7 +43,7 @@ class LinearConstraint(Value):
 
     def __post_init__(self) -> None:
         text("name of a constraint", self.name)
-        whole(f"m of {self.name}, its number of rows,", self.m, 1, _MOST_ROWS)
+        object.__setattr__(self, "m", whole(f"m of {self.name}, its number of rows,", self.m, 1, _MOST_ROWS))
         function(f"rows of {self.name}", self.rows, "rows(state, t)")
 
     @property

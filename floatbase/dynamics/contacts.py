@@ -128,13 +128,13 @@ class Contacts(Value):
         """J of (4), shape (k, nv), at time t, s."""
         of_kind("state", state, State)
         t = number("t", t, "s")
-        return self._stacked(state, [contact.jacobian(state, t) for contact in self.items])
+        return self._stacked(state, [read_only(contact.jacobian(state, t)) for contact in self.items])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
         of_kind("state", state, State)
         t = number("t", t, "s")
-        parts = [contact.constraint(state, t) for contact in self.items]
+        parts = [tuple(map(read_only, contact.constraint(state, t))) for contact in self.items]
         b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
@@ -186,7 +186,7 @@ class Contacts(Value):
         return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
-        return Contacts([*self.items, *of_kind("what is added to Contacts", other, Contacts).items])
+        return Contacts([*self.items, *of_kind("what is added to Contacts", other, Contacts, "fb.Contacts([contact])").items])
 
     def __iter__(self) -> Iterator[Contact]:
         return iter(self.items)

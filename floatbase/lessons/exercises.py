@@ -23,6 +23,7 @@ from floatbase.lessons import progress
 from floatbase.lessons.rounding import about
 
 TRIES = 2  # so many before `reveal` shows a solution
+NEAR = 0.02  # of the right value: as much as a number with two digits may spoil
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,8 @@ class Numeric:
         for hint, wrong in self.mistakes.items():
             if self._equal(given, np.asarray(wrong(), dtype=np.float64)):
                 return Verdict(False, hint)
+        if self._equal(given, right, NEAR) and not self.count:
+            return Verdict(False, "Nearly: less than 2 % off. Is a number in it rounded, or a small part left out?")
         if self.count:
             return Verdict(
                 False, "Neither right nor a mistake this check knows. What is counted, and what is left out or counted twice?"
@@ -137,9 +140,10 @@ class Numeric:
             return Verdict(False, "This is the transpose of the answer.")
         return Verdict(False, "Neither right nor a mistake this check knows. Look at the units, then at the statement again.")
 
-    def _equal(self, a: Any, b: Any) -> bool:
-        b = np.asarray(b, dtype=np.float64)
-        return a.shape == b.shape and bool(np.max(np.abs(a - b)) <= self.tolerance * (1e-9 + np.max(np.abs(b))))
+    def _equal(self, a: Any, b: Any, tolerance: float = 0.0) -> bool:
+        """Whether they differ by less than this part of b's largest number, or than `self.tolerance`, if that is more."""
+        b, part = np.asarray(b, dtype=np.float64), max(tolerance, self.tolerance)
+        return a.shape == b.shape and bool(np.max(np.abs(a - b)) <= part * (1e-9 + np.max(np.abs(b))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -184,7 +184,7 @@ class _Line(widgets.Label):
 
 
 def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:
-    made = widgets.Button(description=text, layout=widgets.Layout(width="6em"))
+    made = widgets.Button(description=text, layout=widgets.Layout(width="6em", flex="0 0 auto"))
     made.on_click(pressed)
     return made
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import LARGEST, plain_numbers
+from floatbase._arrays import LARGEST, plain_numbers, text
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.rounding import about
@@ -31,7 +31,7 @@ def predict(name: str, *answer: Any, unit: str = "", choices: Sequence[str] = ()
     choices: the texts to choose from; without them the answer is a number.
     count: how many numbers.
     """
-    _units[name] = unit
+    _units[text("name of a prediction", name)] = unit
     stored = progress.predictions().get(name, {})
     given = answer[0] if len(answer) == 1 else list(answer) or ...
     if given is None or given is Ellipsis:
@@ -55,6 +55,7 @@ def compare(name: str, value: Any) -> None:
     name: as in `predict`. value: a number, several, or a text: what the cell has computed. A whole number is printed whole, any
     other with two significant digits. Raises `InputError` for anything else.
     """
+    text("name of a prediction", name)
     result: Any = value if isinstance(value, str) else _rounded(value)
     stored = progress.predictions().get(name, {})
     known = stored | _unkept.get(name, {})
@@ -71,12 +72,16 @@ def compare(name: str, value: Any) -> None:
 
 
 def review(lesson: str = "") -> None:
-    """Print what was predicted in a lesson, such as "02", or in all of them: name, what was said, what it is, how far off."""
+    """Print what was predicted in a lesson, such as "02", or in all of them: name, what was said, what it is, how far off.
+
+    The name of one prediction, such as "02.c", prints that one.
+    """
+    lesson = f"0{lesson}" if len(text("lesson", lesson)) == 1 and lesson.isdigit() else lesson
     stored = progress.predictions()
     known = {name: stored.get(name, {}) | _unkept.get(name, {}) for name in sorted({*stored, *_unkept})}
     rows = [("", "you said", "it is", "")]
     for name, entry in known.items():
-        if "said" in entry and lesson in ("", name.split(".")[0]):
+        if "said" in entry and lesson in ("", name, name.split(".")[0]):
             said, result, unit = entry["said"], entry.get("is"), entry.get("unit", "")
             shown, off = ("not seen yet", "") if result is None else (_as_result(result, unit), _how_far(said, result, unit))
             rows.append((name, _as_said(said, unit), shown, off))

@@ -18,7 +18,20 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, flat_forces, number, of_kind, plain_numbers, positive, read_only, text
+from floatbase._arrays import (
+    Array,
+    Value,
+    checked,
+    flat_forces,
+    function,
+    number,
+    of_kind,
+    plain_numbers,
+    positive,
+    read_only,
+    sealed,
+    text,
+)
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
@@ -110,16 +123,16 @@ def _together(name: str, value: Any, shape: tuple[int, ...], *others: tuple[int,
     raise InputError(f"the function of {name} gave {len(value)} targets; it must give one, or {_ALL_THREE}.")
 
 
-@lru_cache(maxsize=64)
-def _zeros(shape: tuple[int, ...]) -> Array:
-    return read_only(np.zeros(shape))
-
-
 def _value(name: str, target: Any, shape: tuple[int, ...]) -> Array:
     """A target. One that does not move was checked when its task was made, but for a robot's own shape."""
     if type(target) is np.ndarray and target.shape == shape and not target.flags.writeable:
         return target
     return checked(name, target, shape)
+
+
+@lru_cache(maxsize=64)
+def _zeros(shape: tuple[int, ...]) -> Array:
+    return sealed(np.zeros(shape))
 
 
 def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
@@ -139,7 +152,7 @@ def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
     for name, shape in shapes.items():
         target, what = getattr(task, name), f"{name} of {task.name}"
         if name == first and callable(target) and not isinstance(target, type):
-            moves = True
+            moves, _ = True, function(what, target, f"{name}(t)")
         elif name != first and callable(target):
             raise InputError(f"{what} cannot be a function: let {first} be one, and give {_ALL_THREE}.")
         elif target is not None or getattr(type(task), name, ...) is not None:  # None counts where it is the default

@@ -20,8 +20,11 @@ SEEN = 0.4  # s for which a slice still lists a push that is over: the eye misse
 
 
 def advice(status: str) -> str:
-    """A status of `Live` as a line for who watches: what stopped the run, and what to do about it."""
-    return status if text("status", status) in ("running", "paused") else f"{status}: press reset, or push again"
+    """A status of `Live` as a line for who watches: what stopped the run, in a sentence, and what to do about it."""
+    if text("status", status) in ("running", "paused"):
+        return status
+    reason = status.split("\n")[0].split(". ")[0].rstrip(".")
+    return f"{reason}: press reset, or push again"
 
 
 class Live:

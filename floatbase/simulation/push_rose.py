@@ -12,12 +12,13 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property, checked, positive, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, misfit, positive, read_only
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, SimulationError
 from floatbase.friction import WrenchSet, wrench_set
 from floatbase.robots import State
 from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
 from floatbase.simulation.sweep import sweep
 
@@ -160,9 +161,12 @@ def push_rose(
 
 def _maker(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
     """A function that makes a simulation and a controller, from what `push_rose` was given; it can be sent to a worker."""
+    needs = "a controller that has a robot, or a function without parameters that makes one"
     if not callable(controller):
-        raise InputError(f"push_rose needs a controller, or a function that makes one, not {controller!r}.")
+        raise InputError(f"push_rose needs {needs} or makes a pair (simulation, controller), not {controller!r}.")
     if not hasattr(controller, "robot"):
+        if fault := misfit(controller):
+            raise InputError(f"push_rose needs {needs}; {fault}.")
         return partial(_pair, controller)
     try:
         return partial(_pair, partial(pickle.loads, cloudpickle.dumps(controller)))
@@ -197,11 +201,14 @@ def _largest(
 ) -> float:
     """The largest multiple of `step`, N, that is survived as a push in a direction, rad; `first` is the first one tried."""
 
-    def survives(steps: int) -> bool:
+    def pushed(steps: int) -> Rollout:
         sim, controller = make()
         push = Push(steps * step * _unit_vectors(direction), sim.time + start, duration, frame)
         ticks = ceil((start + duration + watch) / sim.timestep)
-        return rollout(sim, controller, ticks * sim.timestep, [push]).outcome == "completed"
+        return rollout(sim, controller, ticks * sim.timestep, [push])
+
+    def survives(steps: int) -> bool:
+        return pushed(steps).outcome == "completed"
 
     survived, fatal = 0, first
     while survives(fatal):
@@ -213,8 +220,9 @@ def _largest(
     while fatal - survived > 1:
         middle = (survived + fatal) // 2
         survived, fatal = (middle, fatal) if survives(middle) else (survived, middle)
-    if survived == 0 and not survives(0):
-        raise SimulationError("the robot falls without a push.")
+    if survived == 0 and (still := pushed(0)).outcome != "completed":
+        how = f"the controller fails without a push: {still.error}"
+        raise SimulationError("the robot falls without a push." if still.error is None else how)
     return survived * step
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import warnings
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -144,18 +143,6 @@ def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], ac
             )
     for push in pushes:
         sim.pushed_body(push)
-    try:
-        signature = inspect.signature(controller)
-    except (TypeError, ValueError):
-        return  # compiled functions hide their parameters
-    try:
-        signature.bind(None, None, 0.0)
-    except TypeError as error:
-        name = getattr(controller, "__name__", type(controller).__name__)
-        raise InputError(
-            f"rollout calls controller(q, v, t) with the time t, s; {name} takes {signature} ({error}). Let it take all "
-            f"three, as in lambda q, v, t: …"
-        ) from None
 
 
 def check_actuators(actuators: Actuators | None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import itertools
 import os
 import pickle
@@ -21,6 +20,7 @@ import cloudpickle
 import loky
 from tqdm.auto import tqdm
 
+from floatbase._arrays import misfit
 from floatbase.errors import InputError, SimulationError
 from floatbase.simulation.table import RESERVED, Row, Store, Table, plain
 
@@ -150,18 +150,10 @@ def _check(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
     """Raise `InputError` for parameters that the function does not take, and for a setup that is no function."""
     if setup is not None and not callable(setup):
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
-    try:
-        signature = inspect.signature(function)
-    except (TypeError, ValueError):
-        return  # compiled functions hide their parameters
     made = () if setup is None else (None,)
     for names in dict.fromkeys(tuple(point) for point in points):
-        try:
-            signature.bind(*made, **dict.fromkeys(names))
-        except TypeError as error:
-            before = "what setup returns, then " if made else ""
-            name = getattr(function, "__name__", function)
-            raise InputError(f"the grid gives {before}{', '.join(names)}; {name} takes {signature}: {error}.") from None
+        if fault := misfit(function, *made, **dict.fromkeys(names)):
+            raise InputError(f"the grid gives {'what setup returns, then ' if made else ''}{', '.join(names)}; {fault}.")
 
 
 def _workers(workers: Any) -> int:
@@ -258,8 +250,8 @@ def _answers(engine: _Engine | None, job: _Job, points: list[Row], open_points: 
                 yield numbers.pop(future), answer
     except BrokenExecutor as error:
         raise SimulationError(
-            "a worker process ended in the middle of a point: out of memory, which fewer workers help, or a crash in "
-            "compiled code."
+            "a worker process ended in the middle of a point: it was out of memory, where fewer workers help, or compiled "
+            "code crashed."
         ) from error
 
 
@@ -302,7 +294,7 @@ def _results(job: _Job, point: Row) -> Row:
         _here.token = job.token
     try:
         answer = _here.function(**point)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # sys.exit would end the program that sweeps, without a word
         return {"error": f"{type(error).__name__}: {error}"}
     results = answer if isinstance(answer, Mapping) else {"result": answer}
     for name in results:

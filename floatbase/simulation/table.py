@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Value, cached_property
+from floatbase._arrays import Value, cached_property, said
 from floatbase.errors import InputError, unknown_name
 
 RESERVED = ("point", "error")  # names of the store's own
@@ -60,7 +60,7 @@ class Table(Value):
     def __getitem__(self, column: str) -> npt.NDArray[Any]:
         """A column as a read-only array; where a row has no number there is NaN, where it has nothing else None."""
         if not isinstance(column, str) or column not in self.columns:
-            raise unknown_name("column", column, self.columns)
+            raise unknown_name("column", column, self.columns, "table.rows are its rows.")
         values = [row.get(column) for row in self.rows]
         if any(_is_number(value) for value in values):
             values = [np.nan if value is None else value for value in values]
@@ -105,6 +105,8 @@ class Store:
         self._path, self._points, self._file = path, points, -1
         if path is None:
             return
+        if not isinstance(path, str | os.PathLike):
+            raise InputError(f'to must be the path of a file, such as "rows.jsonl", not {said(path)}.')
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)

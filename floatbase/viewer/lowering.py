@@ -6,13 +6,13 @@ Equal shapes are the same object, so that a picture that shows a shape again sen
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import umsgpack
 
+from floatbase._arrays import cached_property
 from floatbase.viewer.colours import RGB
 from floatbase.viewer.text import LETTER, text_picture
 

@@ -24,7 +24,8 @@ OUTLINE = 0.6  # width of the outline of a push, over the radius of its shaft
 
 
 def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike, size: float, colour: RGB = COM) -> Picture:
-    """A force as a straight arrow, and a moment as a curled arrow around its axis. Either may be zero, and is left out.
+    """A force as a straight arrow, and a moment as a curled arrow around its axis, drawn over the robot, in which it would
+    hide. Either may be zero, and is left out.
 
     position: (3,), m, world, where both begin.
     force: (3,), m, world: the force times the picture's scale (m/N).
@@ -37,17 +38,20 @@ def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike,
     if np.linalg.norm(force) > 1e-6:
         picture["/force"] = arrow(position, force, colour, size)
     if np.linalg.norm(moment) > 1e-6:
-        picture["/moment"] = curled_arrow(position, moment, colour)
+        picture["/moment"] = curled_arrow(position, moment, colour, on_top=True)
     return picture
 
 
-def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM) -> Item:
+def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM, on_top: bool = False) -> Item:
     """An arrow that turns around an axis by the right-hand rule.
 
-    position: (3,), m, world, its centre. moment: (3,), m, world: along the axis, as long as the radius. colour: RGB.
+    position: (3,), m, world, its centre.
+    moment: (3,), m, world: along the axis, as long as the radius.
+    colour: RGB.
+    on_top: whether it is drawn over what is in front of it.
     """
     moment, radius = directed("a curled arrow", moment)
-    return Item(_unit_curl(colour), placed(position, geometry.frame_along(moment / radius), radius))
+    return Item(_unit_curl(colour, on_top), placed(position, geometry.frame_along(moment / radius), radius))
 
 
 def push(
@@ -124,7 +128,7 @@ def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
 
 
 @lru_cache(maxsize=64)
-def _unit_curl(colour: RGB) -> Shape:
+def _unit_curl(colour: RGB, on_top: bool) -> Shape:
     """Three quarters of a ring of radius 1 around z, with a head at its end."""
     end = 1.5 * np.pi
     ring = geometry.torus_arc(1.0, 0.055, 0.0, end - 0.3)
@@ -132,7 +136,7 @@ def _unit_curl(colour: RGB) -> Shape:
     at = np.array([np.cos(end - 0.3), np.sin(end - 0.3), 0.0])
     along = np.array([-at[1], at[0], 0.0])
     turned = head @ geometry.frame_along(along).T + at
-    return lowering.mesh(*geometry.merged([ring, (turned, faces)]), colour)
+    return lowering.mesh(*geometry.merged([ring, (turned, faces)]), colour, on_top=on_top)
 
 
 @lru_cache(maxsize=64)

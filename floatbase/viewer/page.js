@@ -196,7 +196,10 @@ function startPlayer(viewer) {
       if (![...speed.options].some((option) => option.value == requested)) speed.add(new Option(`${requested}×`, requested));
       speed.value = requested;
       animator().mixer.timeScale = command.options.speed;
-      if (command.options.paused) animator().pause();
+      if (command.options.paused) {
+        animator().pause();
+        animator().seek(0);  // the first picture: before this, items that come later are seen, too
+      }
       if (!ticking) tick();
     },
   };

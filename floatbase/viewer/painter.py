@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
-from floatbase._arrays import Array, checked, of_kind, plain_numbers, said, texts
+from floatbase._arrays import Array, cached_property, checked, of_kind, plain_numbers, said, texts
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron

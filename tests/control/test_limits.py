@@ -183,7 +183,37 @@ def make(**options: object) -> Callable[[], object]:
             InputError,
             r"h of r has shape \(3,\); it must have shape \(12,\)",
         ),
-        (make(rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]), InputError, r"G of r has shape \(3, 3\); .* \(any, 12\)"),
+        (
+            make(max_normal_force=lambda t: 1.0),
+            InputError,
+            "max_normal_force must be one number .* or a mapping .*, not a func",
+        ),
+        (
+            make(max_normal_force=[1.0, 2.0]),
+            InputError,
+            r"max_normal_force must be one number .* or a mapping .*, not \[1.0, 2",
+        ),
+        (
+            make(max_normal_force={"FL_foot": lambda: 1.0}),
+            InputError,
+            r"max_normal_force of FL_foot must be .* called as force\(t\); <lambda> takes \(\): too many positional arguments",
+        ),
+        (
+            make(rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]),
+            InputError,
+            "rows 'r' take 3 numbers; their block 'tau' has 12.",
+        ),
+        (
+            make(rows=[Rows("r", "forces", (np.eye(9), np.ones(9)))]),
+            InputError,
+            r"rows 'r' take 9 numbers; their block 'forces' has 12; a function of \(eom, t\) can follow the contacts",
+        ),
+        (
+            lambda: Rows("r", "tau", (np.ones(12), [1.0])),
+            InputError,
+            r"G of r has shape \(12,\); it must have shape \(any, any\): one row alone is rows\[:1\], not rows\[0\]",
+        ),
+        (lambda: Rows("r", "tau", lambda eom: 3.0), InputError, r"called as rows\(eom, t\); <lambda> takes \(eom\): too many"),
         (make(rows=[Rows("r", "tau", lambda eom, t: 3.0)]), InputError, "rows 'r' must be G and h"),
         (make(rows=[Rows("r", "tau", (np.eye(12), np.ones(12)), ["a"])]), InputError, "rows 'r' have 1 owners and 12 rows"),
         (make(rows=2 * [Rows("r", "tau", (np.eye(12), np.ones(12)))]), InputError, "inequality name 'r 0' stands twice"),
@@ -206,7 +236,7 @@ def test_a_bound_that_goes_wrong_is_told_in_the_words_of_the_readable_path() -> 
 @pytest.mark.parametrize("path", ["compiled", "readable"])
 def test_a_replaced_controller_is_checked(path: str) -> None:
     controller = judges.controller_of("go2", path=path)
-    with pytest.raises(InputError, match=r"G of r has shape \(3, 3\)"):
+    with pytest.raises(InputError, match="rows 'r' take 3 numbers; their block 'tau' has 12"):
         controller.replace(limits=replace(controller.limits, rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]))
     with pytest.raises(UnknownNameError, match="unknown contact in max_normal_force 'FL_fot'; near names: FL_foot"):
         controller.replace(limits=replace(controller.limits, max_normal_force={"FL_fot": 1.0}))

@@ -28,10 +28,14 @@ class Own:
         vars(self).update({name: part for name, part in parts.items() if name != without})
 
 
-def own_with_nan() -> Own:
+def own(residual: Callable[..., object]) -> Own:
     task = Own()
-    vars(task)["residual"] = lambda eom, t=0.0: fb.Affine(np.eye(18), np.full(18, np.nan))
+    vars(task)["residual"] = residual
     return task
+
+
+def own_with_nan() -> Own:
+    return own(lambda eom, t=0.0: fb.Affine(np.eye(18), np.full(18, np.nan)))
 
 
 def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
@@ -57,6 +61,17 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: controller(Own(without="block")), InputError, "Own is no task yet, for it has no block; a task"),
         (lambda: controller(Own(residual=np.ones(3))), InputError, r"residual of 'mine' .*fb\.Affine\(A, b\), not ndarray"),
         (lambda: controller(Own()), InputError, "residual of 'mine' must be .*, not NoneType"),
+        (
+            lambda: controller(own(lambda eom: None)),
+            InputError,
+            r"residual of 'mine' must be .* called as residual\(eom, t\); <lambda> takes \(eom\): too many",
+        ),
+        (lambda: controller(own(lambda eom, t: 1 + "")), TypeError, "unsupported operand"),
+        (
+            lambda: controller(own(lambda eom, t: fb.Affine(np.ones(18), [0.0]))),
+            InputError,
+            r"task 'mine': A has shape \(18,\); .*: one row alone is rows\[:1\], not rows\[0\]",
+        ),
         (lambda: controller(own_with_nan()), InputError, r"task 'mine': b holds nan at index \[0\]"),
         (
             lambda: controller().qp(judges.load("solo12").standing()),
@@ -82,6 +97,13 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
         (lambda: controller(fb.TorqueTask(lambda t: None)), InputError, "target of torque regularisation .* not None"),
         (lambda: controller(fb.CoMTask(lambda t: np.array(1.0))), InputError, r"position of .* has shape \(\); .*\(3,\)"),
         (lambda: controller(fb.CoMTask(lambda t: ([0, [0]], UP, UP))), InputError, "position of .* must be numbers of shape"),
+        (
+            lambda: fb.CoMTask(lambda: UP),
+            InputError,
+            r"called as position\(t\); <lambda> takes \(\): too many positional argum",
+        ),
+        (lambda: fb.OrientationTask("base", lambda t, f: UP), InputError, r"called as rotation\(t\); .* 'f'"),
+        (lambda: fb.CoMTask(UP, kp=UP), InputError, r"kp of centre of mass has shape \(3,\); it must be one number \(1/s²\)"),
         (lambda: fb.CoMTask(UP, lambda t: UP), InputError, r"velocity of .* cannot be a function: let position be one"),
         (lambda: fb.CoMTask(lambda t: UP, UP), InputError, r"velocity of .* must be left out, for position is a function"),
         (lambda: controller(fb.PostureTask(STATE.q, UP)), InputError, r"velocity of posture has shape \(3,\); .*\(12,\)"),
@@ -111,6 +133,19 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
 def test_bad_input_is_told_what_would_be_right(make: Callable[[], object], kind: type[FloatbaseError], text: str) -> None:
     with pytest.raises(kind, match=text):
         make()
+
+
+def test_a_trajectory_that_does_not_begin_at_zero_is_told_why_it_was_asked_for_that() -> None:
+    def later(t: float) -> np.ndarray:
+        if t < 1.0:
+            raise ArithmeticError(f"nothing at {t}")
+        return STATE.com
+
+    made = (lambda: controller(fb.CoMTask(later)), lambda: controller().replace(tasks=[fb.CoMTask(later)]))
+    for make in made:
+        with pytest.raises(ArithmeticError, match=r"nothing at 0\.0") as raised:
+            make()
+        assert any("while a controller was made" in note and "at t = 0" in note for note in raised.value.__notes__)
 
 
 @pytest.mark.parametrize(

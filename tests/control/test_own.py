@@ -365,6 +365,10 @@ def test_contacts_of_ones_own_may_write_into_the_same_arrays_again() -> None:
     others, frames = fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"]), ("FL_foot", "FR_foot")
     own = fb.Contacts([Reuses(frame, radius=0.022) for frame in frames])
     same = fb.Contacts([PointContact(frame, radius=0.022) for frame in frames])
+    A, b = own.constraint(robot.random_state(0))
+    expected, right_side = same.constraint(robot.random_state(0))
+    assert np.array_equal(A, 2.0 * expected) and np.array_equal(b, 2.0 * right_side)
+    assert np.array_equal(own.jacobian(robot.random_state(0)), same.jacobian(robot.random_state(0)))
     known, _ = judges.pair(robot, others + same)
     for controller in judges.pair(robot, others + own):
         for state in judges.near_and_far("go2", 3):

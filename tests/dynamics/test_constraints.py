@@ -134,6 +134,8 @@ def test_rows_that_do_not_fit_are_named(rows: Callable[..., tuple[Array, Array]]
 def test_a_constraint_needs_a_row() -> None:
     with pytest.raises(fb.FloatbaseError, match=r"m of none, its number of rows, is 0; it must be a whole number ≥ 1"):
         LinearConstraint("none", 0, lambda s, t: (np.zeros((0, 18)), np.zeros(0)))
+    whole = LinearConstraint("one", 1.0, lambda s, t: (np.ones((1, 18)), np.zeros(1)))
+    assert fb.Contacts([whole]).k == 1 and whole.row_names == ("row 0",)
 
 
 # bolts: Figure 1, left --------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics import FlatFootContact, PointContact, fixed_frame
+from floatbase.dynamics import FlatFootContact, LinearConstraint, PointContact, fixed_frame
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
 
 GO2, UR5, SOLO = judges.load("go2"), judges.load("ur5"), judges.load("solo12")
@@ -46,6 +46,16 @@ ALL = fb.Contacts.points(GO2)
         (lambda: fb.Contacts.points(GO2, normals=[0, 0, np.nan]), InputError, r"normal of FL_foot holds nan at index \[2\]"),
         (lambda: fb.Contacts.flat_feet(GO2), InputError, r"FL_foot of go2 is not a flat foot; use fb\.Contacts\.points"),
         (lambda: ALL + ALL, InputError, "contact 'FL_foot' stands twice in the list; each name may stand once"),
+        (
+            lambda: ALL + LinearConstraint("rail", 1, lambda state, t: (np.ones((1, 18)), [0.0])),
+            InputError,
+            r"added to Contacts must be Contacts, as fb\.Contacts\(\[contact\]\), not a LinearConstraint",
+        ),
+        (
+            lambda: LinearConstraint("rail", 1, lambda state: 0),
+            InputError,
+            r"rows\(state, t\); <lambda> takes \(state\): too many",
+        ),
         (lambda: ALL.only("FL"), UnknownNameError, "unknown contact 'FL'; near names: FL_foot"),
         (lambda: ALL.without("left"), UnknownNameError, "unknown contact 'left'; known: FL_foot, FR_foot, RL_foot, RR_foot"),
         (lambda: ALL["FL"], UnknownNameError, "unknown contact 'FL'"),

@@ -192,6 +192,7 @@ def test_wrong_answers_to_00_1_get_the_hint_that_fits() -> None:
         (float("nan"), "not finite"),
         ("heavy", "should be numbers"),
         (..., "no answer yet"),
+        (16.0 * (9.81 + 2.0), "Nearly"),  # 16 kg
         (1.0, "Neither right nor a mistake this check knows"),
     ]
     assert missed("00.1", wrong) == []

@@ -198,6 +198,7 @@ def test_wrong_widths_of_the_plate_get_their_hint(pressing: Robot) -> None:
         (2 * (120 * height / pressing.mass - ahead), "one more factor"),
         (2 * (pressing.weight * height / 120 - ahead), "exchanged"),
         (-WIDE_ENOUGH, "sign"),
+        (2 * (120 * 0.63 / 206 - 0.04), "Nearly"),  # with the numbers of the text
         (1e3 * WIDE_ENOUGH, "Neither right"),
         ([WIDE_ENOUGH, WIDE_ENOUGH], "one number"),
         (None, "no answer yet"),

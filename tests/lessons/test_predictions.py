@@ -177,6 +177,9 @@ def test_a_lesson_is_reviewed_and_all_of_them_are(said: Any) -> None:
     ]  # fmt: skip
     assert len({line.index(word) for line, word in zip(table, ("it is", "at rest   right", "69 mm"), strict=True)}) == 1
     assert [line.split()[0] for line in said()] == ["you", "02.a", "02.c", "03.d"]
+    for name, rows in (("2", ["02.a", "02.c"]), ("02.c", ["02.c"]), ("03.d", ["03.d"])):
+        review(name)
+        assert [line.split()[0] for line in said()] == ["you", *rows]
 
 
 DAMAGED = (
@@ -224,6 +227,13 @@ def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process_and_a_line_sa
     monkeypatch.setenv("FLOATBASE_HOME", str(home))  # as soon as it can be kept, it is
     compare("05.u", 69.2)
     assert progress.predictions() == {"05.u": {"said": 40, "unit": "mm", "is": 69.2}}
+
+
+def test_a_name_that_was_left_out_is_missed() -> None:
+    for call in (lambda: predict(3.0, unit="N"), lambda: compare(3.0, 2.0), lambda: review(2)):
+        with pytest.raises(InputError, match="must be a text, not"):
+            call()
+    assert progress.predictions() == {}
 
 
 @pytest.mark.parametrize("nothing", [None, True, {}, 1j])

@@ -12,7 +12,7 @@ import pytest
 from waiting import until
 
 import floatbase as fb
-from floatbase.simulation import SEEN, Live
+from floatbase.simulation import SEEN, Live, advice
 from floatbase.viewer import push_at
 
 ROBOT = judges.load("go2")
@@ -55,6 +55,19 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slic
     run.use(CONTROLLER)
     run.start()
     until(lambda: len(slices) > 1)
+
+
+@pytest.mark.parametrize(
+    ("status", "line"),
+    [
+        ("paused", "paused"),
+        ("fell", "fell: press reset, or push again"),
+        ("controller failed: no point satisfies all rows. In conflict:\n  6 × friction.", "rows: press reset, or push again"),
+        ("stopped: 0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd: press reset, or push again"),
+    ],
+)
+def test_what_stopped_a_run_is_told_in_one_sentence(status: str, line: str) -> None:
+    assert advice(status).endswith(line) and "\n" not in advice(status)
 
 
 class Held:

@@ -74,7 +74,7 @@ UP = [0.0, 0.0, 1.0]
         (
             lambda: fb.rollout(SIM, lambda q, v: None, 1.0),
             InputError,
-            r"calls controller\(q, v, t\) .* <lambda> takes \(q, v\) \(too many positional arguments\)",
+            r"called as controller\(q, v, t\); <lambda> takes \(q, v\): too many positional arguments",
         ),
         (lambda: fb.rollout(SIM, lambda q, v, t, gain: None, 1.0), InputError, "missing a required argument: 'gain'"),
         (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), UnknownNameError, "'bse'; near names: base"),

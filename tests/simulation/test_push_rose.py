@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import judges
 import matplotlib.pyplot as plt
@@ -12,7 +13,7 @@ from scipy.linalg import expm
 from scipy.spatial import ConvexHull
 
 import floatbase as fb
-from floatbase.errors import InputError, SimulationError
+from floatbase.errors import InfeasibleError, InputError, SimulationError
 from floatbase.simulation import PushRose
 from floatbase.viewer import roses
 
@@ -102,12 +103,23 @@ def test_the_rose_is_plotted_and_drawn_to_scale(rose: PushRose) -> None:
 def test_factories_and_what_does_not_fit(standing: fb.WholeBodyController) -> None:
     robot = standing.robot
 
+    def fails(q: np.ndarray, v: np.ndarray, t: float) -> Any:
+        raise InfeasibleError("no torque")
+
+    vars(fails)["robot"] = robot
     for make, options, error, message in (
         (standing, {"directions": 2}, InputError, "directions is 2; it must be a whole number ≥ 3"),
         (standing, {"step": 0.0}, InputError, "step is 0; it must be > 0 N"),
         (standing, {"frame": "bass"}, fb.FloatbaseError, "near names: base"),
         (3, {}, InputError, "needs a controller"),
         (lambda: 3, {}, InputError, "must make a controller that has a robot"),
+        (
+            judges.limp,
+            {},
+            InputError,
+            r"needs a controller that has a robot, or .*; limp takes \(q: .*: missing a required argu",
+        ),
+        (lambda: fails, {"directions": 3, "workers": 1}, SimulationError, "the controller fails without a push: no torque"),
         (lambda: (fb.Simulation(robot), judges.limp), {"directions": 3, "workers": 1}, SimulationError, "falls without a push"),
         (lambda: (fb.Simulation(fb.load("ur5")), judges.limp), {}, InputError, "ur5 is bolted to the ground"),
     ):

@@ -98,6 +98,9 @@ def test_a_controller_that_fails_at_once_leaves_an_empty_record(sim: fb.Simulati
     for look in (record.slip, lambda: record.final):
         with pytest.raises(fb.FloatbaseError, match="this record is empty: controller failed, no point satisfies all rows"):
             look()
+    fb.rollout(sim, judges.controller_of("go2"), 0.01)  # feet have touched the ground
+    record = fb.rollout(sim, greedy, 0.1)
+    assert (record.outcome, record.measured.shape, record.foot_positions.shape) == ("controller failed", (0, 12), (0, 4, 3))
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, None, "much"])

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.errors import InputError, SimulationError
+from floatbase.errors import InputError, SimulationError, UnknownNameError
 from floatbase.simulation import Table
 
 GRID = {"n": [1, 2, 3, 4, 5], "scale": np.array([0.1, 0.3])}
@@ -183,6 +183,10 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
         fb.sweep(square, {"x": [1]}, to=tmp_path / "nowhere" / "rows.jsonl", progress=False)
     with pytest.raises(InputError, match="knows its function by its name"):
         fb.sweep(lambda x: x, {"x": [1]}, to=path, progress=False)
+    with pytest.raises(InputError, match="to must be the path of a file, not 3"):
+        fb.sweep(square, {"x": [1]}, to=3, progress=False)
+    with pytest.raises(UnknownNameError, match=r"unknown column 0; known: error, result, x\. table\.rows are its rows"):
+        list(first)
 
 
 def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.CaptureFixture[str]) -> None:
@@ -200,6 +204,7 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.C
         (square, {"y": [1]}, {}, r"the grid gives y; square takes \(x: "),
         (square, [{"x": 1}, {"x": 1, "y": 1}], {}, "the grid gives x, y; square takes"),
         (square, {"x": [square]}, {}, "parameter x cannot be stored: it holds a value of type function"),
+        (square, {"x": [1]}, {"to": 3.5}, r"to must be the path of a file, such as \"rows.jsonl\", not 3.5"),
         (square, {"x": [1]}, {"workers": 0}, "workers is 0; it must be a whole number of processes ≥ 1"),
         (square, {"x": [1]}, {"workers": 1.5}, "workers is 1.5"),
         (square, {"x": [1]}, {"workers": 1, "cluster": "tcp://127.0.0.1:1"}, "Leave one of the two out"),
@@ -208,6 +213,11 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.C
         with pytest.raises(InputError, match=message):
             fb.sweep(function, grid, **options)
     assert capfd.readouterr().err == ""
+
+
+def test_a_function_that_ends_its_program_ends_its_point_only() -> None:
+    table = fb.sweep(lambda x: sys.exit(f"no {x}") if x == 1 else x, {"x": [0, 1, 2]}, workers=1, progress=False)
+    assert [row["error"] for row in table.rows] == [None, "SystemExit: no 1", None]
 
 
 def test_the_bar_counts_points_and_failures_and_can_be_switched_off(capfd: pytest.CaptureFixture[str]) -> None:

@@ -259,6 +259,19 @@ def leaning(viewer: Viewer, state: State, contacts: Contacts, tangents: list[flo
     return [viewer.painter.picture(state, contacts, force) for force in forces]
 
 
+def test_a_paused_record_hides_what_comes_later(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
+    page.set_viewport_size(SMALL)
+    first, second = leaning(viewer, standing, contacts, [0.0, 0.6])
+    del first["measured/FL_foot"]
+    viewer.play_pictures([0, 1], [first, second], paused=True)
+    page.goto(viewer.url)
+    settle(page)
+    seen = """(name) => viewer.scene_tree.find(["meshcat", "measured", name]).object.visible"""
+    assert [page.evaluate(seen, name) for name in ("FL_foot", "FR_foot")] == [False, True]
+    page.evaluate("viewer.animator.seek(1)")
+    assert page.evaluate(seen, "FL_foot")
+
+
 # the page answers "done" when it has drawn; a page whose answer is withheld is busy for the window
 WITHHOLD = """() => {
   const socket = viewer.connection, send = socket.send.bind(socket);

@@ -18,9 +18,7 @@ from floatbase.simulation import Rollout
 from floatbase.viewer import MEASURED, Item, Picture, View, Viewer, below, marks, props, recording, shapes
 
 PRESSING = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
-
-
-PRESSING_VIEW = View(66.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
+PRESSING_VIEW = View(100.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
 
 
 def show_arm(view: Viewer, state: fb.State) -> Viewer:
@@ -30,7 +28,8 @@ def show_arm(view: Viewer, state: fb.State) -> Viewer:
     names: dict[str, npt.ArrayLike] = {
         "x": [0.32, 0.0, 0.03],
         "y": [0.0, 0.33, 0.03],
-        "tool": tool + [-0.06, 0.0, 0.16],
+        "z": [0.09, 0.0, 0.28],
+        "tool": tool + [-0.03, 0.0, -0.1],
         "wall": [tool[0], 0.0, 0.95],
     }
     extra |= {f"label/{name}": shapes.label(at, name, 0.05, plate=False) for name, at in names.items()}
@@ -59,7 +58,7 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
             extra["f/wall"] = shapes.arrow(tool, view.scale * force, MEASURED, view.painter.size)
             extra["f/bolts"] = shapes.arrow(start, view.scale * bolts, MEASURED, view.painter.size)
             extra["f/moment"] = marks.curled_arrow([0.0, 0.16, 0.1], 0.003 * moment, MEASURED)
-            extra["label/wall"] = shapes.label(tip + [0.0, 0.0, 0.06], "f{r}", 0.06, plate=False)
+            extra["label/wall"] = shapes.label(tip + [0.0, 0.0, -0.08], "f{r}", 0.06, plate=False)
             extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06, plate=False)
             extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06, plate=False)
         view.show(state, com=False, extra=extra)
@@ -88,7 +87,7 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
                 drawn["label/wall"] = shapes.label(tool + vector + [0.0, 0.0, 0.07], "f{r}", 0.06, plate=False)
         return drawn
 
-    return _play(view, record, picture, View(66.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
+    return _play(view, record, picture, View(100.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
 
 
 def play_floating(view: Viewer, record: Rollout) -> Viewer:

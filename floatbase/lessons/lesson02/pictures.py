@@ -63,11 +63,10 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         drawn = marks.wrench(base.translation, scale * f, MOMENT * moment, size)
         extra = {f"base{path}": item for path, item in drawn.items()} if np.linalg.norm(force) > 1e-6 else {}
         if extra:
-            extra["label/base"] = shapes.label(
-                base.translation + scale * f + [0.0, 0.0, 0.04], "on the base", 0.028, plate=False
-            )
-            tip = state.point(foot) + scale * force
-            extra["label/foot"] = shapes.label(tip + [0.05, 0.0, 0.02], "on the foot", 0.028, plate=False)
+            above = base.translation + np.maximum(scale * f, [-np.inf, -np.inf, 0.1]) + [0.0, 0.0, 0.04]  # and above the trunk
+            extra["label/base"] = shapes.label(above, "on the base", 0.028, plate=False)
+            ahead = state.point(foot) + [0.14, 0.0, -0.06]  # neither leg nor arrow comes here
+            extra["label/foot"] = shapes.label(ahead, "on the foot", 0.028, plate=False)
         picture = view.painter.picture(state, contacts, planned=forces, com=False, cones=False, extra=extra)
         view.draw({path.replace("planned/", "force/"): item for path, item in picture.items()})
         torques = ", ".join(f"{x + 0.0:.1f}" for x in np.round(generalised[6:][leg], 1))
@@ -78,7 +77,7 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         )
 
     panel = slider_panel(view, draw, forwards=(-40.0, 0.0, 40.0, "N"), up=(0.0, 60.0, 80.0, "N"))
-    view.camera(View(76.0, 14.0, 1.0, around=((0.0, 0.0, 0.32), 0.42)))
+    view.camera(View(76.0, 14.0, 1.0, around=((0.0, 0.0, 0.31), 0.47)))
     return panel
 
 
@@ -174,9 +173,12 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
                 rod = shapes.rod(a, geometry.frame_along((b - a) / length), length, 0.006, view.painter.text)
                 picture[f"way/{i}"] = rod
         picture["wheel/now"] = _drawn(states[min(round(time * 20), len(states) - 1)], way, time)
-        for name, at in (("start", corners[0]), ("end", corners[-1])):
+        ends = {"start": corners[0], "end": corners[-1]}
+        if np.linalg.norm(corners[-1] - corners[0]) < 0.1:
+            ends = {"start and end": corners[0]}
+        for name, at in ends.items():
             picture[f"mark/{name}"] = shapes.contact_patch(at + [0.0, 0.0, 0.002], [0.0, 0.0, 1.0], 0.035)
-            picture[f"name/{name}"] = shapes.label(at + [-0.17, 0.0, 0.02], name, 0.05)
+            picture[f"name/{name}"] = shapes.label(at + [-0.12, -0.13, 0.0], name, 0.05, plate=False)
         view.draw(picture)
         gone = states[-1].q[:2] - states[0].q[:2]
         slip = max(float(np.abs(wheel().slip(state)).max()) for state in states)
@@ -186,7 +188,7 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
         )
 
     panel = slider_panel(view, draw, way=(0.0, 0.5, 1.0, "m"), turn=(-1.5, -0.7, 1.5, "rad"), time=(0.0, 1.5, 4.0, "s"))
-    view.camera(View(-115.0, 32.0, 1.0, around=((0.38, 0.05, 0.1), 0.62)))
+    view.camera(View(-115.0, 32.0, 1.0, around=((0.4, -0.1, 0.1), 0.85)))
     return panel
 
 
