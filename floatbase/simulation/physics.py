@@ -284,7 +284,7 @@ class Simulation(Fixed):
     def _base_height(self) -> float:
         """Height of the base's origin over the nearest plane of the ground, m."""
         at = self._base_position.tolist()
-        return min(_dot(normal, at) - offset for normal, offset in self._planes)
+        return min([_dot(normal, at) - offset for normal, offset in self._planes])
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"
