@@ -14,6 +14,7 @@ from floatbase.qp import Solution, solve
 from floatbase.robots import State
 
 SAG = 2e-3  # of the weight, N or N·m: the torque regularisation lets a robot begin to sag; 1.5e-3 on anymal_kinova
+ASIDE = 5e-3  # of the friction coefficient 0.3: a force at its limit may lean a little aside of the wish
 
 
 def cases(name: str, n: int) -> list[State]:
@@ -179,8 +180,8 @@ def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
 
     quarter = np.pi / 4
     for turn in (0.0, quarter):
-        assert reached(turn, turn) == pytest.approx(0.3 * np.cos(quarter), abs=1e-3)
-        assert reached(turn + quarter, turn) == pytest.approx(0.3, abs=1e-3)
+        assert reached(turn, turn) == pytest.approx(0.3 * np.cos(quarter), abs=ASIDE)
+        assert reached(turn + quarter, turn) == pytest.approx(0.3, abs=ASIDE)
 
 
 def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> None:
