@@ -102,6 +102,7 @@ ACCEPTED: dict[str, set[str]] = {
     "Affine.constant.b": ANY_LENGTH, "Affine.__call__.x": {"column"}, "ConstantTorques.tau": ANY_LENGTH,
     "ForceTask.target": ANY_LENGTH, "TorqueTask.target": ANY_LENGTH, "PostureTask.q": ANY_LENGTH,
     "PostureTask.velocity": ANY_LENGTH, "PostureTask.acceleration": ANY_LENGTH,
+    "Ground.offset": {"column"}, "Robot.standing.offset": {"column"},
     "time": {"one too many"}, "times": {"one too many"},
     "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
 }  # fmt: skip
@@ -186,7 +187,7 @@ LEFT_OUT = {
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
-        "recording.checked_rollout",
+        "recording.checked_rollout", "Ground.clearances",
     ),
     "needs trimesh": ("urdf_visuals",),
     "draws what it is given": ("Viewer.draw", "Viewer.play_pictures", "below", "hexadecimal", "robot_meshes", "appearance"),
