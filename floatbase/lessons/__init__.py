@@ -11,17 +11,22 @@ from floatbase.lessons.rounding import about
 
 if TYPE_CHECKING:
     from floatbase.lessons.panels import SliderPanel, live, push_panel, slider_panel
+    from floatbase.lessons.roses import draw_roses, measured_rose, plot_roses, rose_controller
 
-_PANELS = ("SliderPanel", "live", "push_panel", "slider_panel")  # imported at first use: they load physics and pictures
+# imported at first use: they load physics and pictures
+_LAZY = {
+    **dict.fromkeys(("SliderPanel", "live", "push_panel", "slider_panel"), "panels"),
+    **dict.fromkeys(("draw_roses", "measured_rose", "plot_roses", "rose_controller"), "roses"),
+}
 
 __all__ = [
     "ConstantTorques", "Exercise", "Numeric", "Shaped", "SliderPanel", "Torques", "Verdict", "about", "all_exercises", "check",
-    "compare", "joint_servo", "live", "numbers", "predict", "progress", "push_panel", "reveal", "review", "show_progress",
-    "slider_panel",
+    "compare", "draw_roses", "joint_servo", "live", "measured_rose", "numbers", "plot_roses", "predict", "progress",
+    "push_panel", "reveal", "review", "rose_controller", "show_progress", "slider_panel",
 ]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PANELS:
+    if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module("floatbase.lessons.panels"), name)
+    return getattr(import_module(f"floatbase.lessons.{_LAZY[name]}"), name)

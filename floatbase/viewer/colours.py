@@ -50,6 +50,7 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("idle cone", IDLE, "friction cone: no force"),
     ("support", SUPPORT, "support region"),
     ("rose", MEASURED, "largest push survived"),
+    ("before", LIMIT, "largest push survived before"),
     ("capture", CALM, "theory: capture point"),
     ("steady", WARNING, "theory: steady push"),
     ("compass", COM, "reachable horizontal force"),

@@ -27,29 +27,30 @@ _SIDES = 72  # of a ring
 _Curve: TypeAlias = tuple[str, Array, RGB, str]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
 
 
-def plot(rose: PushRose, axis: Axes | None = None, theory: bool = True) -> Axes:
+def plot(rose: PushRose, axis: Axes | None = None, theory: bool = True, before: PushRose | None = None) -> Axes:
     """The largest pushes that were survived, N, over their directions, seen from above: x points up, y to the left.
 
     rose: the record, as from `fb.push_rose`.
     axis: polar axes to plot on; None for a new figure.
     theory: whether to draw the curves of the capture point and of a steady push too.
-    Raises `InputError` for axes that are not polar.
+    before: another controller's rose in the same directions, to compare with; drawn in grey.
+    Raises `InputError` for axes that are not polar and for roses of different directions.
     """
     title = f"{rose.state.robot.name}: pushes of {rose.duration:g} s at {rose.frame} [N]"
-    return _plot(rose.directions, _curves(rose, theory), title, axis)
+    return _plot(rose.directions, _curves(rose, theory, before), title, axis)
 
 
-def picture(rose: PushRose, scale: float | None = None, theory: bool = True) -> Picture:
+def picture(rose: PushRose, scale: float | None = None, theory: bool = True, before: PushRose | None = None) -> Picture:
     """The rose on level ground around the robot, with rings for its scale: items for `extra` of `Viewer.show`.
 
         view.show(rose.state, rose.contacts, cones=False, extra=roses.picture(rose))
 
     rose: the record, as from `fb.push_rose`.
     scale: length of a drawn push, m/N; None makes its widest curve half as wide again as the stance.
-    theory: as for `plot`.
+    theory, before: as for `plot`.
     """
     middle = rose.state.frame_pose(rose.frame).translation
-    return _picture(rose.directions, _curves(rose, theory), middle, rose.contacts.positions(rose.state), scale)
+    return _picture(rose.directions, _curves(rose, theory, before), middle, rose.contacts.positions(rose.state), scale)
 
 
 def plot_compass(wrenches: WrenchSet, axis: Axes | None = None, n: int = 72) -> Axes:
@@ -116,9 +117,13 @@ def _picture(directions: Array, curves: list[_Curve], middle: Array, feet: Array
     return items
 
 
-def _curves(rose: PushRose, theory: bool) -> list[_Curve]:
+def _curves(rose: PushRose, theory: bool, before: PushRose | None) -> list[_Curve]:
     """The measured curve first."""
     curves = [("rose", rose.pushes, MEASURED, "o-")]
+    if before is not None:
+        if not np.array_equal(before.directions, rose.directions):
+            raise InputError(f"roses of {len(rose.directions)} and {len(before.directions)} directions cannot be compared.")
+        curves.append(("before", before.pushes, LIMIT, "o-"))
     if theory:
         curves += [("capture", rose.capture, CALM, "--"), ("steady", rose.steady, WARNING, ":")]
     return curves

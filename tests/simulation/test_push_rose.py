@@ -96,6 +96,15 @@ def test_the_rose_is_plotted_and_drawn_to_scale(rose: PushRose) -> None:
     assert {path.split("/")[0] for path in roses.picture(rose, theory=False)} == {"rose"}
     assert near.keys() == far.keys() and "rose/ring 100 N" in near
     assert all(np.allclose(near[path].matrix[:2, 3], rose.state.q[:2]) for path in near if "label" not in path)
+    before = replace(rose, pushes=rose.pushes / 2)
+    axis = roses.plot(rose, theory=False, before=before)
+    grey = axis.get_lines()[1]
+    assert np.allclose(grey.get_ydata()[:-1], rose.pushes / 2) and grey.get_label() == "largest push survived before"
+    plt.close(axis.figure)
+    assert {path.split("/")[0] for path in roses.picture(rose, theory=False, before=before)} == {"rose", "before"}
+    other = replace(rose, directions=rose.directions[:-1], pushes=rose.pushes[:-1])
+    with pytest.raises(InputError, match="cannot be compared"):
+        roses.plot(rose, before=other)
     ends = [picture["rose/label 100 N"].matrix[:2, 3] - rose.state.q[:2] for picture in (near, far)]
     assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
 

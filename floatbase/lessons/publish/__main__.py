@@ -23,6 +23,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     paged = commands.add_parser("pages", help="write lessons as HTML pages, which need no kernel")
     paged.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
     paged.add_argument("--to", type=Path, default=PAGES, metavar="FOLDER", help=f"where to write, {PAGES} by default")
+    rosed = commands.add_parser("roses", help="measure the push roses of lessons, such as 05, anew")
+    rosed.add_argument("lessons", nargs="+", metavar="LESSON")
     commands.add_parser("workspace", help="bring the learner's copy in notebooks/my up to date")
 
     given = parser.parse_args(arguments)
@@ -33,6 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _map()
         elif given.command == "pages":
             _pages(given.lessons or [*sorted(FOLDER.glob("*.ipynb")), *sorted(FOLDER.glob("*.md"))], given.to)
+        elif given.command == "roses":
+            _roses(given.lessons)
         else:
             for line in prepare():
                 print(line)
@@ -52,6 +56,13 @@ def _map() -> None:
     (FOLDER / "equations.md").write_text(equations.table(), encoding="utf-8")
     (FOLDER / "conventions.md").write_text(conventions.page(), encoding="utf-8")
     README.write_text(readme_with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def _roses(lessons: Sequence[str]) -> None:
+    from floatbase.lessons.roses import measure_rose
+
+    for lesson in lessons:
+        print(f"{lesson}: {measure_rose(lesson)}")
 
 
 def _pages(sources: Sequence[Path], folder: Path) -> None:

@@ -1,0 +1,80 @@
+"""The push roses that end lessons from 05 on: measured by a command, kept with the course, drawn over the former lesson's.
+
+`python -m floatbase.lessons.publish roses 05` measures that of lesson 05 anew, which takes a minute or two, and writes it into
+roses.json beside this file, where the lessons read it. A lesson that has one offers `rose_controller()`, which makes its
+controller.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from floatbase._arrays import text
+from floatbase.errors import InputError
+from floatbase.simulation import PushRose, Simulation, push_rose
+from floatbase.viewer import Picture, roses
+
+_FILE = Path(__file__).with_name("roses.json")
+_DIRECTIONS = 8
+_STEP, _DURATION = 5.0, 0.1  # N, s
+
+
+def measured_rose(lesson: str) -> PushRose:
+    """The rose of that lesson's controller, such as "05", as it was measured last.
+
+    Raises `InputError` for a lesson without one.
+    """
+    kept = _kept()
+    if text("lesson", lesson) not in kept:
+        raise InputError(f"lesson {lesson!r} has no push rose; these have: {', '.join(kept)}.")
+    controller = rose_controller(lesson)()
+    angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    start = Simulation(controller.robot).state
+    return PushRose(angles, np.array(kept[lesson]), _STEP, _DURATION, "base", start, controller.contacts)
+
+
+def plot_roses(lesson: str, axis: Axes | None = None) -> Axes:
+    """The rose of that lesson, over the former lesson's in grey. axis: polar axes to plot on; None for a new figure."""
+    return roses.plot(measured_rose(lesson), axis, theory=False, before=_before(lesson))
+
+
+def draw_roses(lesson: str) -> Picture:
+    """What `plot_roses` plots, on the ground below the robot: items for `extra` of `Viewer.show`."""
+    return roses.picture(measured_rose(lesson), theory=False, before=_before(lesson))
+
+
+def rose_controller(lesson: str) -> Callable[[], Any]:
+    """The function that makes the controller of that lesson's rose. Raises `InputError` where there is none."""
+    try:
+        make: Callable[[], Any] = import_module(f"floatbase.lessons.lesson{text('lesson', lesson)}").rose_controller
+    except (ModuleNotFoundError, AttributeError) as error:
+        raise InputError(f"lesson {lesson!r} has no controller to push: lessons from 05 to 09 have.") from error
+    return make
+
+
+def measure_rose(lesson: str) -> PushRose:
+    """Measure the rose of that lesson and keep it."""
+    rose = push_rose(rose_controller(lesson), directions=_DIRECTIONS, step=_STEP, duration=_DURATION)
+    kept = {**_kept(), lesson: rose.pushes.tolist()}
+    lines = [f"{json.dumps(name)}: {json.dumps(kept[name])}" for name in sorted(kept)]
+    _FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    return rose
+
+
+def _before(lesson: str) -> PushRose | None:
+    """The rose of the lesson before, if there is one."""
+    earlier = [name for name in _kept() if name < lesson]
+    return measured_rose(max(earlier)) if earlier else None
+
+
+def _kept() -> dict[str, list[float]]:
+    """For each lesson its largest pushes, N."""
+    kept: dict[str, list[float]] = json.loads(_FILE.read_text(encoding="utf-8"))
+    return kept

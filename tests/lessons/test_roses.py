@@ -1,0 +1,46 @@
+"""The push roses of the lessons: what is kept is what the physics says, and the former lesson's lies below in grey."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase import lessons
+from floatbase.errors import InputError
+from floatbase.lessons import draw_roses, measured_rose, plot_roses, rose_controller
+
+KEPT = json.loads((Path(lessons.__file__).parent / "roses.json").read_text(encoding="utf-8"))
+PART = 0.6  # of the kept push is survived and 1 / PART of it is not, on any processor: a fall amplifies rounding
+
+
+@pytest.mark.parametrize("lesson", sorted(KEPT))
+def test_what_is_kept_is_what_the_physics_says(lesson: str) -> None:
+    rose = measured_rose(lesson)
+    outcomes = []
+    for factor in (PART, 1 / PART):
+        controller = rose_controller(lesson)()
+        push = fb.Push(factor * rose.pushes[2] * rose.unit_vectors[2], start=0.2, duration=rose.duration)
+        outcomes.append(fb.rollout(fb.Simulation(controller.robot), controller, 1.8, [push]).outcome)
+    assert outcomes[0] == "completed" != outcomes[1]
+
+
+@pytest.mark.parametrize("lesson", sorted(KEPT))
+def test_the_former_lesson_is_grey(lesson: str) -> None:
+    axis = plot_roses(lesson)
+    former = [name for name in sorted(KEPT) if name < lesson][-1:]
+    expected = [measured_rose(name).pushes for name in [lesson, *former]]
+    assert np.array_equal([line.get_ydata()[:-1] for line in axis.get_lines()], expected)
+    plt.close(axis.figure)
+    assert {path.split("/")[0] for path in draw_roses(lesson)} == {"rose", *["before" for _ in former]}
+
+
+def test_lessons_without_a_rose_are_told() -> None:
+    with pytest.raises(InputError, match="no push rose"):
+        measured_rose("00")
+    with pytest.raises(InputError, match="no controller to push"):
+        rose_controller("00")
