@@ -1,0 +1,9 @@
+"""Behaviours: controllers that step. Gaits, swings, plans of the centre of mass, footholds, `Walk` and `Stand`."""
+
+from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
+from floatbase.behaviours.gait import Gait
+from floatbase.behaviours.lipm import LIPM
+from floatbase.behaviours.swing import Swing
+from floatbase.behaviours.walk import Gains, Step, Walk
+
+__all__ = ["LIPM", "Gains", "Gait", "Step", "Swing", "Walk", "capture_point", "neutral_point", "step_adjustment"]

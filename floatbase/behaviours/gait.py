@@ -1,0 +1,147 @@
+"""`Gait`: which foot is in the air when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import floor, inf
+from types import MappingProxyType
+
+import numpy as np
+
+from floatbase._arrays import Value, number, of_kind, positive, text
+from floatbase.errors import InputError, unknown_name
+from floatbase.robots import Robot
+
+SAME_TIME = 1e-9  # s: times of a schedule that differ by less are the same; sums of periods round
+_MOST_PHASES = 1000  # asked for at once
+
+
+@dataclass(frozen=True, eq=False)
+class Gait(Value):
+    """A contact schedule: foot f is in the air for `swing` s from start + (n + offsets[f]) period on, n = 0, 1, 2, …
+
+    offsets: for each foot the part of the period at which it lifts, from 0 to 1.
+    period: s, from one lift-off of a foot to its next.
+    swing: s, for which a foot is in the air, less than the period.
+    start: s, before which no foot lifts.
+    stop: s, from which on no foot lifts any more; one that is in the air then still comes down.
+
+    `trot`, `crawl` and `walk` make the usual ones. Raises `InputError` for numbers that do not fit.
+    """
+
+    offsets: Mapping[str, float]
+    period: float
+    swing: float
+    start: float = 0.0
+    stop: float = inf
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.offsets, Mapping) or not self.offsets:
+            raise InputError('offsets must be a mapping from feet to parts of the period, such as {"left": 0.0, "right": 0.5}.')
+        offsets = {text("foot", foot): number(f"offset of {foot}", offset) for foot, offset in self.offsets.items()}
+        for foot, offset in offsets.items():
+            if not 0.0 <= offset < 1.0:
+                raise InputError(f"the offset of {foot} is {offset:g}; it must be from 0 to less than 1.")
+        object.__setattr__(self, "offsets", MappingProxyType(offsets))
+        for name in ("period", "swing"):
+            object.__setattr__(self, name, positive(name, getattr(self, name), "s"))
+        object.__setattr__(self, "start", number("start", self.start, "s"))
+        if self.stop != inf:
+            object.__setattr__(self, "stop", number("stop", self.stop, "s"))
+        if self.swing > self.period - SAME_TIME:
+            raise InputError(f"swing is {self.swing:g} s of a period of {self.period:g} s; each foot must stand for a while.")
+
+    @staticmethod
+    def trot(robot: Robot, swing: float = 0.25, pause: float = 0.0, start: float = 0.0) -> Gait:
+        """Diagonal pairs of a quadruped in turns, with a pause on all feet after each swing; all times in s."""
+        front, hind = _rows_of_feet(robot)
+        step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
+        offsets = {front[0]: 0.0, hind[1]: 0.0, front[1]: 0.5, hind[0]: 0.5}
+        return Gait({foot: offsets[foot] for foot in _names(robot)}, 2.0 * step, swing, start)
+
+    @staticmethod
+    def crawl(robot: Robot, swing: float = 0.3, pause: float = 0.2, start: float = 0.0) -> Gait:
+        """One foot of a quadruped after the other, hind before front on each side, with a pause after each; times in s."""
+        front, hind = _rows_of_feet(robot)
+        step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
+        offsets = {hind[0]: 0.0, front[0]: 0.25, hind[1]: 0.5, front[1]: 0.75}
+        return Gait({foot: offsets[foot] for foot in _names(robot)}, 4.0 * step, swing, start)
+
+    @staticmethod
+    def walk(robot: Robot, swing: float = 0.6, pause: float = 0.1, start: float = 0.0) -> Gait:
+        """The two feet of a biped in turns, with a pause on both after each swing; times in s."""
+        names = _names(robot)
+        if len(names) != 2:
+            raise InputError(f"{robot.name} has {len(names)} feet; Gait.walk is for two. Gait.trot and Gait.crawl are for four.")
+        step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
+        return Gait(dict(zip(names, (0.0, 0.5), strict=True)), 2.0 * step, swing, start)
+
+    @property
+    def feet(self) -> tuple[str, ...]:
+        """Names of the feet."""
+        return tuple(self.offsets)
+
+    def swing_of(self, foot: str, t: float) -> tuple[float, float] | None:
+        """When a foot lifted and when it lands, s, if it is in the air at time t, s; None if it stands."""
+        if foot not in self.offsets:
+            raise unknown_name("foot", foot, self.offsets)
+        first = self.start + self.offsets[foot] * self.period
+        cycles = floor((t + SAME_TIME - first) / self.period)
+        lift = first + cycles * self.period
+        in_the_air = cycles >= 0 and t < lift + self.swing - SAME_TIME and lift < self.stop - SAME_TIME
+        return (lift, lift + self.swing) if in_the_air else None
+
+    def stance(self, t: float) -> tuple[str, ...]:
+        """The feet that stand at time t, s."""
+        return tuple(foot for foot in self.offsets if self.swing_of(foot, t) is None)
+
+    def next_swing(self, foot: str, t: float) -> tuple[float, float] | None:
+        """The first swing of a foot that begins at time t, s, or later, as (lift, land), s; None where there is none."""
+        first = self.start + self.offsets[foot] * self.period
+        lift = first + max(0, -floor((first - t + SAME_TIME) / self.period)) * self.period
+        return (lift, lift + self.swing) if lift < self.stop - SAME_TIME else None
+
+    def phases(self, t: float, n: int, longest: float = 5.0) -> list[tuple[float, float, tuple[str, ...]]]:
+        """The next n times of one stance from t on, as (begin, end, standing feet), s; one that does not end is cut.
+
+        longest: s, after which a stance is cut, and the list ends.
+        """
+        if not 1 <= n <= _MOST_PHASES:
+            raise InputError(f"n is {n}; a schedule has from 1 to {_MOST_PHASES} phases at once.")
+        found: list[tuple[float, float, tuple[str, ...]]] = []
+        while len(found) < n:
+            end = self._next_change(t)
+            stance = self.stance(t)
+            if end - t > longest:
+                return [*found, (t, t + longest, stance)]
+            found.append((t, end, stance))
+            t = end
+        return found
+
+    def _next_change(self, t: float) -> float:
+        """When a foot lifts or lands next after t, s."""
+        times = [inf]
+        for foot in self.offsets:
+            now, coming = self.swing_of(foot, t), self.next_swing(foot, t + 2.0 * SAME_TIME)
+            times += [now[1]] if now else []
+            times += [coming[0]] if coming else []
+        return min(times)
+
+
+def _names(robot: Robot) -> tuple[str, ...]:
+    return tuple(foot.frame for foot in of_kind("robot", robot, Robot).feet)
+
+
+def _rows_of_feet(robot: Robot) -> tuple[tuple[str, str], tuple[str, str]]:
+    """The front feet and the hind feet of a quadruped, left before right."""
+    names = _names(robot)
+    if len(names) != 4:
+        raise InputError(f"{robot.name} has {len(names)} feet; this gait is for four. Gait.walk is for two.")
+    standing = robot.standing()
+    places = {name: standing.point(name) for name in names}
+    by_x = sorted(names, key=lambda name: -places[name][0])
+    rows = [sorted(pair, key=lambda name: -places[name][1]) for pair in (by_x[:2], by_x[2:])]
+    if not all(np.sign(places[left][1]) > np.sign(places[right][1]) for left, right in rows):
+        raise InputError(f"{robot.name} does not stand on two feet to the left and two to the right: make its Gait by offsets.")
+    return (rows[0][0], rows[0][1]), (rows[1][0], rows[1][1])

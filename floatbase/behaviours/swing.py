@@ -1,0 +1,51 @@
+"""`Swing`: the path of a foot through the air."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from floatbase._arrays import Array, Value, checked, number, positive, read_only
+from floatbase.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Swing(Value):
+    """A foot's path from start to end, at rest at both: minimum jerk, and a bump of `height` upwards.
+
+    start, end: (3,), m, world.
+    lift, land: s, when it begins and ends.
+    height: m, of the bump, half-way.
+
+    It may be aimed elsewhere at every tick: the value with another `end`. Raises `InputError` for numbers that do not fit.
+    """
+
+    start: Array
+    end: Array
+    lift: float
+    land: float
+    height: float = 0.05
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", checked("start", self.start, (3,), "m"))
+        object.__setattr__(self, "end", checked("end", self.end, (3,), "m"))
+        for name in ("lift", "land"):
+            object.__setattr__(self, name, number(name, getattr(self, name), "s"))
+        object.__setattr__(self, "height", positive("height", self.height, "m", allow_zero=True))
+        if not self.land > self.lift:
+            raise InputError(f"the foot lifts at {self.lift:g} s and lands at {self.land:g} s; it must land later.")
+
+    def __call__(self, t: float) -> tuple[Array, Array, Array]:
+        """Position, m, velocity, m/s, and acceleration, m/s², shape (3,) each, at time t in s; at rest before and after.
+
+        With u from 0 to 1: start + (end - start) (10 u³ - 15 u⁴ + 6 u⁵), and 64 u³ (1 - u)³ height upwards.
+        """
+        T = self.land - self.lift
+        u = min(max((t - self.lift) / T, 0.0), 1.0)
+        w = u * (1.0 - u)
+        along = (u**3 * (10.0 - 15.0 * u + 6.0 * u * u), 30.0 * w * w / T, 60.0 * w * (1.0 - 2.0 * u) / T**2)
+        bump = (64.0 * w**3, 192.0 * w * w * (1.0 - 2.0 * u) / T, 384.0 * w * (1.0 - 5.0 * w) / T**2)
+        way, up = self.end - self.start, np.array([0.0, 0.0, self.height])
+        x, v, a = (s * way + b * up for s, b in zip(along, bump, strict=True))
+        return read_only(self.start + x), read_only(v), read_only(a)
