@@ -53,7 +53,7 @@ class Gait(Value):
             raise InputError(f"swing is {self.swing:g} s of a period of {self.period:g} s; each foot must stand for a while.")
 
     @staticmethod
-    def trot(robot: Robot, swing: float = 0.25, pause: float = 0.0, start: float = 0.0) -> Gait:
+    def trot(robot: Robot, swing: float = 0.25, pause: float = 0.0, start: float = 1.0) -> Gait:
         """Diagonal pairs of a quadruped in turns, with a pause on all feet after each swing; all times in s."""
         front, hind = _rows_of_feet(robot)
         step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
@@ -61,7 +61,7 @@ class Gait(Value):
         return Gait({foot: offsets[foot] for foot in _names(robot)}, 2.0 * step, swing, start)
 
     @staticmethod
-    def crawl(robot: Robot, swing: float = 0.3, pause: float = 0.2, start: float = 0.0) -> Gait:
+    def crawl(robot: Robot, swing: float = 0.3, pause: float = 0.2, start: float = 1.0) -> Gait:
         """One foot of a quadruped after the other, hind before front on each side, with a pause after each; times in s."""
         front, hind = _rows_of_feet(robot)
         step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
@@ -69,7 +69,7 @@ class Gait(Value):
         return Gait({foot: offsets[foot] for foot in _names(robot)}, 4.0 * step, swing, start)
 
     @staticmethod
-    def walk(robot: Robot, swing: float = 0.6, pause: float = 0.1, start: float = 0.0) -> Gait:
+    def walk(robot: Robot, swing: float = 0.6, pause: float = 0.1, start: float = 1.0) -> Gait:
         """The two feet of a biped in turns, with a pause on both after each swing; times in s."""
         names = _names(robot)
         if len(names) != 2:

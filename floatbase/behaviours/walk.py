@@ -11,7 +11,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, function, number, of_kind, positive, read_only
+from floatbase._arrays import Array, Value, checked, function, number, of_kind, positive
+from floatbase.affine import Affine
 from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
 from floatbase.behaviours.gait import SAME_TIME, Gait
 from floatbase.behaviours.lipm import LIPM, Piece
@@ -87,6 +88,7 @@ class _Memory:
     footholds: dict[str, Array] = field(default_factory=dict)
     stance: tuple[str, ...] = ()
     phase: tuple[float, float] = (0.0, 0.0)  # begin and end of the present stance
+    ground: Affine = field(default_factory=lambda: Affine.linear(np.zeros((1, 2))))  # see `Walk._plane`
     plan: LIPM | None = None
 
 
@@ -282,8 +284,8 @@ class Walk:
         if np.linalg.norm(aside) > _GIVES_WAY:  # or the robot runs back to its path, and falls
             m.place = m.place + aside
         phases = self.gait.phases(t, _PHASES)
-        m.stance, m.phase = stance, (phases[0][0], phases[0][1])
-        m.footholds = {}
+        m.stance, m.phase, m.footholds = stance, (phases[0][0], phases[0][1]), {}
+        m.ground = self._plane()
         m.plan = LIPM(self._pieces(state, t, phases), state.com[:2], self.omega)
         for foot in set(self._all.names) - set(stance) - set(m.swinging):
             lift, land = self.gait.swing_of(foot, t) or (t, t + self.gait.swing)
@@ -324,16 +326,23 @@ class Walk:
     def _foothold(self, foot: str, land: float) -> Array:
         """Where a foot is to land, (3,) m, world: on the plane through the feet as they stand or stood."""
         xy = checked(f"the foothold of {foot}", self.foothold(foot, land, self), (2,), "m")
-        return read_only([*xy, self._nominal[foot][2] + self._ground(xy)])
+        return self._on_ground(foot, xy)
 
-    def _ground(self, xy: Array) -> float:
-        """Height of the plane through the feet at (2,) m, above where they stand in the robot's posture."""
+    def _on_ground(self, foot: str, xy: Array) -> Array:
+        """Where a foot's frame is when it stands at (2,) m, (3,) m, world."""
+        return np.array([*xy, self._nominal[foot][2] + self._began.ground(xy)[0]])
+
+    def _plane(self) -> Affine:
+        """The ground as a plane through the feet as they stand or stood: (2,) m, world, to its height, (1,) m.
+
+        0 is where they stand in the robot's posture. A slope that the feet do not show, as across a line, counts as none.
+        """
         m = self._began
         heights = np.array([m.feet[foot][2] - nominal[2] for foot, nominal in self._nominal.items()])
         places = np.array([m.feet[foot][:2] for foot in self._nominal])
         middle = places.mean(axis=0)
-        slope = np.linalg.lstsq(places - middle, heights - heights.mean(), rcond=1e-3)[0]
-        return float(heights.mean() + slope @ (xy - middle))
+        slope = np.linalg.lstsq(places - middle, heights - heights.mean(), rcond=_THIN)[0]
+        return Affine(slope[None], [heights.mean() - slope @ middle])
 
     def _centre(self, foot: str, at: Array, yaw: float) -> Array:
         """Where a foot carries best, (2,) m: the middle of a sole, below the centre of a ball. at: (3,) m, of its frame."""
@@ -357,7 +366,7 @@ class Walk:
             left = each.path.land - t
             shift = step_adjustment(error, left, self.omega, _DEAD_ZONE if area else 0.0)
             end = self._within_reach(foot, each.planned[:2] + shift, state.com[:2] + state.com_velocity[:2] * left)
-            each.path = replace(each.path, end=np.array([*end, each.planned[2] if not shift.any() else self._nominal[foot][2] + self._ground(end)]))
+            each.path = replace(each.path, end=self._on_ground(foot, end))
 
     def _within_reach(self, foot: str, end: Array, body: Array) -> Array:
         """The foothold nearest to `end`, (2,) m, that the leg reaches from the body, (2,) m, and that is on the foot's side."""
@@ -395,9 +404,10 @@ class Walk:
     def _com_at(self, t: float) -> tuple[Array, Array, Array]:
         m = self._began
         assert m.plan is not None
-        height = self._standing.com[2] + float(np.mean([m.feet[foot][2] - n[2] for foot, n in self._nominal.items()]))
         x, v, a = m.plan(t)
-        return np.array([*x, height]), np.array([*v, 0.0]), np.array([*a, 0.0])
+        slope = m.ground.A[0]
+        height, rise, bend = self._standing.com[2] + m.ground(x)[0], slope @ v, slope @ a
+        return np.array([*x, height]), np.array([*v, rise]), np.array([*a, bend])
 
     def _base_at(self, t: float) -> tuple[Array, Array, Array]:
         yaw = self.path(t)[1]
@@ -455,6 +465,7 @@ def below_the_body(foot: str, land: float, walk: Walk) -> Array:
     return neutral_point(walk.below(foot, land), velocity, gait.period - gait.swing)
 
 
+_THIN = 1e-3  # part of the feet's extent: what is thinner shows no slope
 _FREE = 1e6  # N: a bound that no robot of the catalogue reaches
 
 
