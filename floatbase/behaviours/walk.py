@@ -275,11 +275,15 @@ class Walk:
         """Another stance begins: take the feet where they are, and plan anew."""
         m = self._began
         moved = []
-        for foot in stance:
+        for foot in m.stance or stance:
             m.feet[foot] = state.point(foot)
-            if foot in m.swinging:
-                moved.append((m.feet[foot] - m.swinging.pop(foot).planned)[:2])
-                m.landed[foot] = t
+        for foot in set(stance) & set(m.swinging):
+            path, planned = m.swinging[foot].path, m.swinging[foot].planned
+            # how high it stands shows when it has stood for a while: feet that aim where others just touched climb
+            m.feet[foot] = np.array([*state.point(foot)[:2], path.end[2]])
+            moved.append((m.feet[foot] - planned)[:2])
+            m.landed[foot] = t
+            del m.swinging[foot]
         aside = np.mean(moved, axis=0) if moved else np.zeros(2)
         if np.linalg.norm(aside) > _GIVES_WAY:  # or the robot runs back to its path, and falls
             m.place = m.place + aside
