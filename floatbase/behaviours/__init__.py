@@ -1,9 +1,13 @@
 """Behaviours: controllers that step. Gaits, swings, plans of the centre of mass, footholds, `Walk` and `Stand`."""
 
-from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
+from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment, support_margin
 from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
+from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing
 from floatbase.behaviours.walk import Gains, Step, Walk
 
-__all__ = ["LIPM", "Gains", "Gait", "Step", "Swing", "Walk", "capture_point", "neutral_point", "step_adjustment"]
+__all__ = [
+    "LIPM", "Gains", "Gait", "Stand", "Step", "Swing", "Walk", "capture_point", "neutral_point", "step_adjustment",
+    "support_margin",
+]  # fmt: skip

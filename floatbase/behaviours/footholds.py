@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._arrays import Array, checked, number, positive, read_only
+from floatbase.errors import InputError
 
 
 def neutral_point(place: npt.ArrayLike, velocity: npt.ArrayLike, stance_time: float) -> Array:
@@ -32,6 +33,41 @@ def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> 
     """
     c, v = (np.asarray(checked(name, x, (None,)))[:2] for name, x in (("com", com), ("velocity", velocity)))
     return read_only(c + v / positive("omega", omega, "1/s"))
+
+
+def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
+    """How far a point is inside the convex hull of the feet, m; negative: how far outside. Level ground, seen from above.
+
+    point: (2,), m, world, such as the capture point or the ZMP. feet: (n, 2), m, world, of all points that touch.
+    On other ground the support region is another: `floatbase.friction.WrenchSet.support_region`, whose corners fit, too.
+    """
+    point, feet = checked("point", point, (2,), "m"), checked("feet", feet, (None, 2), "m")
+    if not len(feet):
+        raise InputError("a robot in the air has no support region: feet must hold one point at least.")
+    corners = _hull(feet)
+    ends = np.roll(corners, -1, axis=0)
+    edges = ends - corners
+    lengths = np.linalg.norm(edges, axis=1)
+    apart = point - corners
+    inside = (edges[:, 0] * apart[:, 1] - edges[:, 1] * apart[:, 0]) / np.where(lengths > 0.0, lengths, 1.0)
+    if len(corners) > 2 and inside.min() >= 0.0:
+        return float(inside.min())
+    along = np.clip(np.sum(apart * edges, axis=1) / np.where(lengths > 0.0, lengths, 1.0) ** 2, 0.0, 1.0)
+    return -float(np.linalg.norm(apart - along[:, None] * edges, axis=1).min())
+
+
+def _hull(points: Array) -> Array:
+    """Corners of the convex hull of points, (n, 2), counter-clockwise. Source: Andrew, Another efficient algorithm, 1979."""
+    ordered = sorted(set(map(tuple, points.tolist())))
+    halves: list[list[tuple[float, ...]]] = []
+    for line in (ordered, ordered[::-1]):
+        half: list[tuple[float, ...]] = []
+        for x, y in line:
+            while len(half) > 1 and (half[-1][0] - half[-2][0]) * (y - half[-2][1]) <= (half[-1][1] - half[-2][1]) * (x - half[-2][0]):
+                half.pop()
+            half.append((x, y))
+        halves.append(half[:-1])
+    return np.array(halves[0] + halves[1] or ordered)
 
 
 def step_adjustment(dcm_error: npt.ArrayLike, time_left: float, omega: float, dead_zone: float = 0.0) -> Array:

@@ -25,7 +25,7 @@ class Gait(Value):
     period: s, from one lift-off of a foot to its next.
     swing: s, for which a foot is in the air, less than the period.
     start: s, before which no foot lifts.
-    stop: s, from which on no foot lifts any more; one that is in the air then still comes down.
+    stop: s, from which on no foot lifts any more; one that is in the air then still comes down. -inf: none lifts ever.
 
     `trot`, `crawl` and `walk` make the usual ones. Raises `InputError` for numbers that do not fit.
     """
@@ -47,7 +47,7 @@ class Gait(Value):
         for name in ("period", "swing"):
             object.__setattr__(self, name, positive(name, getattr(self, name), "s"))
         object.__setattr__(self, "start", number("start", self.start, "s"))
-        if self.stop != inf:
+        if abs(self.stop) != inf:
             object.__setattr__(self, "stop", number("stop", self.stop, "s"))
         if self.swing > self.period - SAME_TIME:
             raise InputError(f"swing is {self.swing:g} s of a period of {self.period:g} s; each foot must stand for a while.")

@@ -19,7 +19,7 @@ from floatbase.behaviours.lipm import LIPM, Piece
 from floatbase.behaviours.swing import Swing
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
-from floatbase.errors import InputError
+from floatbase.errors import InfeasibleError
 from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
 from floatbase.robots import Robot, State
 
@@ -106,7 +106,7 @@ class Walk:
     velocity: (2,) m/s, forwards and to the left, of the body; may be set while it walks, and is approached by 1 m/s².
     yaw_rate: rad/s, to the left; as velocity.
     clearance: m, how high feet are lifted.
-    reach: m, how far a foot may land from where it would stand below the body.
+    reach: m, how far a foot may land from where it would stand below the body; 0.2 by default, 0.3 for flat feet.
     ramp: s, in which a foot is unloaded before it lifts, and loaded after it landed, as far as all feet stand then.
     foothold: (foot, land in s, walk) -> (2,) m, world: where a foot should land, before adjustments; `neutral_point` below the
         body by default.
@@ -125,7 +125,7 @@ class Walk:
         yaw_rate: float = 0.0,
         *,
         clearance: float = 0.05,
-        reach: float = 0.2,
+        reach: float | None = None,
         ramp: float = 0.1,
         foothold: Foothold | None = None,
         gains: Gains | None = None,
@@ -134,18 +134,19 @@ class Walk:
         self.robot, self._all = of_kind("robot", robot, Robot), of_kind("contacts", contacts, Contacts)
         self.velocity, self.yaw_rate = velocity, yaw_rate
         self.clearance = positive("clearance", clearance, "m", allow_zero=True)
-        self.reach, self.ramp = positive("reach", reach, "m"), positive("ramp", ramp, "s", allow_zero=True)
+        self._flat = {contact.name for contact in contacts if isinstance(contact, FlatFootContact)}
+        self.reach = positive("reach", (0.3 if self._flat else 0.2) if reach is None else reach, "m")
+        self.ramp = positive("ramp", ramp, "s", allow_zero=True)
         self.foothold = below_the_body if foothold is None else function("foothold", foothold, "foothold(foot, land, walk)")
         self.gains = Gains.of(contacts) if gains is None else of_kind("gains", gains, Gains)
         self._options = options
         self.gait = gait
         self._standing = standing = robot.standing()
-        self._flat = {c.name for c in contacts if isinstance(c, FlatFootContact)}
         origins = {contact.name: standing.point(contact.name) for contact in contacts}
         middle = np.mean([self._centre(name, origin, 0.0) for name, origin in origins.items()], axis=0)
         self._nominal = {name: origin - [*middle, 0.0] for name, origin in origins.items()}
         self.omega = sqrt(robot.gravity / (standing.com[2] - float(contacts.positions(standing)[:, 2].mean())))
-        self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
+        self._controllers: dict[tuple[tuple[str, ...], bool], WholeBodyController] = {}
         self._memory: _Memory | None = None
         self.history: deque[Step] = deque(maxlen=_HISTORY)
 
@@ -187,7 +188,8 @@ class Walk:
     @property
     def contacts(self) -> Contacts:
         """The contacts of the present stance."""
-        return self._controllers[self.stance].contacts if self.stance in self._controllers else self._all
+        key = (self.stance, False)
+        return self._controllers[key].contacts if key in self._controllers else self._all
 
     @property
     def footholds(self) -> dict[str, Array]:
@@ -229,7 +231,10 @@ class Walk:
         if stance != self._began.stance:
             self._change(state, t, stance)
         self._aim(state, t)
-        return self._controller()(q, v, t)
+        try:
+            return self._controller()(q, v, t)
+        except InfeasibleError:  # torques and friction do not hold the feet
+            return self._controller(contact_weight=_GIVES)(q, v, t)
 
     @property
     def _began(self) -> _Memory:
@@ -382,14 +387,20 @@ class Walk:
         place[1] = side * max(side * place[1], _OWN_SIDE * abs(nominal[1]))
         return body + _turned(place, yaw)
 
-    def _controller(self) -> WholeBodyController:
-        """The controller of the present stance, made when it is first needed."""
+    def _controller(self, **options: Any) -> WholeBodyController:
+        """The controller of the present stance, made when it is first needed. options: more of them."""
         stance = self._began.stance
-        if stance not in self._controllers:
-            self._controllers[stance] = WholeBodyController(
-                self.robot, self._all.only(*stance), self._tasks(stance), max_normal_force=self._loads(stance), **self._options
+        key = (stance, bool(options))
+        if key not in self._controllers:
+            self._controllers[key] = WholeBodyController(
+                self.robot,
+                self._all.only(*stance),
+                self._tasks(stance),
+                max_normal_force=self._loads(stance),
+                **self._options,
+                **options,
             )
-        return self._controllers[stance]
+        return self._controllers[key]
 
     def _tasks(self, stance: Sequence[str]) -> list[Task]:
         """The tasks of a stance; their targets follow the plan."""
@@ -470,6 +481,7 @@ def below_the_body(foot: str, land: float, walk: Walk) -> Array:
 
 
 _THIN = 1e-3  # part of the feet's extent: what is thinner shows no slope
+_GIVES = 1e4  # weight of contacts that must give way, beside 10 of the tasks
 _FREE = 1e6  # N: a bound that no robot of the catalogue reaches
 
 

@@ -13,6 +13,7 @@ from floatbase._arrays import LARGEST, Array, Fixed, checked, number, of_kind, p
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, NormalForces, Rows
 from floatbase.control.problem import Problem, rehearsal
+from floatbase.control.soft import contact_weight_of, softened
 from floatbase.control.tick import Compiled, Given, cache_warning, obstacle
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, unknown_name
@@ -23,7 +24,7 @@ from floatbase.robots import Robot, State, torque_limits_of
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
 _ANOTHER = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
-_OPTIONS = ("facets", "inside", "turn", "min_normal_force", "max_normal_force", "torque_limits", "rows", "solver", "path")
+_OPTIONS = ("facets", "inside", "turn", "min_normal_force", "max_normal_force", "torque_limits", "rows", "contact_weight", "solver", "path")
 
 
 class WholeBodyController(Fixed):
@@ -40,6 +41,9 @@ class WholeBodyController(Fixed):
         errors.
     torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.
     rows: inequality rows of one's own on q̈, τ or λ, see `floatbase.control.Rows`.
+    contact_weight: None holds the contacts by rows, (5). A number, such as 1e4, puts ½ contact_weight ‖A q̈ - b‖² into the
+        objective instead: contacts give way where torques and friction do not suffice to hold them, and only rows of one's own
+        and bounds of normal forces can make a tick infeasible.
     solver: one of `floatbase.qp.solvers()`.
     path: "readable" assembles and solves the QP as it is written. "compiled" solves the same problem many times faster
         (`floatbase.control.tick`), with tasks, constraints and rows of one's own too. "auto" takes compiled where it can.
@@ -76,6 +80,7 @@ class WholeBodyController(Fixed):
         max_normal_force: NormalForces | None = None,
         torque_limits: npt.ArrayLike | None = None,
         rows: Sequence[Rows] = (),
+        contact_weight: float | None = None,
         solver: str = "daqp",
         path: Path = "auto",
     ):
@@ -83,6 +88,8 @@ class WholeBodyController(Fixed):
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
         bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows, turn)
         problem = Problem(robot, contacts, tasks, bounds)
+        if contact_weight is not None:
+            problem = Problem(robot, *softened(contacts, problem.tasks, contact_weight), bounds)
         bounds.check_names(contacts.names, _feet(robot))
         with rehearsal():
             problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
@@ -176,6 +183,9 @@ class WholeBodyController(Fixed):
 
         Other limits: `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
         """
+        weight = contact_weight_of(self.tasks)
+        if weight is not None:
+            contacts, tasks = softened(self.contacts if contacts is None else contacts, self.tasks if tasks is None else tasks, weight)
         new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
         problem = replace(self.problem, **{name: value for name, value in new.items() if value is not None})
         if limits is not None:

@@ -1,0 +1,63 @@
+"""`Stand`: stands, and steps when it must."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._arrays import number, of_kind, positive
+from floatbase.behaviours.footholds import capture_point, support_margin
+from floatbase.behaviours.gait import SAME_TIME, Gait
+from floatbase.behaviours.walk import Walk
+from floatbase.control import Command
+from floatbase.dynamics import Contacts
+from floatbase.robots import Robot, State
+
+_SLOW = 0.1  # m/s of the centre of mass, below which it stops stepping
+
+
+class Stand(Walk):
+    """Stands where it is; with `steps` it walks in place once the capture point comes near the edge of the feet, until slow.
+
+    robot, contacts, options: as for `Walk`.
+    steps: the gait to step by, such as `Gait.trot(robot)`, whose start and stop do not count; None to stand only.
+    margin: m, from the capture point to the edge of the support region, below which it steps.
+    """
+
+    def __init__(self, robot: Robot, contacts: Contacts, steps: Gait | None = None, *, margin: float = 0.03, **options: Any):
+        never = Gait(dict.fromkeys(of_kind("contacts", contacts, Contacts).names, 0.0), 1.0, 0.5, stop=-inf)
+        self._never = never if steps is None else replace(of_kind("steps", steps, Gait, "Gait.trot(robot)"), stop=-inf)
+        self.steps, self.margin = steps, positive("margin", margin, "m", allow_zero=True)
+        super().__init__(robot, contacts, self._never, **options)
+
+    @property
+    def stepping(self) -> bool:
+        """Whether it steps now."""
+        return self.gait is not self._never
+
+    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
+        """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
+        t = number("t", t, "s")
+        if self._memory is not None and t < self._memory.time - SAME_TIME:
+            self._memory, self.gait = None, self._never
+        if self.steps is not None and self._memory is not None:
+            self._decide(State(self.robot, q, v), t, self.steps)
+        return super().__call__(q, v, t)
+
+    def _decide(self, state: State, t: float, steps: Gait) -> None:
+        """Begin to step, or end it."""
+        m = self._began
+        if not self.stepping:
+            feet = self._all.positions(state)[:, :2]
+            if support_margin(capture_point(state.com, state.com_velocity, self.omega), feet) < self.margin:
+                self.gait = replace(steps, start=t, stop=inf)
+        elif self.gait.stop == inf:
+            slow = np.linalg.norm(state.com_velocity[:2]) < _SLOW
+            if slow and t > self.gait.start + self.gait.period:
+                self.gait = replace(self.gait, stop=t)
+        elif not m.swinging:
+            self.gait = self._never

@@ -1,0 +1,94 @@
+"""Contacts that give way: (5) as a cost instead of rows, for states in which no forces hold them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from floatbase._arrays import Array, Value, positive, read_only
+from floatbase.affine import Affine
+from floatbase.dynamics import Block, Contact, Contacts, EquationsOfMotion
+from floatbase.objectives import Task
+from floatbase.robots import State
+
+
+@dataclass(frozen=True, eq=False)
+class SoftContact(Value):
+    """A contact that holds no motion: forces act at its points, inside their cones, and `ContactTask` asks it to stand still.
+
+    held: the contact.
+    """
+
+    held: Contact
+    row_names: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def name(self) -> str:
+        """The contact's name."""
+        return self.held.name
+
+    @property
+    def mu(self) -> float:
+        """The contact's coefficient of friction."""
+        return self.held.mu
+
+    @property
+    def normal(self) -> Array:
+        """The contact's unit normal, shape (3,), world."""
+        return self.held.normal
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The contact's points."""
+        return self.held.point_names
+
+    @property
+    def k(self) -> int:
+        """The contact's number of force components."""
+        return self.held.k
+
+    def positions(self, state: State) -> Array:
+        """World positions of the points, shape (n, 3), m."""
+        return self.held.positions(state)
+
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
+        """J of (4), shape (k, nv), at time t, s."""
+        return self.held.jacobian(state, t)
+
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
+        """(5) without rows."""
+        return read_only(np.zeros((0, state.robot.nv))), read_only(np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTask(Value):
+    """The motion that contacts hold, as a wish: residual A q̈ - b of (5), m/s² and rad/s².
+
+    contacts: as they would be held. weight: of ½‖residual‖² in the objective.
+    """
+
+    contacts: Contacts
+    weight: float
+    name: str = "motion of the contacts"
+    block: ClassVar[Block] = "qdd"
+
+    def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
+        """A q̈ - b, shape (m,)."""
+        A, b = self.contacts.constraint(eom.state, t)
+        return Affine(A, -b)
+
+
+def softened(contacts: Contacts, tasks: Sequence[Task], weight: float) -> tuple[Contacts, tuple[Task, ...]]:
+    """Contacts and tasks, soft or not, as those of a controller whose contacts give way at this weight."""
+    held = Contacts([contact.held if isinstance(contact, SoftContact) else contact for contact in contacts])
+    kept = [task for task in tasks if not isinstance(task, ContactTask)]
+    soft = ContactTask(held, positive("contact_weight", weight))
+    return Contacts([SoftContact(contact) for contact in held]), (*kept, soft)
+
+
+def contact_weight_of(tasks: Sequence[Task]) -> float | None:
+    """The weight of soft contacts among the tasks, None where there is none."""
+    return next((task.weight for task in tasks if isinstance(task, ContactTask)), None)
