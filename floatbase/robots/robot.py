@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from floatbase.robots.state import State
 
 UNIT_LENGTH_TOLERANCE = 1e-6  # quaternions printed with seven digits pass; normalising what is further off could hide a fault
+_SPARE = 4  # as many results as threads are likely to ask for at once
 _LIMIT_ERROR = 1e-6  # rad or m: angles printed with seven digits pass
 _SINGULAR = 1e-10  # least eigenvalue of M scaled to a diagonal of ones: robots have 1e-3 and more, rounding leaves 1e-15
 _SHARE = 0.05  # part in a motion without inertia from which a joint is named
@@ -189,6 +191,11 @@ class Robot(Value):
     def weight(self) -> float:
         """Total weight, N."""
         return self.mass * self.gravity
+
+    @cached_property
+    def _spare(self) -> deque[pin.Data]:
+        """Memory of states that are gone, for Pinocchio's results of the next one: making it takes longer than filling it."""
+        return deque(maxlen=_SPARE)
 
     @cached_property
     def base(self) -> str:

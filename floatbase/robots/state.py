@@ -40,8 +40,15 @@ class State(Value):
         check_unit_lengths(robot.model, "q", self.q, ", or use robot.standing()")
 
     def _memory(self) -> pin.Data:
-        """Memory for Pinocchio's results."""
-        return self.robot.model.createData()
+        """Memory for Pinocchio's results: of a state that is gone, where there is some."""
+        try:
+            return self.robot._spare.pop()
+        except IndexError:
+            return self.robot.model.createData()
+
+    def __del__(self) -> None:
+        if "_data" in self.__dict__:  # nothing refers to this state any more, and what it handed out are copies
+            self.robot._spare.append(self._data)
 
     @cached_property
     def _data(self) -> pin.Data:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
-
-import pinocchio as pin
 
 from floatbase._arrays import Array, sealed
 from floatbase.control.tick.tables import Dynamics
@@ -14,29 +11,14 @@ from floatbase.robots import State
 
 
 class TickState(State):
-    """The state of a tick, which checks nothing, since the tick does, and borrows the memory of Pinocchio's results.
-
-    It gives that memory back when nothing refers to it any more: whoever keeps a state keeps what it says.
+    """The state of a tick, which checks nothing, since the tick does.
 
     dynamics: of the robot.
     q, v: (nq,), (nv,), which nobody else may write to.
     """
 
-    _spare: deque[pin.Data]
-
     def __init__(self, dynamics: Dynamics, q: Array, v: Array):
-        self.__dict__.update(robot=dynamics.robot, q=sealed(q.view()), v=sealed(v.view()), _spare=dynamics.spare)
-
-    def _memory(self) -> pin.Data:
-        """What another state has given back, where there is some."""
-        try:
-            return self._spare.pop()
-        except IndexError:
-            return super()._memory()
-
-    def __del__(self) -> None:
-        if "_data" in self.__dict__:
-            self._spare.append(self._data)
+        self.__dict__.update(robot=dynamics.robot, q=sealed(q.view()), v=sealed(v.view()))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return State, (self.robot, self.q, self.v)

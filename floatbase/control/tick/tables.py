@@ -6,7 +6,6 @@ What belongs to one robot or one contact is made once, so that a controller with
 from __future__ import annotations
 
 import os
-from collections import deque
 from functools import lru_cache
 from threading import Lock
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
@@ -43,7 +42,6 @@ POINT, FLAT, OWN = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
 QDD, TAU, FORCES = range(3)
 BLOCKS = {"qdd": QDD, "tau": TAU, "forces": FORCES}
-_SPARE = 4  # Pinocchio's results that are kept for the next tick: as many as threads are likely to tick at once
 _POSE = 12  # numbers of a pose: rotation column by column, then position
 Indices: TypeAlias = npt.NDArray[np.int64]
 Cut: TypeAlias = tuple[int, bool, float]  # facets, inside and turn of a `FrictionPolyhedron`
@@ -55,14 +53,12 @@ class Dynamics:
     views: M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12); overwritten by every `update`.
     tree, links: as in `kinematics.Bodies`.
     lock: held from `update` until the views have been read.
-    spare: memory for the results of `moment.TickState`, for making it takes longer than a tick.
     """
 
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
 
     def __init__(self, robot: Robot):
         self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
-        self.spare: deque[pin.Data] = deque(maxlen=_SPARE)
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE), (8 * _POSE, 8))
