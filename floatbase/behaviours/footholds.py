@@ -63,7 +63,9 @@ def _hull(points: Array) -> Array:
     for line in (ordered, ordered[::-1]):
         half: list[tuple[float, ...]] = []
         for x, y in line:
-            while len(half) > 1 and (half[-1][0] - half[-2][0]) * (y - half[-2][1]) <= (half[-1][1] - half[-2][1]) * (x - half[-2][0]):
+            while len(half) > 1 and (half[-1][0] - half[-2][0]) * (y - half[-2][1]) <= (half[-1][1] - half[-2][1]) * (
+                x - half[-2][0]
+            ):
                 half.pop()
             half.append((x, y))
         halves.append(half[:-1])

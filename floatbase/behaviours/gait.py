@@ -73,7 +73,9 @@ class Gait(Value):
         """The two feet of a biped in turns, with a pause on both after each swing; times in s."""
         names = _names(robot)
         if len(names) != 2:
-            raise InputError(f"{robot.name} has {len(names)} feet; Gait.walk is for two. Gait.trot and Gait.crawl are for four.")
+            raise InputError(
+                f"{robot.name} has {len(names)} feet; Gait.walk is for two. Gait.trot and Gait.crawl are for four."
+            )
         step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
         return Gait(dict(zip(names, (0.0, 0.5), strict=True)), 2.0 * step, swing, start)
 

@@ -41,7 +41,9 @@ class LIPM(Value):
         for begin, end, p0, p1 in self.pieces:
             begin, end = number("begin of a piece", begin, "s"), number("end of a piece", end, "s")
             if not end > begin or (pieces and abs(pieces[-1][1] - begin) > _GAP):
-                raise InputError(f"a piece of the ZMP goes from {begin:g} to {end:g} s; each must end later, and the next begin there.")
+                raise InputError(
+                    f"a piece of the ZMP goes from {begin:g} to {end:g} s; each must end later, and the next begin there."
+                )
             pieces.append((begin, end, checked("ZMP", p0, (2,), "m"), checked("ZMP", p1, (2,), "m")))
         object.__setattr__(self, "pieces", tuple(pieces))
 

@@ -42,15 +42,15 @@ class Stand(Walk):
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
         t = number("t", t, "s")
-        if self._memory is not None and t < self._memory.time - SAME_TIME:
-            self._memory, self.gait = None, self._never
-        if self.steps is not None and self._memory is not None:
+        if self._reference is not None and t < self._reference.time - SAME_TIME:
+            self._reference, self.gait = None, self._never
+        if self.steps is not None and self._reference is not None:
             self._decide(State(self.robot, q, v), t, self.steps)
         return super().__call__(q, v, t)
 
     def _decide(self, state: State, t: float, steps: Gait) -> None:
         """Begin to step, or end it."""
-        m = self._began
+        now = self._now
         if not self.stepping:
             feet = self._all.positions(state)[:, :2]
             if support_margin(capture_point(state.com, state.com_velocity, self.omega), feet) < self.margin:
@@ -59,5 +59,5 @@ class Stand(Walk):
             slow = np.linalg.norm(state.com_velocity[:2]) < _SLOW
             if slow and t > self.gait.start + self.gait.period:
                 self.gait = replace(self.gait, stop=t)
-        elif not m.swinging:
+        elif not now.swinging:
             self.gait = self._never

@@ -24,7 +24,18 @@ from floatbase.robots import Robot, State, torque_limits_of
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
 _ANOTHER = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
-_OPTIONS = ("facets", "inside", "turn", "min_normal_force", "max_normal_force", "torque_limits", "rows", "contact_weight", "solver", "path")
+_OPTIONS = (
+    "facets",
+    "inside",
+    "turn",
+    "min_normal_force",
+    "max_normal_force",
+    "torque_limits",
+    "rows",
+    "contact_weight",
+    "solver",
+    "path",
+)
 
 
 class WholeBodyController(Fixed):
@@ -185,7 +196,9 @@ class WholeBodyController(Fixed):
         """
         weight = contact_weight_of(self.tasks)
         if weight is not None:
-            contacts, tasks = softened(self.contacts if contacts is None else contacts, self.tasks if tasks is None else tasks, weight)
+            contacts, tasks = softened(
+                self.contacts if contacts is None else contacts, self.tasks if tasks is None else tasks, weight
+            )
         new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
         problem = replace(self.problem, **{name: value for name, value in new.items() if value is not None})
         if limits is not None:
