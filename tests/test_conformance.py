@@ -24,13 +24,17 @@ import pytest
 from values import CONTACTS, CONTROLLER, EOM, HYDRAULIC, RECORD, ROBOT, STATE, UP, VALUES
 
 import floatbase as fb
+from floatbase.behaviours import Gains, Gait, Stand, Walk
 from floatbase.control import AnalyticController
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import ConstantTorques
 from floatbase.simulation import Live
 from floatbase.viewer import plots, recording
 
-ROOMS = ("", "actuators", "control", "dynamics", "friction", "lessons", "objectives", "qp", "robots", "simulation", "viewer")
+ROOMS = (
+    "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp", "robots", "simulation",
+    "viewer",
+)  # fmt: skip
 MODULES = (plots, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
 OTHER, TALOS = judges.load("solo12"), judges.load("talos")
 QP = CONTROLLER.qp(STATE)
@@ -41,6 +45,8 @@ COST = fb.Quadratic(np.eye(12), np.ones(12))
 NORMAL = np.array([0.1, 0.0, 1.0])
 AXES = plt.figure().gca()
 SIM = fb.Simulation(ROBOT)
+GAIT, WALKING = Gait.trot(ROBOT), Walk(ROBOT, fb.Contacts.feet(ROBOT), Gait.trot(ROBOT))
+WALKING(STATE.q, STATE.v)
 LIVE = Live(SIM, CONTROLLER, lambda record: None)
 
 FOLDER = os.environ["FLOATBASE_HOME"]  # of this run
@@ -165,6 +171,15 @@ EXAMPLES: dict[str, Any] = {
     "v_joints": ZERO,
     "Viewer.checkbox.value": True, "value": 0.5, "valve_bandwidth": 250.0, "velocity": UP, "view": "front", "weight": 1.0,
     "working": (), "wrench": np.ones(6), "x": ZERO,
+    "LIPM.pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))], "LIPM.com": np.zeros(2), "omega": 5.0, "Gait.offsets": {"a": 0.0}, "Gait.walk.robot": TALOS,
+    "period": 1.0, "swing": 0.25, "Gains.swing": (900.0, 10.0), "Gains.com": (100.0, 10.0), "Gains.base": (100.0, 10.0),
+    "Gains.posture": (100.0, 1e-2), "stop": 2.0, "pause": 0.1, "Gait.phases.n": 4, "longest": 5.0, "foot": "FL_foot",
+    "Swing.start": UP, "Swing.end": UP, "lift": 0.0, "land": 0.5, "Swing.height": 0.05, "gait": GAIT, "steps": GAIT,
+    "Walk.velocity": np.zeros(2), "Stand.velocity": np.zeros(2), "yaw_rate": 0.1, "clearance": 0.05, "reach": 0.2, "ramp": 0.1,
+    "foothold": lambda foot, land, walk: np.zeros(2), "gains": Gains(), "place": np.zeros(2),
+    "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
+    "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02, "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
+    "contact_weight": 1e4,
 }  # fmt: skip
 
 # what only the package makes, and by what
@@ -172,7 +187,7 @@ RESULTS = {
     "EquationsOfMotion": "equations_of_motion", "FeasibleSpace": "feasible_space", "Rollout": "rollout", "Solution": "solve",
     "Iteration": "active_set", "ActiveSetRun": "active_set", "Residuals": "Solution.residuals", "Decomposition": "decompose",
     "TorqueForForces": "torque_for_forces", "Pose": "Cylinders.pose", "Power": "Cylinders.power", "Robot": "load",
-    "PushRose": "push_rose", "Table": "sweep",
+    "PushRose": "push_rose", "Table": "sweep", "Step": "Walk.history",
     "AnalyticCommand": "AnalyticController", "Command": "WholeBodyController", "Verdict": "check", "Piece": "urdf_visuals",
     "Item": "shapes", "RowLabel": "QP", "recording.Animation": "animate", "OilState": "HydraulicActuators",
 }  # fmt: skip
@@ -204,7 +219,7 @@ ALONE = {name for names in LEFT_OUT.values() for name in names}
 SELVES: dict[str, Any] = {
     "Simulation": SIM, "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
     "AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "HydraulicActuators": HYDRAULIC,
-    "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
+    "Walk": WALKING, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)), "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
     "ConstantTorques": ConstantTorques(ZERO),
 }  # fmt: skip
 
@@ -262,7 +277,8 @@ def methods_of(room: str, name: str, kind: type) -> Iterator[Callee]:
 
 
 def parameters_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
-    return list(inspect.signature(function).parameters.values())
+    """But for more arguments by name, which go to another callee here."""
+    return [p for p in inspect.signature(function).parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
 
 
 def entry(table: dict[str, Any], callee: Callee, parameter: str, default: Any = None) -> Any:

@@ -21,12 +21,13 @@ from floatbase.actuators import HydraulicActuators
 from floatbase.control import AnalyticController
 from floatbase.dynamics import PointContact
 
-WITHOUT_ARRAYS = ("ActiveSetRun", "FeasibleSpace", "Problem", "Residuals", "Rows", "Table")
+WITHOUT_ARRAYS = ("ActiveSetRun", "FeasibleSpace", "Gains", "Gait", "Problem", "Residuals", "Rows", "Table")
 NO_VALUES = {
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators Simulation WholeBodyController",
     "a text": "RowLabel",
     "memory of a thread or a window": "Live SliderPanel Viewer Window",
     "an answer that rollout copies": "Torques",
+    "with a memory of what they do": "Stand Step Walk",
     "views of a MuJoCo model": "Conversion",
     "shapes of a picture": "Item Piece View",
     "made of functions of a lesson": "ConstantTorques Exercise LeastCost Numeric Shaped Verdict",
@@ -34,8 +35,8 @@ NO_VALUES = {
 
 
 def rooms() -> list[Any]:
-    names = ("actuators", "control", "dynamics", "friction", "lessons", "lessons.lesson04", "objectives", "qp", "robots")
-    return [fb, *(import_module(f"floatbase.{name}") for name in (*names, "simulation", "viewer"))]
+    names = "actuators behaviours control dynamics friction lessons lessons.lesson04 objectives qp robots simulation viewer"
+    return [fb, *(import_module(f"floatbase.{name}") for name in names.split())]
 
 
 def arrays_of(value: Any) -> dict[str, np.ndarray]:

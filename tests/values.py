@@ -7,6 +7,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
+from floatbase.behaviours import LIPM, Gains, Gait, Swing
 from floatbase.control import AnalyticController, Rows
 from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_frame, moving_frame, seen_from_turning_frame
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
@@ -25,6 +26,7 @@ RECORD = fb.rollout(fb.Simulation(ROBOT), CONTROLLER, 0.005)
 HYDRAULIC = HydraulicActuators(ROBOT)
 POSE = HYDRAULIC.cylinders.pose(STATE.q[7:])
 RUN = active_set(table_top())
+PLAN = LIPM([(0.0, 1.0, np.zeros(2), np.full(2, 0.1))], np.zeros(2), 5.0)
 VALUES = {
     "Robot": ROBOT, "Foot": judges.load("talos").feet[0], "State": STATE, "Contacts": CONTACTS,
     "PointContact": CONTACTS["FL_foot"],
@@ -45,5 +47,6 @@ VALUES = {
     "bias forces": bias_forces(STATE), "contact space": contact_space(EOM), "drive": moving_frame("base", np.zeros_like),
     "Rows": Rows("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
     "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", STATE, CONTACTS),
+    "Gait": Gait.trot(ROBOT), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": PLAN, "Gains": Gains(),
     "turning view": seen_from_turning_frame([0.0, 0.1], UP, UP),
 }  # fmt: skip

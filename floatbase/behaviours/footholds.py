@@ -9,6 +9,9 @@ from floatbase._arrays import Array, checked, number, positive, read_only
 from floatbase.errors import InputError
 
 
+_FARTHEST = 50.0  # ω times a time: what grows by e^{50} is out of reach of any robot
+
+
 def neutral_point(place: npt.ArrayLike, velocity: npt.ArrayLike, stance_time: float) -> Array:
     """Raibert's neutral point: the foothold, (2,), m, that the body passes in the middle of the coming stance.
 
@@ -31,8 +34,16 @@ def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> 
     It is the divergent component of motion, too: ξ̇ = ω (ξ - p), so it runs away from the ZMP p. Sources: Pratt et al., Capture
     point, 2006; Englsberger, Ott, Albu-Schäffer, 2015.
     """
-    c, v = (np.asarray(checked(name, x, (None,)))[:2] for name, x in (("com", com), ("velocity", velocity)))
+    c, v = _horizontal("com", com, "m"), _horizontal("velocity", velocity, "m/s")
     return read_only(c + v / positive("omega", omega, "1/s"))
+
+
+def _horizontal(name: str, vector: npt.ArrayLike, unit: str) -> Array:
+    """x and y of a vector of two or three."""
+    found = checked(name, vector, (None,), unit)
+    if len(found) not in (2, 3):
+        raise InputError(f"{name} has shape {found.shape}; it must have shape (2,) or (3,) ({unit}).")
+    return found[:2]
 
 
 def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
@@ -83,4 +94,5 @@ def step_adjustment(dcm_error: npt.ArrayLike, time_left: float, omega: float, de
     error = checked("dcm_error", dcm_error, (2,), "m")
     size = float(np.linalg.norm(error))
     beyond = max(0.0, size - positive("dead_zone", dead_zone, "m", allow_zero=True)) / (size or 1.0)
-    return read_only(beyond * np.exp(positive("omega", omega, "1/s") * max(0.0, number("time_left", time_left, "s"))) * error)
+    exponent = positive("omega", omega, "1/s") * max(0.0, number("time_left", time_left, "s"))
+    return read_only(beyond * np.exp(min(exponent, _FARTHEST)) * error)

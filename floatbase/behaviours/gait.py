@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from floatbase._arrays import Value, number, of_kind, positive, text
+from floatbase._arrays import Value, number, of_kind, positive, text, whole
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot
 
@@ -25,7 +25,7 @@ class Gait(Value):
     period: s, from one lift-off of a foot to its next.
     swing: s, for which a foot is in the air, less than the period.
     start: s, before which no foot lifts.
-    stop: s, from which on no foot lifts any more; one that is in the air then still comes down. -inf: none lifts ever.
+    stop: s, from which on no foot lifts any more; one that is in the air then still comes down. None: it goes on.
 
     `trot`, `crawl` and `walk` make the usual ones. Raises `InputError` for numbers that do not fit.
     """
@@ -34,7 +34,7 @@ class Gait(Value):
     period: float
     swing: float
     start: float = 0.0
-    stop: float = inf
+    stop: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Mapping) or not self.offsets:
@@ -47,7 +47,7 @@ class Gait(Value):
         for name in ("period", "swing"):
             object.__setattr__(self, name, positive(name, getattr(self, name), "s"))
         object.__setattr__(self, "start", number("start", self.start, "s"))
-        if abs(self.stop) != inf:
+        if self.stop is not None:
             object.__setattr__(self, "stop", number("stop", self.stop, "s"))
         if self.swing > self.period - SAME_TIME:
             raise InputError(f"swing is {self.swing:g} s of a period of {self.period:g} s; each foot must stand for a while.")
@@ -86,12 +86,10 @@ class Gait(Value):
 
     def swing_of(self, foot: str, t: float) -> tuple[float, float] | None:
         """When a foot lifted and when it lands, s, if it is in the air at time t, s; None if it stands."""
-        if foot not in self.offsets:
-            raise unknown_name("foot", foot, self.offsets)
-        first = self.start + self.offsets[foot] * self.period
+        t, first = number("t", t, "s"), self._first(foot)
         cycles = floor((t + SAME_TIME - first) / self.period)
         lift = first + cycles * self.period
-        in_the_air = cycles >= 0 and t < lift + self.swing - SAME_TIME and lift < self.stop - SAME_TIME
+        in_the_air = cycles >= 0 and t < lift + self.swing - SAME_TIME and self._lifts_at(lift)
         return (lift, lift + self.swing) if in_the_air else None
 
     def stance(self, t: float) -> tuple[str, ...]:
@@ -100,17 +98,16 @@ class Gait(Value):
 
     def next_swing(self, foot: str, t: float) -> tuple[float, float] | None:
         """The first swing of a foot that begins at time t, s, or later, as (lift, land), s; None where there is none."""
-        first = self.start + self.offsets[foot] * self.period
+        t, first = number("t", t, "s"), self._first(foot)
         lift = first + max(0, -floor((first - t + SAME_TIME) / self.period)) * self.period
-        return (lift, lift + self.swing) if lift < self.stop - SAME_TIME else None
+        return (lift, lift + self.swing) if self._lifts_at(lift) else None
 
     def phases(self, t: float, n: int, longest: float = 5.0) -> list[tuple[float, float, tuple[str, ...]]]:
         """The next n times of one stance from t on, as (begin, end, standing feet), s; one that does not end is cut.
 
         longest: s, after which a stance is cut, and the list ends.
         """
-        if not 1 <= n <= _MOST_PHASES:
-            raise InputError(f"n is {n}; a schedule has from 1 to {_MOST_PHASES} phases at once.")
+        n, t, longest = whole("n", n, 1, _MOST_PHASES), number("t", t, "s"), positive("longest", longest, "s")
         found: list[tuple[float, float, tuple[str, ...]]] = []
         while len(found) < n:
             end = self._next_change(t)
@@ -120,6 +117,15 @@ class Gait(Value):
             found.append((t, end, stance))
             t = end
         return found
+
+    def _lifts_at(self, time: float) -> bool:
+        return self.stop is None or time < self.stop - SAME_TIME
+
+    def _first(self, foot: str) -> float:
+        """When a foot lifts first, s, if the gait goes on until then."""
+        if not isinstance(foot, str) or foot not in self.offsets:
+            raise unknown_name("foot", foot, self.offsets)
+        return self.start + self.offsets[foot] * self.period
 
     def _next_change(self, t: float) -> float:
         """When a foot lifts or lands next after t, s."""

@@ -8,10 +8,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property, checked, number, positive, read_only
+from floatbase._arrays import Array, Value, cached_property, checked, number, positive, read_only, said
 from floatbase.errors import InputError
 
 Piece: TypeAlias = tuple[float, float, Array, Array]
+_FARTHEST = 300.0  # ω times the length of a plan: e^{300} is a number still, and half a minute of any robot
 _GAP = 1e-6  # s: pieces of a ZMP that are further apart are not one after the other
 
 
@@ -35,16 +36,22 @@ class LIPM(Value):
     def __post_init__(self) -> None:
         object.__setattr__(self, "com", checked("com", self.com, (2,), "m"))
         object.__setattr__(self, "omega", positive("omega", self.omega, "1/s"))
-        if not isinstance(self.pieces, Sequence) or not len(self.pieces):
-            raise InputError("a plan needs pieces of the ZMP: [(begin, end, p at begin, p at end), …].")
-        pieces = []
-        for begin, end, p0, p1 in self.pieces:
+        form = "a plan needs pieces of the ZMP: [(begin, end, p at begin, p at end), …]"
+        if not isinstance(self.pieces, list | tuple) or not self.pieces:
+            raise InputError(f"{form}, not {said(self.pieces)}.")
+        pieces: list[Piece] = []
+        for piece in self.pieces:
+            if not isinstance(piece, list | tuple) or len(piece) != 4:
+                raise InputError(f"{form}; one of them is {said(piece)}.")
+            begin, end, p0, p1 = piece
             begin, end = number("begin of a piece", begin, "s"), number("end of a piece", end, "s")
             if not end > begin or (pieces and abs(pieces[-1][1] - begin) > _GAP):
                 raise InputError(
                     f"a piece of the ZMP goes from {begin:g} to {end:g} s; each must end later, and the next begin there."
                 )
             pieces.append((begin, end, checked("ZMP", p0, (2,), "m"), checked("ZMP", p1, (2,), "m")))
+        if self.omega * (pieces[-1][1] - pieces[0][0]) > _FARTHEST:
+            raise InputError(f"a plan of {pieces[-1][1] - pieces[0][0]:g} s is too long: omega times its length must be at most {_FARTHEST:g}.")
         object.__setattr__(self, "pieces", tuple(pieces))
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
@@ -86,5 +93,5 @@ class LIPM(Value):
         """p, its slope, and the rising and the falling part of c - p at time t; before the first piece as at its begin."""
         t = max(number("t", t, "s"), self.pieces[0][0])
         begin, p0, slope, a, b = next(part for part in reversed(self._parts) if part[0] <= t)
-        growth = np.exp(self.omega * (t - begin))
+        growth = np.exp(min(self.omega * (t - begin), _FARTHEST))  # beyond the last piece a is 0
         return p0 + slope * (t - begin), slope, a * growth, b / growth

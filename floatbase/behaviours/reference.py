@@ -1,4 +1,4 @@
-"""What the tasks of a `Walk` follow: the body's path, the plan of the centre of mass, the swings, and the ramps of the loads."""
+"""What the tasks of a `Walk` follow: the body's path, the plan of the centre of mass, the swings, the ramps of the loads."""
 
 from __future__ import annotations
 
@@ -63,14 +63,14 @@ class Reference:
     ground: Affine = field(default_factory=lambda: Affine.linear(np.zeros((1, 2))))
     plan: LIPM | None = None
 
-    def moved(self, desired: Array, begin: float, t: float) -> Motion:
+    def moved(self, desired: Array, begin: float, t: float) -> tuple[Array, float, Array]:
         """Place, (2,) m, yaw and velocity, (3,), of the path at t in s, with a desired velocity (3,) from `begin` on."""
         time = max(0.0, t - max(self.time, begin))
         change = desired - self.velocity
         rising = np.minimum(time, np.abs(change) / _SPEEDING)  # s, of each part
         velocity = self.velocity + np.sign(change) * _SPEEDING * rising
         way = (self.velocity + velocity) / 2.0 * rising + velocity * (time - rising)
-        return self.place + turned(way[:2], self.yaw + way[2] / 2.0), self.yaw + way[2], velocity
+        return self.place + turned(way[:2], self.yaw + way[2] / 2.0), self.yaw + float(way[2]), velocity
 
     def find_ground(self) -> None:
         """Lay the ground as a plane through the feet; a slope that they do not show, as across a line, counts as none."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -29,8 +28,8 @@ class Stand(Walk):
     """
 
     def __init__(self, robot: Robot, contacts: Contacts, steps: Gait | None = None, *, margin: float = 0.03, **options: Any):
-        never = Gait(dict.fromkeys(of_kind("contacts", contacts, Contacts).names, 0.0), 1.0, 0.5, stop=-inf)
-        self._never = never if steps is None else replace(of_kind("steps", steps, Gait, "Gait.trot(robot)"), stop=-inf)
+        gait = Gait(dict.fromkeys(of_kind("contacts", contacts, Contacts).names, 0.0), 1.0, 0.5) if steps is None else steps
+        self._never = replace(of_kind("steps", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0)
         self.steps, self.margin = steps, positive("margin", margin, "m", allow_zero=True)
         super().__init__(robot, contacts, self._never, **options)
 
@@ -54,8 +53,8 @@ class Stand(Walk):
         if not self.stepping:
             feet = self._all.positions(state)[:, :2]
             if support_margin(capture_point(state.com, state.com_velocity, self.omega), feet) < self.margin:
-                self.gait = replace(steps, start=t, stop=inf)
-        elif self.gait.stop == inf:
+                self.gait = replace(steps, start=t, stop=None)
+        elif self.gait.stop is None:
             slow = np.linalg.norm(state.com_velocity[:2]) < _SLOW
             if slow and t > self.gait.start + self.gait.period:
                 self.gait = replace(self.gait, stop=t)

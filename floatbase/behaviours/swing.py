@@ -42,7 +42,7 @@ class Swing(Value):
         With u from 0 to 1: start + (end - start) (10 u³ - 15 u⁴ + 6 u⁵), and 64 u³ (1 - u)³ height upwards.
         """
         T = self.land - self.lift
-        u = min(max((t - self.lift) / T, 0.0), 1.0)
+        u = min(max((number("t", t, "s") - self.lift) / T, 0.0), 1.0)
         w = u * (1.0 - u)
         along = (u**3 * (10.0 - 15.0 * u + 6.0 * u * u), 30.0 * w * w / T, 60.0 * w * (1.0 - 2.0 * u) / T**2)
         bump = (64.0 * w**3, 192.0 * w * w * (1.0 - 2.0 * u) / T, 384.0 * w * (1.0 - 5.0 * w) / T**2)

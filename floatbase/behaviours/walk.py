@@ -59,8 +59,8 @@ class Gains(Value):
         return Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
 
 
-@dataclass(frozen=True, eq=False)
-class Step(Value):
+@dataclass(frozen=True)
+class Step:
     """What a `Walk` did at one change of stance.
 
     time: s.
@@ -125,6 +125,7 @@ class Walk:
         self.ramp = positive("ramp", ramp, "s", allow_zero=True)
         self.foothold = below_the_body if foothold is None else function("foothold", foothold, "foothold(foot, land, walk)")
         self.gains = Gains.of(contacts) if gains is None else of_kind("gains", gains, Gains)
+        WholeBodyController(robot, contacts, (), **options)  # what does not fit is told now, and not in the loop
         self._options, self._standing = options, robot.standing()
         origins = {contact.name: self._standing.point(contact.name) for contact in contacts}
         middle = np.mean([self._centre(name, origin, 0.0) for name, origin in origins.items()], axis=0)
@@ -190,12 +191,13 @@ class Walk:
 
     def below(self, foot: str, t: float) -> Array:
         """Where a foot would stand below the body at time t in s, (2,) m, world, if the desired velocity goes on."""
-        place, yaw, _ = self._path(t)
+        foot = self._all[foot].name  # an `UnknownNameError` tells what there is
+        place, yaw, _ = self._path(number("t", t, "s"))
         return place + turned(self._nominal[foot][:2], yaw)
 
     def velocity_at(self, t: float) -> Array:
         """The body's velocity at time t in s, (2,) m/s, world, if the desired one goes on."""
-        _, yaw, velocity = self._path(t)
+        _, yaw, velocity = self._path(number("t", t, "s"))
         return turned(velocity[:2], yaw)
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
@@ -224,7 +226,7 @@ class Walk:
         self._reference: Reference | None = None
         self.history: deque[Step] = deque(maxlen=_HISTORY)
 
-    def _path(self, t: float) -> Motion:
+    def _path(self, t: float) -> tuple[Array, float, Array]:
         """Place, yaw and velocity of the path at t; it stands before the first foot lifts, and once none does any more."""
         now, begin = self._now, max(self._now.time, self.gait.start)
         walks = now.swinging or any(self.gait.next_swing(foot, begin) for foot in self.gait.feet)
