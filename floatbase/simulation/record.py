@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, cached_property, read_only, sealed, whole
+from floatbase._arrays import Array, Value, cached_property, flag, read_only, sealed, whole
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -90,10 +90,44 @@ class Rollout(Value):
             row[:] = pin.centerOfMass(model, data, q)
         return read_only(com)
 
-    def slip(self) -> Array:
-        """How far each contact point strayed from where it was first, shape (points,), m."""
+    def slip(self, rolling: bool = True) -> Array:
+        """How far each contact point strayed, at most, from where it began to stand, shape (points,), m.
+
+        It stands while the controller's stance has it; 0 where it never did.
+
+        rolling: whether the way that a ball rolls counts, too: its lowest point moves with it, and nothing slides.
+        """
         self._check_not_empty()
-        return read_only(np.linalg.norm(self.foot_positions - self.foot_positions[0], axis=2).max(axis=0))
+        places = self.foot_positions if flag("rolling", rolling) else self.foot_positions - self._rolled()
+        farthest, first = np.zeros(places.shape[1]), 0
+        for contact in self.contacts:
+            points = slice(first, first := first + len(contact.point_names))
+            for begin, end in self._standing_times(contact.name):
+                strayed = np.linalg.norm(places[begin:end, points] - places[begin, points], axis=2).max(axis=0)
+                farthest[points] = np.maximum(farthest[points], strayed)
+        return read_only(farthest)
+
+    def _standing_times(self, contact: str) -> list[tuple[int, int]]:
+        """First row, and the row after the last, of each time that the controller's stance has a contact."""
+        if not self.stances:
+            return [(0, len(self))]
+        has = {stance: contact in stance.names for stance in dict.fromkeys(self.stances)}
+        stands = np.array([False, *(has[stance] for stance in self.stances), False])
+        edges = np.flatnonzero(stands[1:] != stands[:-1])
+        return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+    def _rolled(self) -> Array:
+        """How far each point's ball has rolled, shape (n, points, 3), m, world: the integral of ω × radius · normal."""
+        arms = [
+            (contact.name, getattr(contact, "radius", 0.0) * contact.normal) for contact in self.contacts for _ in contact.point_names
+        ]
+        rates = np.zeros((len(self), len(arms), 3))
+        if any(np.any(arm) for _, arm in arms):
+            for rate, q, v in zip(rates, self.q, self.v, strict=True):
+                state = State(self.robot, q, v)
+                rate[:] = [np.cross(state.frame_velocity(name)[3:], arm) if np.any(arm) else np.zeros(3) for name, arm in arms]
+        steps = np.diff(self.time)[:, None, None] * (rates[1:] + rates[:-1]) / 2.0
+        return np.concatenate([np.zeros((1, len(arms), 3)), np.cumsum(steps, axis=0)])
 
     def _check_not_empty(self) -> None:
         if not len(self):
