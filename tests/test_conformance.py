@@ -171,14 +171,17 @@ EXAMPLES: dict[str, Any] = {
     "v_joints": ZERO,
     "Viewer.checkbox.value": True, "value": 0.5, "valve_bandwidth": 250.0, "velocity": UP, "view": "front", "weight": 1.0,
     "working": (), "wrench": np.ones(6), "x": ZERO,
-    "LIPM.pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))], "LIPM.com": np.zeros(2), "omega": 5.0, "Gait.offsets": {"a": 0.0}, "Gait.walk.robot": TALOS,
+    "LIPM.pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))], "LIPM.com": np.zeros(2),
+    "LIPM.omega": 5.0, "capture_point.omega": 5.0, "step_adjustment.omega": 5.0, "Gait.offsets": {"a": 0.0},
+    "Gait.walk.robot": TALOS,
     "period": 1.0, "swing": 0.25, "Gains.swing": (900.0, 10.0), "Gains.com": (100.0, 10.0), "Gains.base": (100.0, 10.0),
     "Gains.posture": (100.0, 1e-2), "stop": 2.0, "pause": 0.1, "Gait.phases.n": 4, "longest": 5.0, "foot": "FL_foot",
     "Swing.start": UP, "Swing.end": UP, "lift": 0.0, "land": 0.5, "Swing.height": 0.05, "gait": GAIT, "steps": GAIT,
     "Walk.velocity": np.zeros(2), "Stand.velocity": np.zeros(2), "yaw_rate": 0.1, "clearance": 0.05, "reach": 0.2, "ramp": 0.1,
     "foothold": lambda foot, land, walk: np.zeros(2), "gains": Gains(), "place": np.zeros(2),
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
-    "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02, "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
+    "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02,
+    "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
     "contact_weight": 1e4,
 }  # fmt: skip
 
@@ -219,7 +222,8 @@ ALONE = {name for names in LEFT_OUT.values() for name in names}
 SELVES: dict[str, Any] = {
     "Simulation": SIM, "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
     "AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "HydraulicActuators": HYDRAULIC,
-    "Walk": WALKING, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)), "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
+    "Walk": WALKING, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)),
+    "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
     "ConstantTorques": ConstantTorques(ZERO),
 }  # fmt: skip
 

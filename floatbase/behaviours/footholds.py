@@ -8,7 +8,6 @@ import numpy.typing as npt
 from floatbase._arrays import Array, checked, number, positive, read_only
 from floatbase.errors import InputError
 
-
 _FARTHEST = 50.0  # ω times a time: what grows by e^{50} is out of reach of any robot
 
 

@@ -50,8 +50,9 @@ class LIPM(Value):
                     f"a piece of the ZMP goes from {begin:g} to {end:g} s; each must end later, and the next begin there."
                 )
             pieces.append((begin, end, checked("ZMP", p0, (2,), "m"), checked("ZMP", p1, (2,), "m")))
-        if self.omega * (pieces[-1][1] - pieces[0][0]) > _FARTHEST:
-            raise InputError(f"a plan of {pieces[-1][1] - pieces[0][0]:g} s is too long: omega times its length must be at most {_FARTHEST:g}.")
+        length = pieces[-1][1] - pieces[0][0]
+        if self.omega * length > _FARTHEST:
+            raise InputError(f"a plan of {length:g} s is too long: omega times its length must be at most {_FARTHEST:g}.")
         object.__setattr__(self, "pieces", tuple(pieces))
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:

@@ -44,6 +44,7 @@ class Reference:
     swinging: the feet in the air.
     footholds: (3,) m, world, where those that are in the air, or lift next, are to land.
     stance, phase: the feet that stand, and from when until when, s.
+    aside: (2,) m, by which the last step was moved.
     ground: (2,) m, world, to the height of the ground there, (1,) m; 0 is that below the posture.
     plan: of the centre of mass.
     """
@@ -60,6 +61,7 @@ class Reference:
     footholds: dict[str, Array] = field(default_factory=dict)
     stance: tuple[str, ...] = ()
     phase: tuple[float, float] = (0.0, 0.0)
+    aside: Array = field(default_factory=lambda: np.zeros(2))
     ground: Affine = field(default_factory=lambda: Affine.linear(np.zeros((1, 2))))
     plan: LIPM | None = None
 

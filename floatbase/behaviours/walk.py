@@ -29,7 +29,7 @@ Phase: TypeAlias = tuple[float, float, tuple[str, ...]]
 _PHASES = 4  # stances that a plan looks ahead: two steps; eight are no better
 _SHIFT = 0.8  # s before the first lift-off and after the last landing in which the ZMP moves
 _DEAD_ZONE = 0.02  # m of DCM error that a stance with area bears without moving a step: it would grow by up to e^{ω 1.2 s}
-_GIVES_WAY = 0.05  # m by which a step has moved, from which on the path moves along, or the robot runs back to it and falls
+_GIVES_WAY = 0.05  # m by which steps have moved, from which on the path moves along, or the robot runs back to it and falls
 _OWN_SIDE = 0.25  # part of its distance from the middle that a foot keeps to its own side: legs must not cross
 _REACH, _REACH_FLAT = 0.2, 0.3  # m
 _LOAD = 2.0  # times its even share of the weight: the normal force from which a ramp comes down
@@ -264,14 +264,17 @@ class Walk:
 
     def _land(self, state: State, feet: Sequence[str]) -> None:
         """These feet have landed; the path moves along where they were moved far."""
-        now, moved = self._now, [np.zeros(2)]
+        now, moved = self._now, []
         for foot in feet:
             each = now.swinging.pop(foot)
             # how high it stands shows when it has stood for a while: feet that aim where others just touched climb
             now.feet[foot] = np.array([*state.point(foot)[:2], each.path.end[2]])
             moved.append((now.feet[foot] - each.planned)[:2])
             now.landed[foot] = now.time
-        aside = np.sum(moved, axis=0) / max(len(feet), 1)
+        if not moved:
+            return
+        before, now.aside = now.aside, np.mean(moved, axis=0)
+        aside = (before + now.aside) / 2.0  # swinging legs sway the body to one side and to the other
         if np.linalg.norm(aside) > _GIVES_WAY:
             now.place = now.place + aside
 

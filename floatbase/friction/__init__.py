@@ -2,9 +2,10 @@
 
 from floatbase.friction.cones import Decomposition, FrictionCone, FrictionPolyhedron, Status, decompose, tangents
 from floatbase.friction.polytopes import cone_rows, vertices
+from floatbase.friction.pressure import centre_of_pressure, contact_wrench
 from floatbase.friction.wrenches import WrenchSet, wrench_set
 
 __all__ = [
-    "Decomposition", "FrictionCone", "FrictionPolyhedron", "Status", "WrenchSet", "cone_rows", "decompose", "tangents",
-    "vertices", "wrench_set",
+    "Decomposition", "FrictionCone", "FrictionPolyhedron", "Status", "WrenchSet", "centre_of_pressure", "cone_rows",
+    "contact_wrench", "decompose", "tangents", "vertices", "wrench_set",
 ]  # fmt: skip

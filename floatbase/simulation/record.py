@@ -119,7 +119,9 @@ class Rollout(Value):
     def _rolled(self) -> Array:
         """How far each point's ball has rolled, shape (n, points, 3), m, world: the integral of ω × radius · normal."""
         arms = [
-            (contact.name, getattr(contact, "radius", 0.0) * contact.normal) for contact in self.contacts for _ in contact.point_names
+            (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
+            for contact in self.contacts
+            for _ in contact.point_names
         ]
         rates = np.zeros((len(self), len(arms), 3))
         if any(np.any(arm) for _, arm in arms):

@@ -1,0 +1,171 @@
+"""Gaits, swings, the pendulum and footholds: what their definitions promise, by finite differences and closed forms."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import judges
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import floatbase as fb
+from floatbase.behaviours import LIPM, Gait, Swing, capture_point, neutral_point, step_adjustment, support_margin
+from floatbase.errors import InputError, UnknownNameError
+
+STEP = 1e-5  # s to each side of central differences
+QUADRUPED = {"go2": ("FL", "RR", "FR", "RL"), "solo12": ("FL", "HR", "FR", "HL"), "anymal_kinova": ("LF", "RH", "RF", "LH")}
+
+
+@pytest.mark.parametrize("name", QUADRUPED)
+def test_a_trot_lifts_diagonal_feet_together(name: str) -> None:
+    first, with_it, second, with_that = QUADRUPED[name]
+    gait = Gait.trot(judges.load(name), swing=0.25, start=1.0)
+    in_the_air = (
+        {foot[:2] for foot in gait.feet if gait.swing_of(foot, 1.1)},
+        {foot[:2] for foot in gait.feet if gait.swing_of(foot, 1.3)},
+    )
+    assert in_the_air == ({first, with_it}, {second, with_that})
+    assert len(gait.stance(0.99)) == 4 and gait.stance(1.0) == gait.stance(1.2)
+
+
+def test_a_crawl_lifts_one_foot_at_a_time_and_pauses() -> None:
+    gait = Gait.crawl(judges.load("go2"), swing=0.3, pause=0.2, start=0.0)
+    phases = gait.phases(0.0, 16)
+    assert [len(stance) for _, _, stance in phases] == [3, 4] * 8
+    assert np.allclose([end - begin for begin, end, _ in phases], [0.3, 0.2] * 8, atol=1e-9)
+    lifted = [next(iter(set(gait.feet) - set(stance))) for _, _, stance in phases[::2]]
+    assert len(set(lifted[:4])) == 4 and lifted[:4] == lifted[4:]
+
+
+def test_phases_follow_one_another_and_agree_with_the_stance() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        period = rng.uniform(0.2, 2.0)
+        offsets = {foot: rng.uniform(0.0, 0.99) for foot in "abcd"}
+        gait = Gait(offsets, period, rng.uniform(0.05, 0.9) * period, rng.uniform(-1.0, 1.0))
+        t = rng.uniform(-2.0, 5.0)
+        phases = gait.phases(t, 12)
+        assert phases[0][0] == t and all(a[1] == b[0] for a, b in itertools.pairwise(phases))
+        for begin, end, stance in phases:
+            assert end > begin and all(gait.stance(begin + part * (end - begin)) == stance for part in (0.01, 0.5, 0.99))
+
+
+def test_no_foot_lifts_from_the_stop_on_and_endless_standing_is_cut() -> None:
+    gait = Gait({"a": 0.0, "b": 0.5}, 1.0, 0.4, stop=1.2)
+    assert gait.swing_of("a", 1.3) == (1.0, 1.4)  # it was in the air and comes down
+    assert gait.swing_of("b", 1.6) is None and gait.next_swing("a", 1.2) is None
+    assert gait.phases(3.0, 4) == [(3.0, 8.0, ("a", "b"))]
+    assert gait.phases(3.0, 4, longest=1.0) == [(3.0, 4.0, ("a", "b"))]
+
+
+def test_stance_times_bear_the_rounding_of_the_clock() -> None:
+    gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
+    timestep, stances = 1e-3, []
+    t = 0.0
+    for _ in range(20_000):  # as a simulation adds up its steps: 20 s
+        stances.append(gait.stance(t))
+        t += timestep
+    changes = [i for i, (before, after) in enumerate(itertools.pairwise(stances), 1) if before != after]
+    assert changes == list(range(250, 20_000, 250))
+
+
+def test_gaits_refuse_what_does_not_fit() -> None:
+    with pytest.raises(InputError, match="must stand for a while"):
+        Gait({"a": 0.0}, 0.5, 0.5)
+    with pytest.raises(InputError, match="from 0 to less than 1"):
+        Gait({"a": 1.0}, 0.5, 0.2)
+    with pytest.raises(InputError, match=r"Gait\.walk is for two"):
+        Gait.trot(judges.load("talos"))
+    with pytest.raises(InputError, match=r"Gait\.trot and Gait\.crawl are for four"):
+        Gait.walk(judges.load("go2"))
+    with pytest.raises(UnknownNameError, match="FL_foot"):
+        Gait.trot(judges.load("go2")).swing_of("FL", 0.0)
+
+
+def test_a_swing_leads_from_rest_to_rest_over_its_height() -> None:
+    rng = np.random.default_rng(1)
+    swing = Swing(rng.normal(size=3), rng.normal(size=3), 0.3, 0.8, height=0.05)
+    for t, place in ((0.3, swing.start), (0.8, swing.end), (0.0, swing.start), (2.0, swing.end)):
+        x, v, a = swing(t)
+        assert np.allclose(x, place) and np.allclose(v, 0.0) and np.allclose(a, 0.0)
+    middle = swing(0.55)[0]
+    assert np.allclose(middle, (swing.start + swing.end) / 2.0 + [0.0, 0.0, 0.05])
+    for t in np.linspace(0.31, 0.79, 25):
+        (x0, v0, _), (x1, v1, _), (_, v, a) = swing(t - STEP), swing(t + STEP), swing(t)
+        assert np.allclose((x1 - x0) / (2 * STEP), v, atol=1e-6) and np.allclose((v1 - v0) / (2 * STEP), a, atol=1e-4)
+    with pytest.raises(InputError, match="must land later"):
+        replace(swing, land=0.3)
+
+
+def test_the_pendulum_keeps_its_equation_and_ends_on_the_last_zmp() -> None:
+    rng, omega = np.random.default_rng(2), 3.4
+    times = np.cumsum(rng.uniform(0.2, 0.8, 6))
+    places = rng.normal(0.0, 0.1, (6, 2))
+    pieces = [(a, b, p0, p1) for a, b, p0, p1 in zip(times, times[1:], places, places[1:], strict=False)]
+    plan = LIPM(pieces, rng.normal(0.0, 0.1, 2), omega)
+    assert np.allclose(plan(times[0])[0], plan.com)
+    assert np.allclose(plan.dcm(times[-1]), places[-1], atol=1e-12)
+    for t in rng.uniform(times[0] + STEP, times[-1] + 1.0, 50):
+        c, v, a = plan(t)
+        scale = 1.0 + np.abs(a).max()
+        assert np.allclose(a, omega**2 * (c - plan.zmp(t)), atol=1e-12 * scale)
+        assert np.allclose(plan.dcm(t), c + v / omega, atol=1e-12)
+        if all(abs(t - edge) > 2 * STEP for edge in times):
+            before, after = plan(t - STEP), plan(t + STEP)
+            assert np.allclose((after[0] - before[0]) / (2 * STEP), v, atol=1e-6)
+            assert np.allclose((after[1] - before[1]) / (2 * STEP), a, atol=1e-4)
+    for edge in times[1:]:  # position and velocity do not jump where the ZMP turns
+        before, after = plan(edge - 1e-9), plan(edge + 1e-9)
+        assert np.allclose(before[0], after[0], atol=1e-7) and np.allclose(before[1], after[1], atol=1e-7)
+    assert np.allclose(plan(times[-1] + 20.0)[0], places[-1], atol=1e-9)  # at rest on the last ZMP
+
+
+def test_a_pendulum_refuses_gaps_and_what_is_no_plan() -> None:
+    zero = np.zeros(2)
+    with pytest.raises(InputError, match="the next begin there"):
+        LIPM([(0.0, 1.0, zero, zero), (1.5, 2.0, zero, zero)], zero, 3.0)
+    with pytest.raises(InputError, match="pieces of the ZMP"):
+        LIPM([], zero, 3.0)
+    with pytest.raises(InputError, match="too long"):
+        LIPM([(0.0, 1e3, zero, zero)], zero, 3.0)
+
+
+def test_footholds_by_their_closed_forms() -> None:
+    assert np.allclose(neutral_point([0.2, 0.1], [0.4, 0.0], 0.5), [0.3, 0.1])
+    assert np.allclose(capture_point([0.1, 0.0, 0.3], [0.5, 0.2, 9.0], 5.0), [0.2, 0.04])
+    # an error of the DCM grows as ξ̇ = ω (ξ - p), and a step there brings it to rest
+    error, omega, left = np.array([0.01, -0.02]), 5.0, 0.2
+    grown = error.copy()
+    for _ in range(10_000):
+        grown += left / 10_000 * omega * grown
+    assert np.allclose(step_adjustment(error, left, omega), grown, rtol=1e-3)
+    assert not step_adjustment(error, left, omega, dead_zone=0.03).any()
+    beyond = step_adjustment(error, left, omega, dead_zone=0.01)
+    assert np.isclose(np.linalg.norm(beyond), np.exp(omega * left) * (np.linalg.norm(error) - 0.01))
+
+
+def test_the_support_margin_is_the_distance_to_the_hull() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        feet, point = rng.normal(size=(rng.integers(3, 9), 2)), rng.normal(0.0, 1.5, 2)
+        hull = ConvexHull(feet)
+        outside = float((hull.equations[:, :2] @ point + hull.equations[:, 2]).max())
+        margin = support_margin(point, feet)
+        if outside <= 0.0:
+            assert np.isclose(margin, -outside)
+        else:  # the nearest point of an edge, sampled
+            corners = feet[hull.vertices]
+            share = np.linspace(0.0, 1.0, 2001)[:, None]
+            edges = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+            nearest = min(np.linalg.norm(point - edge, axis=1).min() for edge in edges)
+            assert margin < 0.0 and np.isclose(-margin, nearest, atol=2e-3)
+    assert np.isclose(support_margin([0.0, 1.0], [[-1.0, 0.0], [1.0, 0.0]]), -1.0)  # two feet: a line
+    assert np.isclose(support_margin([0.0, 1.0], [[0.0, 0.0]]), -1.0)
+    with pytest.raises(InputError, match="in the air"):
+        support_margin([0.0, 0.0], np.zeros((0, 2)))
+
+
+def test_names_of_the_front_door_are_untouched() -> None:
+    assert not {"Gait", "Walk"} & set(fb.__all__)  # they live in their room

@@ -1,0 +1,310 @@
+"""`Walk` and `Stand` on MuJoCo: the figures that were reached, and the falls on the way there, each with its name.
+
+All run with a control period of 2 ms; `benchmarks/walking.py` has the long runs, 1 ms, and thirty pushes each.
+"""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.behaviours import Gains, Gait, Stand, Walk, below_the_body
+from floatbase.errors import InputError, UnknownNameError
+from floatbase.simulation import Rollout
+
+PERIOD = 2e-3  # s
+
+
+def walk_of(name: str, gait: Callable[[Any], Gait], velocity: tuple[float, float] = (0.0, 0.0), **options: Any) -> Walk:
+    robot = judges.load(name)
+    return Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait(robot), velocity, **options)
+
+
+def run(walk: Walk, duration: float, *pushes: fb.Push, **options: Any) -> Rollout:
+    return fb.rollout(fb.Simulation(walk.robot, **options), walk, duration, pushes, PERIOD)
+
+
+@cache
+def trot(push: float = 0.0) -> tuple[Rollout, Walk]:
+    """go2 trots forwards at 0.3 m/s from 1 s on, and is pushed to the left for 0.1 s at 2.5 s."""
+    walk = walk_of("go2", Gait.trot, (0.3, 0.0))
+    return run(walk, 5.0, *([fb.Push([0.0, push, 0.0], start=2.5)] if push else [])), walk
+
+
+def tilt(record: Rollout) -> float:
+    """The largest angle between the base's and the world's vertical, degrees."""
+    x, y = record.q[:, 3], record.q[:, 4]
+    return float(np.rad2deg(np.arccos(1.0 - 2.0 * (x**2 + y**2)).max()))
+
+
+def speed(record: Rollout, begin: float, end: float) -> np.ndarray:
+    first, last = np.searchsorted(record.time, [begin, end])
+    return (record.com[last, :2] - record.com[first, :2]) / (record.time[last] - record.time[first])
+
+
+def test_a_trot_goes_at_the_desired_speed_straight_and_upright() -> None:
+    record, _ = trot()
+    assert record.outcome == "completed"
+    assert np.allclose(speed(record, 2.5, 4.5), [0.3, 0.0], atol=0.01)  # two whole periods
+    assert abs(record.com[-1, 1]) < 0.03 and tilt(record) < 0.5
+    assert record.measured[:, 2::3].max() < 1.2 * judges.load("go2").weight
+    assert record.slip(rolling=False).max() < 3e-3
+
+
+def test_the_momentum_of_a_walk_changes_by_what_the_ground_does() -> None:
+    record, walk = trot()
+    rows = (record.time > 2.0) & (record.time < 4.0)
+    time, forces = record.time[rows], record.measured[rows].reshape(rows.sum(), -1, 3).sum(axis=1)
+    gravity = np.array([0.0, 0.0, -walk.robot.weight])
+    ends = [record.state(int(np.searchsorted(record.time, t))).com_velocity for t in (time[0], time[-1])]
+    impulse = (forces[:-1] + gravity).sum(axis=0) * PERIOD
+    assert np.allclose(
+        impulse, walk.robot.mass * (ends[1] - ends[0]), atol=0.02 * walk.robot.weight * PERIOD * len(time) ** 0.5
+    )
+
+
+def test_every_tick_of_a_walk_is_compiled() -> None:
+    walk, paths = walk_of("go2", Gait.trot, (0.3, 0.0)), []
+
+    class Told:
+        robot = walk.robot
+        contacts = property(lambda self: walk.contacts)
+
+        def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> fb.control.Command:
+            command = walk(q, v, t)
+            paths.append(command.path)
+            return command
+
+    assert fb.rollout(fb.Simulation(walk.robot), Told(), 2.0, control_period=PERIOD).outcome == "completed"
+    assert set(paths) == {"compiled"}
+
+
+def test_a_trot_bears_pushes_from_the_side() -> None:
+    record, _ = trot(60.0)
+    assert record.outcome == "completed" and abs(record.com[-1, 1]) < 0.15 and tilt(record) < 2.0
+    assert trot(200.0)[0].outcome == "completed"
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12"])
+def test_each_foot_is_lifted_in_turn_while_the_robot_stands(name: str) -> None:
+    walk = walk_of(name, lambda robot: Gait.crawl(robot, swing=0.5, pause=0.5))
+    record = run(walk, 5.5)
+    radius = walk.robot.feet[0].radius
+    height = record.foot_positions[:, :, 2].max(axis=0)
+    assert record.outcome == "completed" and tilt(record) < 0.3
+    assert np.all(height > 0.045) and np.all(height < 0.055 + radius)
+    assert np.linalg.norm(record.foot_positions[-1] - record.foot_positions[0], axis=1).max() < 0.01
+
+
+def test_a_ramp_takes_the_jumps_out_of_the_torques() -> None:
+    jumps = {}
+    for ramp in (0.0, 0.1):
+        walk = walk_of("go2", lambda robot: Gait.crawl(robot, swing=0.3, pause=0.3), (0.05, 0.0), ramp=ramp)
+        record = run(walk, 4.0)
+        assert record.outcome == "completed"
+        changes = [i for i, (a, b) in enumerate(zip(record.stances, record.stances[1:], strict=False), 1) if a is not b]
+        jumps[ramp] = np.median([np.abs(record.tau_desired[i] - record.tau_desired[i - 1]).max() for i in changes])
+    assert jumps[0.1] < 1.5 and jumps[0.1] < 0.5 * jumps[0.0]  # N·m
+
+
+def test_talos_walks_on_flat_feet() -> None:
+    record = run(walk_of("talos", Gait.walk, (0.2, 0.0)), 4.5)
+    assert record.outcome == "completed" and tilt(record) < 0.5
+    assert np.isclose(speed(record, 3.0, 4.4)[0], 0.2, rtol=0.06)  # one period
+    assert record.measured[:, 2::3].max() < 0.9 * judges.load("talos").weight
+
+
+def test_it_turns_on_the_spot_and_goes_sideways() -> None:
+    walk = walk_of("go2", Gait.trot, (0.0, 0.1), yaw_rate=0.5)
+    record = run(walk, 4.0)
+    assert record.outcome == "completed"
+    q = record.q[-1]
+    yaw = np.arctan2(2.0 * (q[6] * q[5] + q[3] * q[4]), 1.0 - 2.0 * (q[4] ** 2 + q[5] ** 2))
+    assert np.isclose(yaw, 0.5 * (3.0 - 0.25), atol=0.1)  # half a second of it speeds up by 1 rad/s²
+
+
+def test_velocity_and_gait_may_change_while_it_walks_and_a_reset_begins_anew() -> None:
+    walk = walk_of("go2", Gait.trot)
+    sim = fb.Simulation(walk.robot)
+    assert fb.rollout(sim, walk, 1.5, control_period=PERIOD).outcome == "completed"
+    walk.velocity = (0.3, 0.0)
+    moving = fb.rollout(sim, walk, 2.0, control_period=PERIOD)
+    assert moving.outcome == "completed" and moving.final.com_velocity[0] > 0.25
+    first = walk.history[0].time
+    sim.reset()
+    again = fb.rollout(sim, walk, 0.5, control_period=PERIOD)
+    assert again.outcome == "completed" and walk.history[0].time == 0.0 == first
+    assert len(walk.history) == 1 and len(walk.stance) == 4
+
+
+def test_steps_save_a_robot_that_would_fall() -> None:
+    robot = judges.load("go2")
+    contacts, push = fb.Contacts.feet(robot, mu=0.6), fb.Push([0.0, 250.0, 0.0], start=0.3)
+    standing, stepping = Stand(robot, contacts), Stand(robot, contacts, Gait.trot(robot, swing=0.2))
+    assert run(standing, 2.5, push).outcome != "completed"
+    record = run(stepping, 4.0, push)
+    assert record.outcome == "completed" and np.linalg.norm(record.final.com_velocity) < 0.1 and not stepping.stepping
+    assert any(len(step.stance) < 4 for step in stepping.history)
+
+
+def test_it_stands_without_a_step_as_long_as_the_capture_point_is_inside() -> None:
+    robot = judges.load("go2")
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
+    assert run(stand, 1.0, fb.Push([0.0, 40.0, 0.0], start=0.2)).outcome == "completed"
+    assert all(len(step.stance) == 4 for step in stand.history)
+
+
+def test_contacts_give_way_where_torques_do_not_hold_them() -> None:
+    robot = judges.load("talos")
+    state, contacts = robot.standing(), judges.stance(robot)
+    weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
+    hard = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), **weak)
+    moving = state.replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
+    with pytest.raises(fb.InfeasibleError):
+        hard(moving.q, moving.v)
+    soft = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), contact_weight=1e4, **weak)
+    command = soft(moving.q, moving.v)
+    assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6)
+    held = fb.equations_of_motion(moving, contacts)
+    assert np.abs(held.A @ command.qdd - held.b).max() > 0.1  # m/s² and rad/s²: they do give way
+    rest = held.M @ command.qdd + held.h - held.S @ command.tau - held.J.T @ command.forces
+    assert np.abs(rest).max() < 1e-6 * robot.weight
+
+
+def test_contacts_that_need_not_give_way_stand_as_held_ones_do() -> None:
+    robot = judges.load("go2")
+    state, contacts = robot.standing(), judges.stance(robot)
+    held, soft = (fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), contact_weight=w) for w in (None, 1e6))
+    assert np.allclose(held(state.q, state.v).tau, soft(state.q, state.v).tau, atol=1e-3)
+    other = soft.replace(contacts=contacts.without("FL_foot"))
+    assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot") and len(other.tasks) == len(soft.tasks)
+
+
+# the falls on the way, each a test ------------------------------------------------------------------------------------------
+
+
+def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
+    record, walk = trot(200.0)
+    reach = max(
+        np.linalg.norm(step.feet[foot][:2] - record.com[np.searchsorted(record.time, step.time) - 1][:2])
+        for step in walk.history for foot in step.stance if step.time > 1.5
+    )  # fmt: skip
+    leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
+    assert reach < leg + walk.reach + 0.05  # from the body; from the plan they would be where the push has led it
+
+
+def test_a_stance_with_area_does_not_throw_its_feet_away() -> None:
+    record = run(walk_of("go2", lambda robot: Gait.crawl(robot, swing=1.2, pause=0.3)), 4.2)
+    assert record.outcome == "completed"  # a millimetre grows by e^{ω 1.2 s} = 830
+    assert np.linalg.norm(record.foot_positions[-1] - record.foot_positions[0], axis=1).max() < 0.01
+
+
+def test_posture_gives_way_to_the_walk() -> None:
+    stiff = Gains(posture=(100.0, 1.0))
+    fast = speed(run(walk_of("go2", Gait.trot, (0.3, 0.0), gains=stiff), 3.6), 2.5, 3.5)[0]
+    assert abs(fast - 0.3) > 5 * abs(speed(trot()[0], 2.5, 3.5)[0] - 0.3)
+
+
+def test_feet_aim_at_the_ground_and_not_below_it() -> None:
+    record, walk = trot()
+    heights = np.array([foot[2] for step in walk.history for foot in step.footholds.values()])
+    standing = record.state(0).point("FL_foot")[2]
+    assert np.ptp(heights) < 1e-3 and np.all(np.abs(heights - standing) < 1e-3)
+
+
+def test_a_jump_of_the_velocity_is_a_ramp_for_the_robot() -> None:
+    record = run(walk_of("go2", Gait.trot, (0.9, 0.0)), 3.5)
+    assert record.outcome == "completed"
+    assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8 and np.isclose(speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1)
+
+
+def test_endless_standing_has_an_end_to_plan_for() -> None:
+    robot = judges.load("go2")
+    stand = Stand(robot, fb.Contacts.feet(robot))
+    state = robot.standing()
+    stand(state.q, state.v, 0.0)
+    assert stand.plan is not None and stand.plan.pieces[-1][1] <= 5.0 + 1e-9
+    assert np.all(np.isfinite(stand(state.q, state.v, 1e4).tau))
+
+
+def test_the_path_gives_way_after_a_long_step() -> None:
+    (calm, _), (record, _) = trot(), trot(200.0)
+    moved = record.com[-1, 1] - calm.com[-1, 1]
+    assert moved > 0.1  # it goes on where it was pushed to, and does not run back
+    assert abs(record.final.com_velocity[1]) < 0.1 and np.isclose(speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1)
+
+
+def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches() -> None:
+    record, walk = trot()
+    radius = walk.robot.foot("FL_foot").radius
+    for step in list(walk.history)[-4:]:
+        row = np.searchsorted(record.time, step.time + 0.05)
+        for foot in step.stance:
+            place = record.state(int(row)).point(foot)
+            assert np.linalg.norm(place - step.feet[foot]) < radius / 4  # a ball that rolls moves less than that in 50 ms
+            assert place[2] - radius < 2e-3
+
+
+# what it is -----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_foothold_of_ones_own_is_taken() -> None:
+    asked = []
+
+    def wider(foot: str, land: float, walk: Walk) -> np.ndarray:
+        asked.append(foot)
+        side = np.sign(walk.robot.standing().point(foot)[1])
+        return below_the_body(foot, land, walk) + [0.0, 0.03 * side]
+
+    walk = walk_of("go2", Gait.trot, foothold=wider)
+    record = run(walk, 2.5)
+    assert record.outcome == "completed" and set(asked) == set(walk.contacts.names) | set(asked)
+    width = [np.ptp(positions[:, 1]) for positions in record.foot_positions[[0, -1]]]
+    assert np.isclose(width[1] - width[0], 0.06, atol=0.02)
+
+
+def test_a_walk_on_a_slope_follows_it() -> None:
+    robot = judges.load("go2")
+    angle = np.deg2rad(8.0)
+    normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
+    ground = fb.Ground(normal=normal)
+    sim = fb.Simulation(robot, ground=ground)
+    walk = Walk(robot, fb.Contacts.points(robot, mu=0.6, normals=normal), Gait.trot(robot), (0.2, 0.0))
+    record = fb.rollout(sim, walk, 4.0, control_period=PERIOD)
+    assert record.outcome == "completed"
+    climbed = record.com[-1] - record.com[0]
+    assert np.isclose(climbed[2] / climbed[0], np.tan(angle), rtol=0.15)
+
+
+def test_copies_begin_anew_and_walk_alike() -> None:
+    walk = walk_of("go2", Gait.trot, (0.2, 0.0))
+    before = run(walk, 1.6)
+    for other in (copy.deepcopy(walk), pickle.loads(pickle.dumps(walk))):
+        assert other.plan is None and not other.history
+        assert np.array_equal(run(other, 1.6).q, before.q)
+
+
+def test_what_does_not_fit_is_told_when_it_is_made() -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.feet(robot)
+    with pytest.raises(UnknownNameError, match="FL_foot"):
+        Walk(robot, contacts.without("FL_foot"), Gait.trot(robot))
+    with pytest.raises(InputError, match=r"Gait\.trot\(robot\)"):
+        Walk(robot, contacts, "trot")
+    with pytest.raises(InputError, match="velocity"):
+        Walk(robot, contacts, Gait.trot(robot), (0.1, 0.2, 0.3))
+    with pytest.raises(InputError, match="facets"):
+        Walk(robot, contacts, Gait.trot(robot), facets=2)
+    walk = Walk(robot, contacts, Gait.trot(robot))
+    with pytest.raises(InputError, match="foothold"):
+        Walk(robot, contacts, Gait.trot(robot), foothold=lambda foot: np.zeros(2))
+    with pytest.raises(InputError, match="yaw_rate"):
+        walk.yaw_rate = np.nan
