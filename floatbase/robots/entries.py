@@ -34,6 +34,7 @@ def _balls(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0,
 
 
 _SOLE = np.array([[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]])  # of talos
+_SOLE_OF_G1 = np.array([[0.12, 0.03, -0.035], [0.12, -0.03, -0.035], [-0.05, -0.025, -0.035], [-0.05, 0.025, -0.035]])
 _solo = partial(
     Entry,
     feet=_balls(("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"), 0.016),
@@ -62,6 +63,25 @@ CATALOGUE: Mapping[str, Entry] = {
         "humanoid with flat feet: each foot carries a wrench through its corners",
         tuple(Foot(frame, corners=_SOLE) for frame in ("left_sole_link", "right_sole_link")),
         sources={"sole": "20 cm × 12 cm, within the ankle's collision mesh", "torque limits": "URDF"},
+    ),
+    "hyq": Entry(
+        "hydraulic quadruped of 80 kg with 3 joints a leg",
+        _balls(("lf_foot", "rf_foot", "lh_foot", "rh_foot"), 0.02175),
+        sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
+    ),
+    "g1": Entry(
+        "humanoid of 33 kg with flat feet",
+        tuple(Foot(frame, corners=_SOLE_OF_G1) for frame in ("left_ankle_roll_link", "right_ankle_roll_link")),
+        joints={
+            f"{side}_{joint}_joint": angle
+            for side in ("left", "right")
+            for joint, angle in {"hip_pitch": -0.25, "knee": 0.5, "ankle_pitch": -0.25}.items()
+        },
+        sources={
+            "sole": "lowest points of the URDF's collision spheres",
+            "posture": "knees bent by 0.5 rad: the reference posture stands on straight legs",
+            "torque limits": "URDF",
+        },
     ),
     "ur5": Entry(
         "arm bolted to the ground: the fixed-base equations (1)",
