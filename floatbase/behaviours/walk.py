@@ -87,7 +87,8 @@ class Walk:
 
     robot: the robot; its feet are point feet or flat feet.
     contacts: all its contacts; `Contacts.feet(robot)` fits.
-    gait: when each foot is in the air; may be set while it walks.
+    gait: when each foot is in the air; may be set while it walks: no foot lifts by the former one any more, and the new one
+        takes over when all stand.
     velocity: (2,) m/s, forwards and to the left, of the body; may be set while it walks, and is approached by 1 m/s².
     yaw_rate: rad/s, to the left; as velocity.
     clearance: m, how high feet are lifted.
@@ -119,6 +120,7 @@ class Walk:
     ):
         self.robot, self._all = of_kind("robot", robot, Robot), of_kind("contacts", contacts, Contacts)
         self._flat = _flat_among(contacts)
+        self._reference: Reference | None = None
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
         self.clearance = positive("clearance", clearance, "m", allow_zero=True)
         self.reach = positive("reach", (_REACH_FLAT if self._flat else _REACH) if reach is None else reach, "m")
@@ -136,14 +138,18 @@ class Walk:
 
     @property
     def gait(self) -> Gait:
-        """When each foot is in the air."""
-        return self._gait
+        """When each foot is in the air, as it was set last."""
+        return self._coming or self._gait
 
     @gait.setter
     def gait(self, gait: Gait) -> None:
         for foot in of_kind("gait", gait, Gait, "Gait.trot(robot)").feet:
             self._all[foot]  # an `UnknownNameError` tells what there is
-        self._gait = gait
+        now = self._reference
+        if now is None or not now.swinging:
+            self._gait, self._coming = gait, None
+        else:  # feet in the air come down as they were to
+            self._gait, self._coming = replace(self._gait, stop=now.time), gait
 
     @property
     def velocity(self) -> Array:
@@ -206,6 +212,8 @@ class Walk:
         if self._reference is None or t < self._reference.time - SAME_TIME:
             self._begin(state, t)
         now = self._now
+        if self._coming and not now.swinging:
+            self._gait, self._coming = self._coming, None
         (now.place, now.yaw, now.velocity), now.time = self._path(t), t
         stance = self._stance_at(t)
         if stance != now.stance:
@@ -223,17 +231,17 @@ class Walk:
 
     def _forget(self) -> None:
         self._controllers: dict[tuple[tuple[str, ...], bool], WholeBodyController] = {}
-        self._reference: Reference | None = None
+        self._reference = None
         self.history: deque[Step] = deque(maxlen=_HISTORY)
 
     def _path(self, t: float) -> tuple[Array, float, Array]:
         """Place, yaw and velocity of the path at t; it stands before the first foot lifts, and once none does any more."""
-        now, begin = self._now, max(self._now.time, self.gait.start)
-        walks = now.swinging or any(self.gait.next_swing(foot, begin) for foot in self.gait.feet)
+        now, begin = self._now, max(self._now.time, self._gait.start)
+        walks = now.swinging or any(self._gait.next_swing(foot, begin) for foot in self._gait.feet)
         return now.moved(np.array([*self.velocity, self.yaw_rate]) if walks else np.zeros(3), begin, t)
 
     def _stance_at(self, t: float) -> tuple[str, ...]:
-        swinging = {foot for foot in self.gait.feet if self.gait.swing_of(foot, t)}
+        swinging = {foot for foot in self._gait.feet if self._gait.swing_of(foot, t)}
         return tuple(name for name in self._all.names if name not in swinging)
 
     def _begin(self, state: State, t: float) -> None:
@@ -250,12 +258,12 @@ class Walk:
         for foot in now.stance or stance:
             now.feet[foot] = state.point(foot)
         self._land(state, [foot for foot in stance if foot in now.swinging])
-        phases = self.gait.phases(now.time, _PHASES)
+        phases = self._gait.phases(now.time, _PHASES)
         now.stance, now.phase, now.footholds = stance, phases[0][:2], {}
         now.find_ground()
         now.plan = LIPM(self._pieces(phases), state.com[:2], self.omega)
         for foot in self._all.names:
-            times = self.gait.swing_of(foot, now.time) if foot in self.gait.feet else None
+            times = self._gait.swing_of(foot, now.time) if foot in self._gait.feet else None
             if times and foot not in now.swinging:
                 end, yaw = now.footholds[foot], yaw_of(state.frame_pose(foot).rotation @ self._flat_rotation(foot).T)
                 path = Swing(state.point(foot), end, *times, self.clearance)
@@ -284,7 +292,7 @@ class Walk:
         zmp = now.plan.zmp(now.time) if now.plan else middles[0]
         pieces: list[Piece] = []
         for i, (begin, end, names) in enumerate(phases):
-            everybody, last = len(names) == len(self.gait.feet), i + 1 == len(phases)
+            everybody, last = len(names) == len(self._gait.feet), i + 1 == len(phases)
             goal = middles[i] if last or not everybody else middles[i + 1]
             if not everybody:
                 pieces.append((begin, end, goal, goal))
@@ -301,10 +309,10 @@ class Walk:
         """The middle of the feet that stand in each phase, (2,) m; finds the footholds of those that swing."""
         now, feet, middles = self._now, dict(self._now.feet), []
         for begin, end, names in phases:
-            stance = [name for name in self._all.names if name in names or name not in self.gait.feet]
+            stance = [name for name in self._all.names if name in names or name not in self._gait.feet]
             middles.append(np.mean([self._centre(name, feet[name], now.yaw) for name in stance], axis=0))
-            for foot in self.gait.feet:
-                times = self.gait.swing_of(foot, begin)
+            for foot in self._gait.feet:
+                times = self._gait.swing_of(foot, begin)
                 if times is not None:
                     place = checked(f"the foothold of {foot}", self.foothold(foot, times[1], self), (2,), "m")
                     now.footholds.setdefault(foot, now.on_ground(foot, place))
@@ -378,11 +386,11 @@ class Walk:
         """Bounds of the normal force of each point while all feet stand, for ramps; None where a foot is in the air."""
         if self.ramp == 0.0 or len(stance) < len(self._all) or len(stance) < 2:
             return None
-        return {foot: partial(self._load, foot) for foot in self.gait.feet}
+        return {foot: partial(self._load, foot) for foot in self._gait.feet}
 
     def _load(self, foot: str, t: float) -> float:
         most = _LOAD * self.robot.weight / len(self._all) / len(self._all[foot].point_names)
-        return self._now.load(foot, t, self.gait, self.ramp, most)
+        return self._now.load(foot, t, self._gait, self.ramp, most)
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles begin anew: controllers are made again, and nothing is remembered."""
