@@ -131,7 +131,12 @@ def talos_pushed(n: int) -> Row:
     for x, y, phase in directions(n):
         push = fb.Push(300.0 * np.array([x, y, 0.0]), 3.0 + phase)
         done += walked("talos", Gait.walk, (0.2, 0.0), 7.5, push, period=2e-3)[0].outcome == "completed"
-    return f"talos: 0.2 m/s and 300 N, {n} random directions (2 ms)", f"{done} of {n}", f"≥ {10 * n // 12}", done >= 10 * n // 12
+    return (
+        f"talos: 0.2 m/s and 300 N, {n} random directions (2 ms)",
+        f"{done} of {n}",
+        f"≥ {10 * n // 12}",
+        done >= 10 * n // 12,
+    )
 
 
 def recovered(name: str, low: float, high: float, gait: Callable[[fb.Robot], Gait], n: int) -> Row:
@@ -195,7 +200,11 @@ def main() -> None:
         lines.append(f"| {what} | {found} | {required} | {'holds' if holds else '**missed**'} |")
         print(lines[-1], flush=True)
     if given.pushes == 30:
-        text = f"# How the robots walk\n\n`python benchmarks/walking.py`, floatbase {fb.__version__}.\n\n" + "\n".join(lines) + "\n"
+        text = (
+            f"# How the robots walk\n\n`python benchmarks/walking.py`, floatbase {fb.__version__}.\n\n"
+            + "\n".join(lines)
+            + "\n"
+        )
         Path(__file__).with_suffix(".md").write_text(text, encoding="utf-8")
 
 

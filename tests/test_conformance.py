@@ -201,7 +201,8 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
-        "vertices", "conflicting_rows", "linear_program", "motion_of", "below_the_body", "target_shapes", "targets_at", "QP.objective",
+        "vertices", "conflicting_rows", "linear_program", "motion_of", "below_the_body", "target_shapes", "targets_at",
+        "QP.objective",
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",

@@ -81,6 +81,34 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
     assert "measured/FR_foot" in drawn()
 
 
+def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground: Playground) -> None:
+    def work() -> None:
+        page.wait_for_timeout(20)
+
+    def control(name: str, call: str) -> None:
+        page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
+
+    def place() -> np.ndarray:
+        return playground.last.final.com if playground.last else np.zeros(3)
+
+    page.goto(playground.view.url)
+    page.wait_for_function("window.viewer && viewer.gui_controllers['trot']")
+    control("forwards [m/s]", "setValue(0.5)")
+    control("turn [rad/s]", "setValue(0.5)")
+    control("trot", "setValue(true)")
+    until(lambda: place()[0] > 0.3, work)
+    picture(page, "bare_page_walking")
+    control("trot", "setValue(false)")
+    until(lambda: playground.last.contacts_at(-1).names == tuple(playground.stance), work)
+    stopped = place()
+    control("CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
+    until(lambda: place()[2] < stopped[2] - 0.01, work)
+    assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
+    control("step when pushed", "setValue(true)")
+    control("reset", "fire()")
+    until(lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05, work)
+
+
 def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
