@@ -19,6 +19,8 @@ Symbols
     C, B        matrices of (10) and (12); β: coordinates of their null spaces, (11) (13) (17)
     G_f, G_τ    net force and net moment about the centre of mass of the contact forces                               (20) (21)
     μ           friction coefficient; also the multipliers of inequality rows, where a quadratic program is solved
+    c, ξ, ω     centre of mass, its divergent component ξ = c + ċ / ω (the capture point), ω = √(g / height), where it walks
+    p           zero-moment point (ZMP), the centre of pressure of all feet: c̈ = ω² (c - p)
     H, g, c     the cost ½ xᵀ H x + gᵀ x + c; rows A x = b and G x ≤ h of a quadratic program
 
 Frames and order
@@ -50,6 +52,6 @@ Importing
 ---------
 `import floatbase as fb` has the names that most programs need. Everything else is imported from its room: `floatbase.robots`,
 `floatbase.dynamics`, `floatbase.objectives`, `floatbase.friction`, `floatbase.qp`, `floatbase.control`, `floatbase.actuators`,
-`floatbase.simulation`, `floatbase.viewer`, `floatbase.lessons`, and the small `floatbase.affine`, `floatbase.linear_algebra`
-and `floatbase.errors`.
+`floatbase.simulation`, `floatbase.behaviours`, `floatbase.viewer`, `floatbase.lessons`, and the small `floatbase.affine`,
+`floatbase.linear_algebra` and `floatbase.errors`.
 """
