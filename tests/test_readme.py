@@ -19,7 +19,7 @@ def blocks(language: str) -> list[str]:
 
 
 def test_the_twelve_lines_work_as_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    (code,) = blocks("python")
+    code, walks = blocks("python")
     (printed,) = blocks("text")
     assert len([line for line in code.splitlines() if line]) == 12
     names: dict[str, Any] = {}
@@ -32,6 +32,10 @@ def test_the_twelve_lines_work_as_printed(capsys: pytest.CaptureFixture[str]) ->
     assert run.slip().max() < 1e-3
     weight = run.measured[-1].reshape(-1, 3)[:, 2].sum()
     assert weight == pytest.approx(state.robot.weight, rel=0.01)
+
+    exec(compile(walks, "README.md", "exec"), names)  # it goes on where the first ends
+    walked = names["run"]
+    assert walked.outcome == "completed" and walked.final.com[0] - state.com[0] > 1.0
 
 
 def test_the_two_commands_exist() -> None:
