@@ -32,13 +32,16 @@ import psutil
 from soak_kills import kills, sweeps
 
 import floatbase as fb
+from floatbase.behaviours import Gait, Walk
 from floatbase.control import Rows
 from floatbase.dynamics import EquationsOfMotion
+from floatbase.simulation import Live
 
 # how much may stay in all: MB, because the allocator keeps freed memory for later; and a connection that is being closed
 LIMITS = {"memory, MB": 8.0, "threads": 1.0, "descriptors": 2.0}
 SAMPLES = 40  # of the three, after the warm-up
 SLOWED = 3.0  # times as long as without pages; a call that waits for a page takes a thousand times as long
+PACE = 0.97  # of real time that a live picture keeps, but for the slice under way when the clock is read
 PATIENCE = 60.0  # s for what takes a moment
 
 Soak = Iterator[Callable[[], object]]  # yields a function that does it once; what does not hold is an AssertionError
@@ -119,6 +122,32 @@ def rollouts() -> Soak:
             raise AssertionError(f"a rollout ended with: {outcome}")
 
     yield step
+
+
+def walking() -> Soak:
+    """A second of go2's trot in a live picture, another velocity in each, and now and then a push; it must keep real time."""
+    robot = fb.load("go2")
+    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot))
+    rng, paces = np.random.default_rng(0), list[float]()
+    with closing(fb.Viewer(robot)) as view:
+        run = Live(fb.Simulation(robot), walk, lambda record: view.show(record.final, record.contacts, record.measured[-1]))
+
+        def step() -> None:
+            walk.velocity, walk.yaw_rate = rng.uniform([-0.1, -0.1], [0.4, 0.1]), rng.uniform(-0.3, 0.3)
+            if rng.uniform() < 0.2:
+                angle = rng.uniform(0.0, 2.0 * np.pi)
+                run.push(60.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))
+            begin, clock = run.sim.time, time.monotonic()
+            run.start()
+            time.sleep(1.0)
+            paces.append((run.sim.time - begin) / (time.monotonic() - clock))
+            if run.status != "running":
+                raise AssertionError(f"the walk ended: {run.status}")
+
+        yield step
+        run.close()
+    if np.median(paces) < PACE:
+        raise AssertionError(f"it reaches {np.median(paces):.0%} of real time")
 
 
 # viewer -----------------------------------------------------------------------------------------------------------------------
@@ -206,6 +235,7 @@ SOAKS: dict[str, tuple[Callable[[], Soak], int]] = {
     "own": (own, 1_000_000),
     "infeasible": (infeasible, 2_000),
     "rollouts": (rollouts, 2_000),
+    "walking": (walking, 300),
     "viewer": (viewer, 100_000),
     "viewers": (viewers, 200),
     "kills": (kills, 200),
