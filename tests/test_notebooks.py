@@ -25,7 +25,7 @@ from floatbase.lessons.publish import FOLDER, execute, read, run, solved
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 LESSONS = sorted(FOLDER.glob("*.ipynb"))
-LIMIT, LIMIT_FOR_ALL = 30.0, 180.0  # s of one core, which a busy machine does not change: a lesson; all of them, both ways
+LIMIT = 30.0  # s of one core, which a busy machine does not change: a lesson, each way
 TOOK: dict[str, float] = {}  # what each run of a lesson took
 
 
@@ -106,6 +106,7 @@ def predicted(notebook: Any) -> list[str]:
 def test_a_lesson_runs_with_its_exercises_solved_and_its_predictions_made(path: Path, tmp_path: Path) -> None:
     notebook = with_every_slider_moved(solved(read(path)))
     names = predicted(notebook)
+    notebook.cells = [cell for cell in notebook.cells if "claims" not in cell.metadata.get("tags", [])]  # nbval runs them
     for cell in notebook.cells:
         if "check" in cell.metadata.get("tags", []):  # a solved lesson proves each check
             cell.source = re.sub(r"^check\((.*)\)$", r"assert check(\1).right, check(\1)", cell.source, flags=re.M)
@@ -117,10 +118,11 @@ def test_a_lesson_runs_with_its_exercises_solved_and_its_predictions_made(path: 
     assert "not seen yet" not in printed
 
 
-def test_all_lessons_together_take_less_than_three_minutes() -> None:
+def test_all_lessons_together_take_less_than_half_of_the_five_minutes() -> None:
     if len(TOOK) < 2 * len(LESSONS):
         pytest.skip("not all lessons were run here")
-    assert 1.0 * len(TOOK) < sum(TOOK.values()) < LIMIT_FOR_ALL  # a run that took nothing was not measured
+    each = sum(TOOK.values()) / len(TOOK)
+    assert 1.0 < each < 15.0  # a run that took nothing was not measured; two cores share them
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
