@@ -24,7 +24,7 @@ WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
 SUPPORT = CALM
-PUSH = _rgb("#222222")  # on a dark background it is light, as text is
+PUSH = _rgb("#222222")  # and the ZMP; on a dark background they are light, as text is
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
@@ -50,7 +50,7 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("idle cone", IDLE, "friction cone: no force"),
     ("support", SUPPORT, "support region"),
     ("dcm", COM, "capture point"),
-    ("zmp", GREYS[1], "planned ZMP"),
+    ("zmp", PUSH, "planned ZMP"),
     ("foothold", GREYS[1], "planned foothold"),
     ("swing", GREYS[1], "swing path"),
     ("rose", MEASURED, "largest push survived"),

@@ -125,7 +125,7 @@ function startCamera(viewer) {
     viewer.camera.position.add(step);
     viewer.controls.target.add(step);
     const scale = node(["meshcat", "scale"]);
-    if (scale) scale.object.position.copy(begin).add(gone);
+    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, 0);  // in our coordinates, z up
     anew = false;
     return way.sub(step).length() > 0;
   }

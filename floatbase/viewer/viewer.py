@@ -180,12 +180,16 @@ class Viewer:
         walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of the robot, then.
         """
         self.painter.check_robot("state", of_kind("state", state, State).robot)
-        return walks.walking(walk, state, self.painter.size, self.painter.ground or LEVEL)
+        return walks.walking(walk, state, self._look)
 
     def step(self, step: Step, t: float, state: State) -> Picture:
         """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s. state: of the robot, then."""
         self.painter.check_robot("state", of_kind("state", state, State).robot)
-        return walks.step(step, t, state, self.painter.size, self.painter.ground or LEVEL)
+        return walks.step(step, t, state, self._look)
+
+    @property
+    def _look(self) -> walks.Look:
+        return walks.Look(self.painter.size, self.painter.ground or LEVEL, self.painter.text)
 
     def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
         """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove everything else."""
@@ -382,7 +386,7 @@ class Viewer:
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
         """Set the title, and the legend of the colours in the picture."""
-        colours = {"push": self.painter.text}
+        colours = dict.fromkeys(("push", "zmp"), self.painter.text)
         items = [
             [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text, SYMBOLS.get(kind, "patch")]
             for kind, colour, text in LEGEND

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, number, of_kind, positive, said
+from floatbase._arrays import Array, number, of_kind, said
 from floatbase.behaviours import LIPM, Step, Swing, Walk, capture_point
 from floatbase.errors import InputError
 from floatbase.robots import Foot, State
@@ -21,33 +22,40 @@ from floatbase.viewer.shapes import Item, Picture, placed
 
 PLACE = GREYS[1]  # of all that is neither a force nor the centre of mass; it shows on any background
 _LIFT = 0.005  # of the robot's size, above the ground: no flicker with its lines and the support region
-_RING, _DIAMOND = 0.06, 0.045  # radii of the marks of capture point and ZMP, of the robot's size
+_RING, _DIAMOND = 0.07, 0.05  # radius of the capture point's mark and half the height of the ZMP's, of the robot's size
 _WIDTH = 0.012  # of a foothold's outline, of the robot's size
 _SMALLEST = 1e-6  # m: a path of no length still has a matrix
 _PIECES = 24  # of a swing path
 
 
-def walking(walk: Walk, state: State, size: float, ground: Plane | Planes = LEVEL) -> Picture:
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How marks are drawn. size: of the robot, m. ground: where they lie. colour: RGB of the ZMP, which shows on the page."""
+
+    size: float
+    ground: Plane | Planes = LEVEL
+    colour: RGB = GREYS[1]
+
+
+def walking(walk: Walk, state: State, look: Look) -> Picture:
     """What a `Walk` plans now: its footholds and swing paths, the capture point where it is, and the planned ZMP.
 
-    walk: the behaviour, after a tick; nothing is drawn before its first one.
-    state: of the robot, then. size: of the robot, m. ground: where the marks lie.
+    walk: the behaviour, after a tick; nothing is drawn before its first one. state: of the robot, then. look: of the marks.
     """
     if of_kind("walk", walk, Walk).plan is None:
         return {}
     assert walk.plan is not None and walk.time is not None
     turns = {foot: walk.yaw_rate * max(path.land - walk.time, 0.0) for foot, path in walk.swings.items()}
-    marks = _on_ground(walk.plan, walk.time, state, size, ground)
-    return marks | _steps(walk.footholds, walk.swings, turns, state, positive("size", size, "m"))
+    return _on_ground(walk.plan, walk.time, state, look) | _steps(walk.footholds, walk.swings, turns, state, look.size)
 
 
-def step(step: Step, t: float, state: State, size: float, ground: Plane | Planes = LEVEL) -> Picture:
+def step(step: Step, t: float, state: State, look: Look) -> Picture:
     """The same of a stored step, as it was planned when its stance began; the capture point is where it is at time t.
 
-    step: an entry of `walk.history`. t: s. state: of the robot, then. size, ground: as for `walking`.
+    step: an entry of `walk.history`. t: s. state: of the robot, then. look: of the marks.
     """
-    marks = _on_ground(of_kind("step", step, Step).plan, number("t", t, "s"), state, size, ground)
-    return marks | _steps(step.footholds, step.swings, {}, state, positive("size", size, "m"))
+    marks = _on_ground(of_kind("step", step, Step).plan, number("t", t, "s"), state, look)
+    return marks | _steps(step.footholds, step.swings, {}, state, look.size)
 
 
 def step_at(steps: Sequence[Step], t: float) -> Step | None:
@@ -63,14 +71,13 @@ def checked_steps(steps: Iterable[Step]) -> list[Step]:
     return [of_kind("a step", step, Step, "one of walk.history") for step in steps]
 
 
-def _on_ground(plan: LIPM, t: float, state: State, size: float, ground: Plane | Planes) -> Picture:
+def _on_ground(plan: LIPM, t: float, state: State, look: Look) -> Picture:
     """Capture point and ZMP. t: s."""
-    dcm = capture_point(of_kind("state", state, State).com, state.com_velocity, plan.omega)
-
-    def at(point: Array, radius: float) -> Array:
-        return placed([*point, ground.height(point) + _LIFT * size], scale=radius * size)
-
-    return {"dcm": Item(_ring(COM, True), at(dcm, _RING)), "zmp": Item(_diamond(), at(plan.zmp(t), _DIAMOND))}
+    dcm, zmp = capture_point(of_kind("state", state, State).com, state.com_velocity, plan.omega), plan.zmp(t)
+    lift = _LIFT * look.size
+    ring = placed([*dcm, look.ground.height(dcm) + lift], scale=_RING * look.size)
+    diamond = placed([*zmp, look.ground.height(zmp) + lift], scale=_DIAMOND * look.size)
+    return {"dcm": Item(_ring(COM, 0.64, True), ring), "zmp": Item(_diamond(look.colour), diamond)}
 
 
 def _steps(
@@ -102,7 +109,7 @@ def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
     at = at + [0.0, 0.0, _LIFT * size]
     if foot.corners is None:
         radius = max(2.0 * foot.radius, 0.04 * size)
-        return Item(_ring(PLACE), placed(at, rotation, radius))
+        return Item(_ring(PLACE, 0.72), placed(at, rotation, radius))
     corners = np.round(foot.corners[:, :2] - foot.corners[:, :2].mean(axis=0), 4)
     return Item(_sole(tuple(map(tuple, corners.tolist())), round(_WIDTH * size, 4)), placed(at, rotation))
 
@@ -135,16 +142,15 @@ def _about_z(yaw: float) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _ring(colour: RGB, on_top: bool = False) -> Shape:
-    """A flat ring around z, of radius 1."""
-    return lowering.mesh(*geometry.revolved([(0.72, 0.0), (1.0, 0.0)], 36), colour, lit=False, on_top=on_top)
+def _ring(colour: RGB, inner: float, on_top: bool = False) -> Shape:
+    """A flat ring around z, of radius 1. inner: its inner radius."""
+    return lowering.mesh(*geometry.revolved([(inner, 0.0), (1.0, 0.0)], 36), colour, lit=False, on_top=on_top)
 
 
-@lru_cache(maxsize=1)
-def _diamond() -> Shape:
-    """A flat square on its corner, of radius 1."""
-    corners = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-    return lowering.mesh(*geometry.fan(corners), PLACE, lit=False, on_top=True)
+@lru_cache(maxsize=8)
+def _diamond(colour: RGB) -> Shape:
+    """An octahedron that stands on its tip, which looks like a diamond from all around."""
+    return lowering.mesh(*geometry.revolved([(0.0, 0.0), (0.6, 1.0), (0.0, 2.0)], 4), colour, lit=False, on_top=True)
 
 
 @lru_cache(maxsize=32)
