@@ -24,6 +24,7 @@ import pytest
 from values import CONTACTS, CONTROLLER, EOM, HYDRAULIC, RECORD, ROBOT, STATE, UP, VALUES
 
 import floatbase as fb
+from floatbase.behaviours import Gait, Walk
 from floatbase.control import AnalyticController
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import ConstantTorques
@@ -42,6 +43,8 @@ NORMAL = np.array([0.1, 0.0, 1.0])
 AXES = plt.figure().gca()
 SIM = fb.Simulation(ROBOT)
 LIVE = Live(SIM, CONTROLLER, lambda record: None)
+WALK = Walk(ROBOT, CONTACTS, Gait.trot(ROBOT, start=0.0))
+WALK(STATE.q, STATE.v)  # so that it has a plan
 
 FOLDER = os.environ["FLOATBASE_HOME"]  # of this run
 
@@ -114,7 +117,8 @@ EXAMPLES: dict[str, Any] = {
     "actuators": HYDRAULIC, "after_reset": lambda: None, "alpha": 0.1, "angle": 30.0, "angular_acceleration": UP,
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
-    "plots.plot_torques.axis": AXES, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
+    "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
+    "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,
     "bulk_modulus": 1.3e9,
     "column": "force", "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,
@@ -156,6 +160,7 @@ EXAMPLES: dict[str, Any] = {
     "LinearConstraint.rows": lambda state, t: None, "Rows.rows": lambda eom, t: (np.eye(18), np.ones(18)), "rows": (),
     "scale": 0.004, "seed": 3, "seen": 0.4,
     "show": lambda record: None, "sim": SIM, "Cylinders.size": np.ones(12), "solver": "daqp", "space": SPACE, "speed": 1.0,
+    "places": np.zeros((2, 3)), "Viewer.step.step": WALK.history[0], "steps": list(WALK.history), "walk": WALK,
     "spread": 0.2, "WrenchSet.reach.start": 150.0 * np.eye(6)[2], "active_set.start": np.zeros(QP.n), "start": 0.1,
     "state": STATE, "status": "inside", "step": 0.1, "stiffness": 100.0, "supply_pressure": 160e5, "support": True, "t": 0.5,
     "turn": 0.3, "solution": VALUES["Solution"],

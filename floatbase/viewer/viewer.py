@@ -178,7 +178,9 @@ class Viewer:
             view.show(state, walk.contacts, extra=view.walking(walk, state))
 
         walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of the robot, then.
+        Raises `InputError` for those of another robot.
         """
+        self.painter.check_robot("walk", of_kind("walk", walk, Walk).robot)
         self.painter.check_robot("state", of_kind("state", state, State).robot)
         return walks.walking(walk, state, self._look)
 

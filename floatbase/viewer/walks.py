@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from floatbase._arrays import Array, number, of_kind, said
 from floatbase.behaviours import LIPM, Step, Swing, Walk, capture_point
-from floatbase.errors import InputError
-from floatbase.robots import Foot, State
+from floatbase.errors import InputError, unknown_name
+from floatbase.robots import Foot, Robot, State
 from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import COM, GREYS, RGB
 from floatbase.viewer.ground import LEVEL, Plane, Planes
@@ -94,14 +94,20 @@ def _steps(
     picture: Picture = {}
     x, y, _ = state.frame_pose("base").rotation[:, 0]
     yaw = float(np.arctan2(y, x))
-    feet = {foot.frame: foot for foot in state.robot.feet}
     for name, place in footholds.items():
-        rotation, offset = _about_z(yaw + turns.get(name, 0.0)), _to_the_ground(feet[name], state.robot.standing())
-        path = name.replace("/", "_")
-        picture[f"foothold/{path}"] = _outline(feet[name], place + rotation @ offset, rotation, size)
+        foot, path = _foot(state.robot, name), name.replace("/", "_")
+        rotation, offset = _about_z(yaw + turns.get(name, 0.0)), _to_the_ground(foot, state.robot.standing())
+        picture[f"foothold/{path}"] = _outline(foot, place + rotation @ offset, rotation, size)
         if name in swings:
             picture[f"swing/{path}"] = _path(swings[name], rotation @ offset)
     return picture
+
+
+def _foot(robot: Robot, name: str) -> Foot:
+    feet = {foot.frame: foot for foot in robot.feet}
+    if name not in feet:
+        raise unknown_name(f"foot of {robot.name}", name, feet)
+    return feet[name]
 
 
 def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:

@@ -354,7 +354,11 @@ def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing
     view = Viewer(go2, background=background)
     view.show(standing, push=("base", [0.0, 30.0, 0.0]))
     assert material(view, "/meshcat/push")["depthTest"] is False
-    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [hexadecimal(BACKGROUNDS[background][3]), "push", "patch"]
+    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [
+        hexadecimal(BACKGROUNDS[background][3]),
+        "push",
+        "patch",
+    ]
     view.close()
 
 
