@@ -112,6 +112,8 @@ function startCamera(viewer) {
   const node = (names) => names.reduce((at, name) => at && at.children[name], viewer.scene_tree);
   // while the panel is open, the middle of the picture is left of it by so many pixels
   const aside = () => room && !viewer.gui.closed ? viewer.gui.width / 2 : 0;
+  // and above it where the player would hide the feet
+  const above = () => part("player").offsetHeight / 2;
 
   // Go with what is followed, at the same height; the scale goes with the camera. Returns whether it is still on its way.
   function go() {
@@ -133,7 +135,7 @@ function startCamera(viewer) {
   viewer.render = () => {
     const moving = path.length > 0 && go();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-    if (aside()) viewer.camera.setViewOffset(w, h, aside(), 0, w, h);
+    if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
     else viewer.camera.clearViewOffset();
     render();
     if (moving) viewer.set_dirty();
