@@ -41,7 +41,8 @@ class Playground:
     def __init__(self, robot: Robot, *, friction: float = 0.7, background: str = "light", port: int = 0):
         self.robot = robot
         self.sim = fb.Simulation(robot, friction)
-        self.view = fb.Viewer(robot, background=background, port=port, facets=4 if robot.feet else None)
+        facets = 4 if robot.feet else None
+        self.view = fb.Viewer(robot, background=background, port=port, facets=facets, follow=True)
         self.mu, self.facets = friction, 4
         self.stance = {foot.frame: True for foot in robot.feet}
         self.shift = [0.0, 0.0, 0.0]  # m, of the centre of mass

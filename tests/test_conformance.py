@@ -45,9 +45,10 @@ COST = fb.Quadratic(np.eye(12), np.ones(12))
 NORMAL = np.array([0.1, 0.0, 1.0])
 AXES = plt.figure().gca()
 SIM = fb.Simulation(ROBOT)
-GAIT, WALKING = Gait.trot(ROBOT), Walk(ROBOT, fb.Contacts.feet(ROBOT), Gait.trot(ROBOT))
-WALKING(STATE.q, STATE.v)
 LIVE = Live(SIM, CONTROLLER, lambda record: None)
+GAIT = Gait.trot(ROBOT, start=0.0)
+WALK = Walk(ROBOT, CONTACTS, GAIT)
+WALK(STATE.q, STATE.v)  # so that it has a plan
 
 FOLDER = os.environ["FLOATBASE_HOME"]  # of this run
 
@@ -120,7 +121,8 @@ EXAMPLES: dict[str, Any] = {
     "actuators": HYDRAULIC, "after_reset": lambda: None, "alpha": 0.1, "angle": 30.0, "angular_acceleration": UP,
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
-    "plots.plot_torques.axis": AXES, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
+    "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
+    "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,
     "bulk_modulus": 1.3e9,
     "column": "force", "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,
@@ -162,6 +164,7 @@ EXAMPLES: dict[str, Any] = {
     "LinearConstraint.rows": lambda state, t: None, "Rows.rows": lambda eom, t: (np.eye(18), np.ones(18)), "rows": (),
     "scale": 0.004, "seed": 3, "seen": 0.4,
     "show": lambda record: None, "sim": SIM, "Cylinders.size": np.ones(12), "solver": "daqp", "space": SPACE, "speed": 1.0,
+    "places": np.zeros((2, 3)), "Viewer.step.step": WALK.history[0], "steps": list(WALK.history), "walk": WALK,
     "spread": 0.2, "WrenchSet.reach.start": 150.0 * np.eye(6)[2], "active_set.start": np.zeros(QP.n), "start": 0.1,
     "state": STATE, "status": "inside", "step": 0.1, "stiffness": 100.0, "supply_pressure": 160e5, "support": True, "t": 0.5,
     "turn": 0.3, "solution": VALUES["Solution"],
@@ -176,7 +179,7 @@ EXAMPLES: dict[str, Any] = {
     "Gait.walk.robot": TALOS,
     "period": 1.0, "swing": 0.25, "Gains.swing": (900.0, 10.0), "Gains.com": (100.0, 10.0), "Gains.base": (100.0, 10.0),
     "Gains.posture": (100.0, 1e-2), "stop": 2.0, "pause": 0.1, "Gait.phases.n": 4, "longest": 5.0, "foot": "FL_foot",
-    "Swing.start": UP, "Swing.end": UP, "lift": 0.0, "land": 0.5, "Swing.height": 0.05, "gait": GAIT, "steps": GAIT,
+    "Swing.start": UP, "Swing.end": UP, "lift": 0.0, "land": 0.5, "Swing.height": 0.05, "gait": GAIT, "Stand.steps": GAIT,
     "Walk.velocity": np.zeros(2), "Stand.velocity": np.zeros(2), "yaw_rate": 0.1, "clearance": 0.05, "reach": 0.2, "ramp": 0.1,
     "foothold": lambda foot, land, walk: np.zeros(2), "gains": Gains(), "place": np.zeros(2),
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
@@ -223,7 +226,7 @@ ALONE = {name for names in LEFT_OUT.values() for name in names}
 SELVES: dict[str, Any] = {
     "Simulation": SIM, "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
     "AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "HydraulicActuators": HYDRAULIC,
-    "Walk": WALKING, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)),
+    "Walk": WALK, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)),
     "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
     "ConstantTorques": ConstantTorques(ZERO),
 }  # fmt: skip

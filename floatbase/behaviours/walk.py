@@ -68,6 +68,7 @@ class Step:
     feet: (3,) m, world, where each foot's frame stands or stood.
     footholds: (3,) m, world, where each foot that is in the air, or lifts next, is to land, as planned then.
     plan: of the centre of mass.
+    swings: the paths of the feet that are in the air, as planned then.
     """
 
     time: float
@@ -75,6 +76,7 @@ class Step:
     feet: dict[str, Array]
     footholds: dict[str, Array]
     plan: LIPM
+    swings: dict[str, Swing]
 
 
 class Walk:
@@ -168,6 +170,11 @@ class Walk:
     @yaw_rate.setter
     def yaw_rate(self, yaw_rate: float) -> None:
         self._yaw_rate = number("yaw_rate", yaw_rate, "rad/s")
+
+    @property
+    def time(self) -> float | None:
+        """s, of the last tick; None before the first."""
+        return self._now.time if self._reference else None
 
     @property
     def stance(self) -> tuple[str, ...]:
@@ -268,7 +275,7 @@ class Walk:
                 end, yaw = now.footholds[foot], yaw_of(state.frame_pose(foot).rotation @ self._flat_rotation(foot).T)
                 path = Swing(state.point(foot), end, *times, self.clearance)
                 now.swinging[foot] = Swinging(path, end, (yaw, self._path(times[1])[1]))
-        self.history.append(Step(now.time, stance, dict(now.feet), dict(now.footholds), now.plan))
+        self.history.append(Step(now.time, stance, dict(now.feet), dict(now.footholds), now.plan, self.swings))
 
     def _land(self, state: State, feet: Sequence[str]) -> None:
         """These feet have landed; the path moves along where they were moved far."""

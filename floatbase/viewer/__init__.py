@@ -1,11 +1,11 @@
 """The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and saves them.
 
-`Viewer` draws. `View` says from where it looks. `shapes`, `marks` and `props` make further items for a picture, `plots` makes
-figures of a rollout, `roses` shows push roses and compasses, and `FIGURES` are the document's figures. `page` and `wire` are
-for programs that write web pages.
+`Viewer` draws. `View` says from where it looks. `shapes`, `marks` and `props` make further items for a picture, `walks` draws
+what a walk plans, `plots` makes figures of a rollout, `roses` shows push roses and compasses, and `FIGURES` are the document's
+figures. `page` and `wire` are for programs that write web pages.
 """
 
-from floatbase.viewer import geometry, marks, page, plots, props, recording, roses, shapes, wire
+from floatbase.viewer import geometry, marks, page, plots, props, recording, roses, shapes, walks, wire
 from floatbase.viewer.camera import PRESETS, View
 from floatbase.viewer.colours import (
     ALARM,
@@ -70,5 +70,6 @@ __all__ = [
     "roses",
     "shapes",
     "urdf_visuals",
+    "walks",
     "wire",
 ]

@@ -24,7 +24,7 @@ WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
 SUPPORT = CALM
-PUSH = _rgb("#222222")  # on a dark background it is light, as text is
+PUSH = _rgb("#222222")  # and the ZMP; on a dark background they are light, as text is
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
@@ -49,6 +49,10 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("cone", ALARM, "friction cone: force outside"),
     ("idle cone", IDLE, "friction cone: no force"),
     ("support", SUPPORT, "support region"),
+    ("dcm", COM, "capture point"),
+    ("zmp", PUSH, "planned ZMP"),
+    ("foothold", GREYS[1], "planned foothold"),
+    ("swing", GREYS[1], "swing path"),
     ("rose", MEASURED, "largest push survived"),
     ("before", LIMIT, "largest push survived before"),
     ("capture", CALM, "theory: capture point"),
@@ -56,6 +60,9 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("compass", COM, "reachable horizontal force"),
     ("ghost", GHOST, GHOST_NAME),
 )
+
+# how the legend marks what is not a patch of its colour: first part of the item's path -> a class of the page's style
+SYMBOLS = {"com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line"}
 
 # status of a friction cone -> its colour and its opacity
 CONE = {"idle": IDLE, "inside": CALM, "active": WARNING, "outside": ALARM}

@@ -14,6 +14,7 @@ from floatbase.viewer.colours import RGB
 from floatbase.viewer.shapes import Item, grid_lines, ground, placed
 
 STEEPEST = 0.2  # least vertical part of a normal of the ground: contacts with less stand on walls
+JUMP = 2.5  # m that the grid jumps at once to stay below a robot: a whole number of its squares, so that nobody sees it
 STEP = 0.01  # m; the height of the ground is rounded to this, so that it does not tremble with the feet
 
 
@@ -28,9 +29,11 @@ class Plane(NamedTuple):
         x, y, z = self.normal
         return (self.offset - x * float(point[0]) - y * float(point[1])) / z
 
-    def lines(self, colour: RGB) -> Item:
-        """The lines of the plane's grid."""
-        return _lines(self, colour)
+    def lines(self, colour: RGB, around: Array | None = None) -> Item:
+        """The lines of the plane's grid, which reach at least 3 m around a point, shape (3,), m; None for the origin."""
+        t1, t2 = tangents(self.normal)
+        i, j = (0, 0) if around is None else (round(float(t @ around) / JUMP) for t in (t1, t2))
+        return _lines(self, colour, i, j)
 
 
 class Planes(NamedTuple):
@@ -42,8 +45,8 @@ class Planes(NamedTuple):
         """z of the ground, m, below or above a point, shape (3,), m."""
         return max(plane.height(point) for plane in self.planes)
 
-    def lines(self, colour: RGB) -> Item:
-        """The lines of all planes' grids, each as far as it is seen."""
+    def lines(self, colour: RGB, around: Array | None = None) -> Item:
+        """The lines of all planes' grids around the origin, each as far as it is seen. around: does not count."""
         return _lines_of_all(self, colour)
 
 
@@ -66,8 +69,11 @@ def plane_under(normals: Array, positions: Array) -> Plane:
 
 
 @lru_cache(maxsize=64)
-def _lines(plane: Plane, colour: RGB) -> Item:
-    return Item(ground(colour).shape, _pose(plane))
+def _lines(plane: Plane, colour: RGB, i: int, j: int) -> Item:
+    """i, j: how many jumps along its two tangents the grid has made."""
+    pose = _pose(plane)
+    pose[:3, 3] += JUMP * (i * pose[:3, 0] + j * pose[:3, 1])
+    return Item(ground(colour).shape, pose)
 
 
 @lru_cache(maxsize=16)

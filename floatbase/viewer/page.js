@@ -80,48 +80,65 @@ function startLegend(viewer, camera) {
   for (const one of [part("meshcat-pane"), part("player"), viewer.gui.domElement]) sizes.observe(one);
   return {
     show(items) {
-      lines.replaceChildren(...items.map(([colour, text]) => {
+      lines.replaceChildren(...items.map(([colour, text, symbol]) => {
         const line = document.createElement("div");
-        line.append(spot(colour), text);
+        line.append(spot(colour, symbol), text);
         return line;
       }));
-      button.firstChild.replaceChildren(...Array.from(new Set(items.map(([colour]) => colour)), spot));
+      button.firstChild.replaceChildren(...Array.from(new Set(items.map(([colour]) => colour)), (colour) => spot(colour)));
       fold();
     },
   };
 }
 
-function spot(colour) {
+// A patch of a colour, or one of the style's symbols in it: a disc, a ring, a diamond, a line.
+function spot(colour, symbol = "patch") {
   const made = document.createElement("i");
-  made.style.background = colour;
+  made.className = symbol;
+  made.style.color = colour;
   return made;
 }
 
+const LAG = 0.3;  // s by which the camera is behind what it follows, so that it does not shake with every step
+const REST = 1e-3;  // m: closer than this it is there
+
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
 function startCamera(viewer) {
-  let followed = [], last = null, room = false;
+  const {Vector3} = MeshCat.THREE;
+  // how far the camera has gone with what it follows, and how far that was from its place at home when the camera was set
+  const gone = new Vector3(), begin = new Vector3();
+  let path = [], from = new Vector3(), smooth = false, anew = true, room = false, clock = 0;
   // searched each time, because another picture has another object there, or none
-  const position = () => {
-    const node = followed.reduce((at, name) => at && at.children[name], viewer.scene_tree);
-    return node ? node.object.getWorldPosition(new MeshCat.THREE.Vector3()) : null;
-  };
+  const node = (names) => names.reduce((at, name) => at && at.children[name], viewer.scene_tree);
   // while the panel is open, the middle of the picture is left of it by so many pixels
   const aside = () => room && !viewer.gui.closed ? viewer.gui.width / 2 : 0;
+  // and above it where the player would hide the feet
+  const above = () => part("player").offsetHeight / 2;
+
+  // Go with what is followed, at the same height; the scale goes with the camera. Returns whether it is still on its way.
+  function go() {
+    const now = performance.now(), part = smooth && !anew ? 1 - Math.exp(-Math.min(now - clock, 100) / 1000 / LAG) : 1;
+    clock = now;
+    const found = node(path), way = new Vector3();
+    if (!found) return false;
+    way.copy(found.object.getWorldPosition(new Vector3())).sub(from).setY(0).sub(gone);
+    const step = way.clone().multiplyScalar(way.length() < REST ? 1 : part);
+    gone.add(step);
+    viewer.camera.position.add(step);
+    viewer.controls.target.add(step);
+    const scale = node(["meshcat", "scale"]);
+    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, 0);  // in our coordinates, z up
+    anew = false;
+    return way.sub(step).length() > 0;
+  }
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
-    if (followed.length) {
-      const now = position();
-      if (now && last) {
-        const step = now.clone().sub(last).setY(0);
-        viewer.camera.position.add(step);
-        viewer.controls.target.add(step);
-      }
-      last = now || last;  // a robot that is removed and drawn again elsewhere is followed there
-    }
+    const moving = path.length > 0 && go();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-    if (aside()) viewer.camera.setViewOffset(w, h, aside(), 0, w, h);
+    if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
     else viewer.camera.clearViewOffset();
     render();
+    if (moving) viewer.set_dirty();
   };
   return {
     aside,
@@ -130,10 +147,14 @@ function startCamera(viewer) {
       viewer.camera.fov = command.fov;
       viewer.camera.position.fromArray(command.position);
       viewer.controls.target.fromArray(command.target);
+      gone.set(0, 0, 0);
+      anew = true;
     },
     follow(command) {
-      followed = command.node.split("/").filter((name) => name);
-      last = position();
+      path = command.node.split("/").filter((name) => name);
+      from.fromArray(command.from);
+      begin.fromArray(command.begin);
+      smooth = command.smooth;
     },
   };
 }

@@ -96,7 +96,7 @@ class Painter:
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
-        picture = {"ground": ground.lines(self.lines)} | self._robot(state, "robot", self._shapes)
+        picture = {"ground": ground.lines(self.lines, state.com)} | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
             stands = [contact.name not in lifted for contact in contacts for _ in contact.point_names]
             picture |= self._contacts(contacts, positions, both, cones, stands)

@@ -1,11 +1,14 @@
-"""Plots of a rollout in the colours of the scene: centre of mass, forces, friction, torques."""
+"""Plots of a rollout in the colours of the scene: centre of mass, forces, gait, friction, torques."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
 CARRIES = 0.01  # of the weight: the direction of a smaller force says nothing about friction
+_INSIDE: dict[str, Any] = {"loc": "upper right"}  # where the legend is
+_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 3, "frameon": False}
 
 
 def plot(rollout: Rollout) -> Figure:
@@ -53,6 +58,49 @@ def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
         axis.plot(rollout.time, planned, color=PLANNED, linewidth=3.5, alpha=0.6, label="" if i else "planned")
         axis.plot(rollout.time, measured, color=MEASURED, linewidth=1.2, label="" if i else "measured")
     return _finished(axis, rollout, "normal forces [N]")
+
+
+def plot_gait(rollout: Rollout, axis: Axes | None = None) -> Axes:
+    """The gait diagram: a bar for each foot while the controller's stance has it, and a line while the ground carries it.
+
+    axis: as for `plot_com`. Raises `InputError` for a record without contacts.
+    """
+    names = _contacts_of(rollout)
+    axis = _axis(axis)
+    rows = enumerate(zip(_stood(rollout), _normal_of_contacts(rollout, rollout.measured), strict=True))
+    for i, (stands, measured) in rows:
+        carried = np.where(measured > CARRIES * rollout.robot.weight, float(i), np.nan)
+        bars = axis.broken_barh(_spans(rollout.time, stands), (i - 0.36, 0.72), color=GREYS[2], alpha=0.6, linewidth=0.0)
+        bars.set_label("" if i else "in the controller's stance")
+        axis.plot(rollout.time, carried, color=MEASURED, linewidth=2.5, label="" if i else "measured contact")
+    axis.set_yticks(range(len(names)), names)
+    axis.set_ylim(len(names) - 0.5, -0.5)
+    return _finished(axis, rollout, "", _ABOVE)
+
+
+def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> list[Axes]:
+    """Normal force of each foot through time, N: measured, and behind it, as a wider line, planned. One plot for each contact.
+
+    axes: as many as the record has contacts; None for a new figure. Raises `InputError` for a record without contacts, and for
+        another number of axes.
+    """
+    names = _contacts_of(rollout)
+    if axes is None:
+        size = (8, 1.0 + 1.1 * len(names))
+        grid = plt.subplots(len(names), 1, figsize=size, sharex=True, sharey=True, layout="constrained", squeeze=False)[1]
+        axes = list(grid[:, 0])
+    made = [of_kind("one of axes", axis, Axes, "plt.gca()") for axis in np.atleast_1d(np.asarray(axes, dtype=object)).flat]
+    if len(made) != len(names):
+        raise InputError(f"axes are {len(made)}; the record has {len(names)} contacts: {', '.join(names)}.")
+    planned, measured = (_normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured))
+    for i, (axis, name) in enumerate(zip(made, names, strict=True)):
+        axis.plot(rollout.time, planned[i], color=PLANNED, linewidth=3.5, alpha=0.6, label="planned")
+        axis.plot(rollout.time, measured[i], color=MEASURED, linewidth=1.0, label="measured")
+        axis.axhline(0.0, color=LIMIT, linewidth=0.6)
+        _finished(axis, rollout, "", {} if i else _ABOVE)
+        axis.set_ylabel(f"{name}\n[N]", rotation=0, ha="right", va="center")
+        axis.set_xlabel("time [s]" if i + 1 == len(made) else "")
+    return made
 
 
 def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
@@ -109,16 +157,45 @@ def _normal(rollout: Rollout, forces: Array) -> Array:
     return np.asarray(np.einsum("nij,ij->in", f, rollout.contacts.normals))
 
 
+def _contacts_of(rollout: Rollout) -> tuple[str, ...]:
+    """The names of the record's contacts."""
+    names = checked_rollout(rollout).contacts.names
+    if not names:
+        raise InputError("the record has no contacts, so there is no gait to plot.")
+    return names
+
+
+def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
+    """Normal force of each contact and time, shape (contacts, n), N; of a flat foot that of all its corners."""
+    points, starts = _normal(rollout, forces), np.cumsum([0] + [len(contact.point_names) for contact in rollout.contacts])
+    return np.array([points[a:b].sum(axis=0) for a, b in pairwise(starts)])
+
+
+def _stood(rollout: Rollout) -> npt.NDArray[np.bool_]:
+    """Whether the controller's stance had each contact at each time, shape (contacts, n)."""
+    if not rollout.stances:
+        return np.ones((len(rollout.contacts), len(rollout)), dtype=bool)
+    has = {stance: [name in stance.names for name in rollout.contacts.names] for stance in dict.fromkeys(rollout.stances)}
+    return np.array([has[stance] for stance in rollout.stances], dtype=bool).T
+
+
+def _spans(times: Array, there: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Begin and length, s, of each span in which something is there."""
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    ends = np.append(times, times[-1:])
+    return [(float(times[a]), float(ends[b] - times[a])) for a, b in changes.reshape(-1, 2)]
+
+
 def _axis(axis: Axes | None) -> Axes:
     return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else of_kind("axis", axis, Axes, "plt.gca()")
 
 
-def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:
-    """Add labels, a legend, and a band for each push."""
+def _finished(axis: Axes, rollout: Rollout, label: str, legend: Mapping[str, Any] = _INSIDE) -> Axes:
+    """Add labels, a band for each push, and a legend; {} for none."""
     for i, push in enumerate(rollout.pushes):
         axis.axvspan(push.start, push.start + push.duration, color=PUSH, alpha=0.12, label="" if i else "push")
     axis.set(xlabel="time [s]", ylabel=label)
     axis.grid(alpha=0.25)
-    if axis.get_legend_handles_labels()[0]:
-        axis.legend(loc="upper right", fontsize="small")
+    if legend and axis.get_legend_handles_labels()[0]:
+        axis.legend(fontsize="small", **legend)
     return axis

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 REPETITIONS = 10_000  # meshcat's default is 1: it plays once and returns to the start
 _MOST_PICTURES = 1e4  # a second: more than any record has rows
 STILL = 1e-7  # m, and 1 for colours and quaternions: what changes less gets no track; single precision would not show it
+SMOOTH = 0.3  # s, standard deviation of the weights over which a followed place is a mean
 _SMOOTH, _STEP = 2301, 2300  # three.js: linear and discrete interpolation
 
 
@@ -83,6 +84,23 @@ def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
         raise InputError("times holds no time, so there is nothing to draw.")
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
     return np.unique(np.clip(np.searchsorted(t, ticks - 1e-9), 0, len(t) - 1))
+
+
+def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
+    """Places without what lasts less than a stride: weighted means over about a second around each time; straight ways stay.
+
+    times: (n,), s, evenly spaced. places: (n, 3), m, world.
+    """
+    t, x = checked("times", times, (None,), "s"), checked("places", places, (None, 3), "m")
+    if len(x) != len(t):
+        raise InputError(f"there are {len(t)} times and {len(x)} places; each place needs one time.")
+    if len(t) < 3 or not t[-1] > t[0]:
+        return x
+    width = SMOOTH * (len(t) - 1) / (t[-1] - t[0])  # in places
+    reach = max(1, min(int(3.0 * width), len(t) - 1))
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    wide = np.pad(x, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    return np.stack([np.convolve(column, weights / weights.sum(), mode="valid") for column in wide.T], axis=1)
 
 
 def checked_rollout(rollout: Rollout) -> Rollout:

@@ -229,6 +229,11 @@ def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
     return _polygon(tuple(tuple(corner) for corner in points.tolist()), colour, opacity)
 
 
+def nothing(position: npt.ArrayLike) -> Item:
+    """A place without anything to see, for the camera to follow. position: (3,), m, world."""
+    return Item(_nothing(), placed(position))
+
+
 def ground(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
     """A square grid of lines on the plane z = 0. colour: RGB. step: m between lines. half: half its side, m."""
     return Item(_grid(colour, step, half), np.eye(4))
@@ -308,6 +313,11 @@ def _label(text: str, height: float, plate: bool, colour: RGB) -> Shape:
 @lru_cache(maxsize=256)
 def _polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float) -> Shape:
     return lowering.mesh(*geometry.fan(corners), colour, opacity=opacity, lit=False)
+
+
+@lru_cache(maxsize=1)
+def _nothing() -> Shape:
+    return lowering.lines(np.zeros((2, 3)), PATCH)
 
 
 @lru_cache(maxsize=8)

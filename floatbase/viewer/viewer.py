@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import flag, function, number, of_kind, positive, said, text, unit_vector, whole
+from floatbase._arrays import Array, flag, function, number, of_kind, positive, said, text, unit_vector, whole
+from floatbase.behaviours import Step, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import marks, page, recording, wire
+from floatbase.viewer import marks, page, recording, shapes, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
-from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, hexadecimal
-from floatbase.viewer.ground import STEEPEST, Plane, Planes
+from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
+from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, below, kinds
 from floatbase.viewer.place import kernel_is_remote
 from floatbase.viewer.shapes import Item, Picture
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
+ROBOT, FOLLOWED = "robot", "followed"  # in the picture: the robot, and where it is on average of a stride
 _MOST_PIXELS = 10_000  # of a picture's height
 # The browser tests whether it reaches the live page: `kernel_is_remote` may be wrong.
 _PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
@@ -52,6 +54,7 @@ class Viewer:
     inside, turn: as for `FrictionPolyhedron`.
     ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin; None takes the plane that the
         contacts stand on when they share a normal, else a level ground.
+    follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it otherwise.
     port: port of the page; 0 takes a free one.
     Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
 
@@ -71,6 +74,7 @@ class Viewer:
         inside: bool = True,
         turn: float = 0.0,
         ground: Ground | npt.ArrayLike | None = None,
+        follow: bool = False,
         port: int = 0,
     ):
         of_kind("robot", robot, Robot)
@@ -84,7 +88,7 @@ class Viewer:
         self.painter = Painter(robot, requested, facets, cut.inside, cut.turn, _ground(ground), lines, text, paper)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
-        self._moving = False
+        self._moving, self._follow = False, flag("follow", follow)
         self._last: State | None = None
         self._controls: dict[str, Callable[[Any], None]] = {}
         self._set_stage(background)
@@ -149,7 +153,7 @@ class Viewer:
         self.draw(picture, title, ghost_name)
         if self._last is None:
             self._last = state
-            self.canvas.set(*self._looking(View(), follow=False))
+            self.canvas.set(*self._looking(View()))
         self._last = state
         return self
 
@@ -168,10 +172,31 @@ class Viewer:
         drawn = marks.prices(positions, contacts, of_kind("solution", solution, Solution), height, self.painter.size)
         return below("price", drawn)
 
+    def walking(self, walk: Walk, state: State) -> Picture:
+        """Marks for `extra` of `show`: planned footholds, swing paths, the capture point, and the planned ZMP of a `Walk`.
+
+            view.show(state, walk.contacts, extra=view.walking(walk, state))
+
+        walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of the robot, then.
+        Raises `InputError` for those of another robot.
+        """
+        self.painter.check_robot("walk", of_kind("walk", walk, Walk).robot)
+        self.painter.check_robot("state", of_kind("state", state, State).robot)
+        return walks.walking(walk, state, self._look)
+
+    def step(self, step: Step, t: float, state: State) -> Picture:
+        """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s. state: of the robot, then."""
+        self.painter.check_robot("state", of_kind("state", state, State).robot)
+        return walks.step(step, t, state, self._look)
+
+    @property
+    def _look(self) -> walks.Look:
+        return walks.Look(self.painter.size, self.painter.ground or LEVEL, self.painter.text)
+
     def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
         """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove everything else."""
         if self._moving:
-            self.window.put(wire.end_animation())
+            self.window.put([self._following(ROBOT), *wire.end_animation()])
             self._moving = False
         self.canvas.draw(picture)
         self._caption(kinds(picture), title, ghost_name)
@@ -187,6 +212,7 @@ class Viewer:
         cones: bool = True,
         support: bool = False,
         ghost: State | None = None,
+        steps: Iterable[Step] = (),
         follow: bool = True,
         paused: bool = False,
         title: str | None = None,
@@ -200,7 +226,8 @@ class Viewer:
         rate: pictures drawn for each second of the record.
         planned: whether to draw the planned forces too.
         com, cones, support, ghost, title, ghost_name: as for `show`.
-        follow: whether the camera moves with the robot.
+        steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step` makes them.
+        follow: whether the camera goes with the robot, smoothly and at its own height; afterwards, too.
         paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
@@ -209,21 +236,27 @@ class Viewer:
             raise InputError("the record has no rows, so there is nothing to play.")
         _check_flags(planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused)
         _check_texts(title=title, ghost_name=ghost_name)
-        rows = recording.thinned(rollout.time, positive("rate", rate, "1/s"))
+        rows, planned_steps = recording.thinned(rollout.time, positive("rate", rate, "1/s")), walks.checked_steps(steps)
+        states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
+        times = rollout.time[rows].tolist()
         pictures = [
             self.painter.picture(
-                State(self.robot, rollout.q[i], rollout.v[i]),
+                state,
                 rollout.contacts,
                 rollout.measured[i],
                 rollout.planned[i] if planned and np.isfinite(rollout.planned[i]).all() else None,
                 com=com, cones=cones, support=support, ghost=ghost, push=recording.push_at(rollout, i),
                 lifted=recording.lifted_at(rollout, i),
+                extra=None if (step := walks.step_at(planned_steps, t)) is None else self.step(step, t, state),
             )
-            for i in rows
+            for i, t, state in zip(rows, times, states, strict=True)
         ]  # fmt: skip
-        self.play_pictures(rollout.time[rows], pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name)
-        self._last = State(self.robot, rollout.q[rows[0]], rollout.v[rows[0]])
-        self.canvas.set(*self._looking(View(), follow))
+        if follow and self.robot.is_floating:
+            places = recording.smoothed(times, np.array([state.joint_transforms[1][:3, 3] for state in states]))
+            pictures = [picture | {FOLLOWED: shapes.nothing(at)} for picture, at in zip(pictures, places, strict=True)]
+        self.play_pictures(times, pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name)
+        self._last, self._follow = states[0], follow
+        self.canvas.set(*self._looking(View(), FOLLOWED))
         return self
 
     def play_pictures(
@@ -243,10 +276,10 @@ class Viewer:
         self._moving = True
         return self
 
-    def camera(self, view: str | View = "default", follow: bool = False) -> Viewer:
+    def camera(self, view: str | View = "default", follow: bool | None = None) -> Viewer:
         """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`.
 
-        follow: whether the camera moves with the robot when it walks away.
+        follow: whether the camera goes with the robot when it walks away, smoothly and at its own height; None leaves it so.
         Every call undoes how the reader has turned the view, so do not call it each time a slider moves.
         Raises `InputError` for another name.
         """
@@ -254,19 +287,28 @@ class Viewer:
             view = PRESETS[view]
         if not isinstance(view, View):
             raise InputError(f"camera view is {said(view)}; it must be one of {', '.join(PRESETS)}, or a View.")
-        _check_flags(follow=follow)
-        self.canvas.set_again(*self._looking(view, follow))
+        self._follow = self._follow if follow is None else flag("follow", follow)
+        self.canvas.set_again(*self._looking(view, FOLLOWED if self._moving else ROBOT))
         return self
 
-    def _looking(self, view: View, follow: bool) -> tuple[wire.Update, wire.Update]:
-        """The commands that set the camera to a view of the robot where it is now, and whether it follows the robot."""
+    def _looking(self, view: View, followed: str = ROBOT) -> tuple[wire.Update, wire.Update]:
+        """The commands that set the camera to a view of the robot where it is now, and what it follows from there."""
         low, high = self.painter.feet_box if view.feet else self.painter.box
-        moved = np.zeros(3)
-        if self._last is not None:
-            moved[:2] = self._last.com[:2] - self.painter.home.com[:2]
-        target, eye = target_and_eye(view, low + moved, high + moved)
-        base = f"{ROOT}robot/{self.robot.model.names[1]}" if follow and self.robot.is_floating else ""
-        return wire.set_camera(eye, target, view.angle), wire.page_command("set_follow", node=base)
+        target, eye = target_and_eye(view, low + self._moved, high + self._moved)
+        return wire.set_camera(eye, target, view.angle), self._following(followed)
+
+    def _following(self, followed: str) -> wire.Update:
+        """The command that lets the camera follow the robot, or what stands for it in a recording, if it is to follow."""
+        base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
+        follows = self._follow and self.robot.is_floating
+        start = (self._last or self.painter.home).joint_transforms[1][:3, 3]
+        return wire.set_follow(ROOT + base if follows else "", start, self._moved, smooth=followed == ROBOT)
+
+    @property
+    def _moved(self) -> Array:
+        """How far the robot is from where it stands at home, (3,), m, horizontally."""
+        away = np.zeros(3) if self._last is None else self._last.com - self.painter.home.com
+        return np.array([*away[:2], 0.0])
 
     def save(self, path: str | Path, title: str | None = None) -> Path:
         """Write the scene, still or moving, as one HTML file that needs neither server nor network. Returns its path.
@@ -346,9 +388,9 @@ class Viewer:
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
         """Set the title, and the legend of the colours in the picture."""
-        colours = {"push": self.painter.text}
+        colours = dict.fromkeys(("push", "zmp"), self.painter.text)
         items = [
-            [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text]
+            [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text, SYMBOLS.get(kind, "patch")]
             for kind, colour, text in LEGEND
             if kind in shown
         ]

@@ -85,8 +85,19 @@ def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> 
     return encode({"type": "set_camera", "position": eye, "target": at, "fov": angle})
 
 
+def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bool) -> Update:
+    """Let the camera go with the object at the path `node`, at the same height; "" for none.
+
+    start: (3,), m, world, where the object was when the camera was set.
+    begin: (3,), m, how far that is from where it is at home; the scale goes there, too.
+    smooth: whether the camera is a little behind, so that it does not shake with the object.
+    """
+    at, moved = _upright(start), _upright(begin)
+    return encode({"type": "set_follow", "path": "", "node": node, "from": at, "begin": moved, "smooth": smooth})
+
+
 def page_command(kind: str, **values: Any) -> Update:
-    """A command of page.js that belongs to no object: set_title, set_legend, set_follow, set_theme or set_kept."""
+    """A command of page.js that belongs to no object: set_title, set_legend, set_theme or set_kept."""
     return encode({"type": kind, "path": "", **values})
 
 

@@ -92,7 +92,7 @@ def test_a_page_is_told_what_leads_from_one_scene_to_another(window: Window) -> 
         assert number_in(await client.commands()) == 1
         window.put([wire.page_command("set_title", text="other"), wire.delete("/meshcat/gone")])
         window.put([wire.encode({"type": "set_animation", "path": "", "animations": [1], "options": {}})])
-        window.put([wire.page_command("set_follow", node="last")])
+        window.put([wire.set_follow("last", np.zeros(3), np.zeros(3), smooth=True)])
         while not any(command["type"] == "set_follow" for command in await client.commands()):
             pass
         window.open_display()

@@ -89,7 +89,7 @@ def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hid
     np.testing.assert_allclose(colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6)
     times, faint = moving["cone/RR_foot/surface", "shape.material.opacity"]  # its force ends
     np.testing.assert_allclose(faint[:, 0], np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"]), atol=1e-6)
-    legend = [text for _, text in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
+    legend = [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
     assert "friction cone: no force" in legend
     times, visible = moving["measured/RR_foot", ".visible"]
     np.testing.assert_array_equal(visible[:, 0], times <= 1.5)

@@ -325,7 +325,7 @@ def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer: Viewer, stan
 
 
 def legend(viewer: Viewer) -> list[str]:
-    return [text for _, text in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
+    return [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
 
 
 def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
@@ -354,7 +354,11 @@ def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing
     view = Viewer(go2, background=background)
     view.show(standing, push=("base", [0.0, 30.0, 0.0]))
     assert material(view, "/meshcat/push")["depthTest"] is False
-    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [hexadecimal(BACKGROUNDS[background][3]), "push"]
+    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [
+        hexadecimal(BACKGROUNDS[background][3]),
+        "push",
+        "patch",
+    ]
     view.close()
 
 
