@@ -1,0 +1,18 @@
+"""Lesson 05, Steering the centre of mass."""
+
+from floatbase.lessons.lesson05.exercises import EXERCISES
+from floatbase.lessons.lesson05.helpers import (
+    GivenForces,
+    com_in_base,
+    leans,
+    reaching,
+    rose_controller,
+    squeezes,
+    three_feet,
+)
+from floatbase.lessons.lesson05.pictures import planned_pull, price_of_preference, show_forces, two_norms
+
+__all__ = [
+    "EXERCISES", "GivenForces", "com_in_base", "leans", "planned_pull", "price_of_preference", "reaching", "rose_controller",
+    "show_forces", "squeezes", "three_feet", "two_norms",
+]  # fmt: skip
