@@ -10,9 +10,9 @@ from floatbase.lessons.lesson05.helpers import (
     squeezes,
     three_feet,
 )
-from floatbase.lessons.lesson05.pictures import planned_pull, price_of_preference, show_forces, two_norms
+from floatbase.lessons.lesson05.pictures import planned_pull, price_of_preference, show_forces, show_moved_com, two_norms
 
 __all__ = [
     "EXERCISES", "GivenForces", "com_in_base", "leans", "planned_pull", "price_of_preference", "reaching", "rose_controller",
-    "show_forces", "squeezes", "three_feet", "two_norms",
+    "show_forces", "show_moved_com", "squeezes", "three_feet", "two_norms",
 ]  # fmt: skip

@@ -55,8 +55,8 @@ def _moments() -> dict[str, Callable[[], Any]]:
         ),
         "These are moments about the world's origin: subtract x_c.": moments(lambda state: np.zeros(3)),
         "The unit: this is in N·mm; lengths are in m.": moments(com, 1000.0),
-        "The right blocks in another order: λ begins with the force at the first row of `x_feet`.": moments(com, 1.0, (2, 1, 0)),
-        "The right blocks in a wrong order: λ has the feet as `x_feet` has them.": moments(com, 1.0, (1, 0, 2)),
+        "The right blocks in the opposite order: λ begins with the first row of `x_feet`.": moments(com, feet=(2, 1, 0)),
+        "The right blocks in a wrong order: λ has the feet as `x_feet` has them.": moments(com, feet=(1, 0, 2)),
     }
 
 
@@ -135,13 +135,12 @@ def _torques() -> dict[str, Callable[[], Any]]:
         "These hold all joints still, the arm too. The same forces can be had for less.": still(pressed),
         "These hold the robot still without the squeeze.": still(standing_forces),
         "These are for the forces of standing still; `pressed` has 20 N more between the front feet.": lambda: (
-            np.linalg.pinv(fb.forces_from_torques(arm_robot()).A)
-            @ (standing_forces() - fb.forces_from_torques(arm_robot()).b)
+            np.linalg.pinv(fb.forces_from_torques(arm_robot()).A) @ (standing_forces() - fb.forces_from_torques(arm_robot()).b)
         ),
     }
 
 
-def _wish_60(eom: EquationsOfMotion) -> fb.Quadratic:
+def _cost_60(eom: EquationsOfMotion) -> fb.Quadratic:
     return wrench_objective(eom.state, eom.contacts, [FORWARDS, 0.0, eom.robot.weight], [0.0, 0.0, 0.0])
 
 
@@ -149,7 +148,7 @@ def _first_design() -> dict[str, Any]:
     """What the stub of exercise 05.4 names."""
     eom = standing_go2()
     return {
-        "wish60": _wish_60(eom),
+        "cost60": _cost_60(eom),
         "force_bias": force_bias,
         "tangential_bias": tangential_bias,
         "contacts": eom.contacts,
@@ -198,7 +197,7 @@ def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
     record = fb.rollout(fb.Simulation(eom.robot, MOST_LEAN), GivenForces(eom.robot, eom.contacts, forces), SHORT)
     slip = record.slip().max() if record.outcome == "completed" else np.inf
     if slip > MOST_SLIP:
-        return Verdict(False, "On paper it is right, but on the physics, with μ = 0.5, a foot slips: stay a little further inside.")
+        return Verdict(False, "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further inside.")
     speed = record.final.com_velocity[0]
     return Verdict(True, f"On MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
 
@@ -265,10 +264,10 @@ EXERCISES = (
     Exercise(
         name="05.4",
         statement="A cost on λ: 60 N forwards beside the weight, within 1 N and 0.1 N·m, and no foot leans by more than 0.5.",
-        stub="design = wish60 + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
+        stub="design = cost60 + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
         solution="whole = np.array([60, 0, robot.weight])  # where all forces together point\n"
         "leaning = fb.Contacts.points(robot, normals=whole / np.linalg.norm(whole))\n"
-        "design = wish60 + 1e-3 * tangential_bias(leaning)",
+        "design = cost60 + 1e-3 * tangential_bias(leaning)",
         judge=_judge_design,
         names=_first_design,
         explanation="(23) calls a force without friction the best, and shares the friction equally. Where friction is the "
