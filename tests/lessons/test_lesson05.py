@@ -7,24 +7,27 @@ from typing import Any
 import numpy as np
 import pytest
 from hints import missed, right
+from matplotlib.colors import to_hex
 
 import floatbase as fb
 from floatbase.dynamics import internal_forces, torque_force_matrix
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson05 import (
     GivenForces,
+    arm_robot,
     com_in_base,
     leans,
     planned_pull,
+    pressed,
     price_of_preference,
     reaching,
     rose_controller,
     show_forces,
+    show_moved_com,
     squeezes,
     three_feet,
     two_norms,
 )
-from floatbase.lessons.lesson05.exercises import arm_robot, pressed
 from floatbase.objectives import (
     com_wrench,
     desired_wrench,
@@ -35,6 +38,7 @@ from floatbase.objectives import (
     torque_for_forces,
     wrench_objective,
 )
+from floatbase.viewer import GREYS, hexadecimal
 
 GO2 = fb.load("go2")
 EOM = standing_go2()
@@ -225,9 +229,18 @@ def test_the_pictures_are_drawn() -> None:
         assert "(60, 0, 0) N" in note and "(0, 0, 0) N·m" in note
         assert {"wish", "wrench"} <= {path.split("/")[0] for path in view.canvas.picture}
         assert "(60" in show_forces(view, EOM.state, EOM.contacts, forces) and "wish" not in view.canvas.picture
-        for path in ("planned", "wrench", "cone"):
-            assert path in {name.split("/")[0] for name in view.canvas.picture}
     finally:
         view.close()
-    assert len(two_norms().axes[0].lines) == 2
-    assert len(price_of_preference([1, 10], [60, 50], [0.8, 0.4], mu=0.7, wish=60).axes) == 2
+    arm_view = fb.Viewer(reaching(0.0).robot)
+    try:
+        drawn = show_moved_com(arm_view, reaching(1.0), reaching(0.0), "before").canvas.picture
+        np.testing.assert_allclose(drawn["before/spot"].matrix[:2, 3], reaching(0.0).com[:2], atol=ROUNDING)
+    finally:
+        arm_view.close()
+
+
+def test_curves_of_anything_but_forces_are_grey() -> None:
+    greys = {hexadecimal(grey) for grey in GREYS}
+    for figure, count in ((two_norms(), 1), (price_of_preference([1, 10], [60, 50], [0.8, 0.4], mu=0.7, wish=60), 2)):
+        assert len(figure.axes) == count
+        assert {to_hex(line.get_color()).upper() for axis in figure.axes for line in axis.lines} <= greys

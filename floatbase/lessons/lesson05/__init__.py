@@ -3,8 +3,10 @@
 from floatbase.lessons.lesson05.exercises import EXERCISES
 from floatbase.lessons.lesson05.helpers import (
     GivenForces,
+    arm_robot,
     com_in_base,
     leans,
+    pressed,
     reaching,
     rose_controller,
     squeezes,
@@ -13,6 +15,6 @@ from floatbase.lessons.lesson05.helpers import (
 from floatbase.lessons.lesson05.pictures import planned_pull, price_of_preference, show_forces, show_moved_com, two_norms
 
 __all__ = [
-    "EXERCISES", "GivenForces", "com_in_base", "leans", "planned_pull", "price_of_preference", "reaching", "rose_controller",
-    "show_forces", "show_moved_com", "squeezes", "three_feet", "two_norms",
+    "EXERCISES", "GivenForces", "arm_robot", "com_in_base", "leans", "planned_pull", "pressed", "price_of_preference",
+    "reaching", "rose_controller", "show_forces", "show_moved_com", "squeezes", "three_feet", "two_norms",
 ]  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
 from floatbase.lessons.lesson03 import standing_go2, standing_still
-from floatbase.lessons.lesson05.helpers import GivenForces, leans, three_feet
+from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, three_feet
 from floatbase.objectives import force_bias, momentum_rate, tangential_bias, wrench_objective
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
@@ -81,22 +80,6 @@ def _forces() -> dict[str, Callable[[], Any]]:
         "9.81 is an acceleration; times the mass it is a force.": lambda: m * UPWARDS + g,
         "Weight times acceleration: the weight is m g already.": lambda: robot.weight * UPWARDS + weight,
     }
-
-
-@cache
-def arm_robot() -> EquationsOfMotion:
-    """(7) of anymal_kinova standing on four feet."""
-    robot = fb.load("anymal_kinova")
-    return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
-
-
-def pressed() -> Array:
-    """The forces of exercise 05.3, shape (12,), N, world: those of standing still, with 20 N between the front feet."""
-    space = fb.feasible_space(arm_robot())
-    forces = space.forces(standing_still(space)).copy()
-    for foot, side in (("LF_FOOT", 20.0), ("RF_FOOT", -20.0)):
-        forces[arm_robot().contacts.force_slice(foot)] += [0.0, side, 0.0]
-    return np.asarray(forces)
 
 
 def _smallest_by_zeta() -> Array:

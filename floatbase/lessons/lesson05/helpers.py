@@ -12,6 +12,7 @@ from floatbase._arrays import Array, checked, flat_forces
 from floatbase.control import AnalyticController
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.controllers import Torques
+from floatbase.lessons.lesson03 import standing_still
 from floatbase.objectives import torque_for_forces
 from floatbase.robots import Robot
 
@@ -86,3 +87,19 @@ def three_feet() -> EquationsOfMotion:
     """(7) of go2, tilted and moving, on all feet but FL."""
     robot = fb.load("go2")
     return fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7).without("FL_foot"))
+
+
+@cache
+def arm_robot() -> EquationsOfMotion:
+    """(7) of anymal_kinova standing on four feet."""
+    robot = fb.load("anymal_kinova")
+    return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
+
+
+def pressed() -> Array:
+    """The forces of exercise 05.3, shape (12,), N, world: those of standing still, with 20 N between the front feet."""
+    space = fb.feasible_space(arm_robot())
+    forces = space.forces(standing_still(space)).copy()
+    for foot, side in (("LF_FOOT", 20.0), ("RF_FOOT", -20.0)):
+        forces[arm_robot().contacts.force_slice(foot)] += [0.0, side, 0.0]
+    return np.asarray(forces)
