@@ -234,7 +234,7 @@ def test_the_pictures_are_drawn() -> None:
     arm_view = fb.Viewer(reaching(0.0).robot)
     try:
         drawn = show_moved_com(arm_view, reaching(1.0), reaching(0.0), "before").canvas.picture
-        np.testing.assert_allclose(drawn["before/spot"].matrix[:2, 3], reaching(0.0).com[:2], atol=ROUNDING)
+        np.testing.assert_allclose(drawn["earlier/spot"].matrix[:2, 3], reaching(0.0).com[:2], atol=ROUNDING)
     finally:
         arm_view.close()
 

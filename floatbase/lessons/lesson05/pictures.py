@@ -46,10 +46,10 @@ def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> 
     name: what the legend calls the ghost.
     """
     x, y, _ = before.com
-    spot = shapes.contact_patch([x, y, 0.0], [0.0, 0.0, 1.0], 0.02 * view.painter.size)
-    stem = shapes.rod([x, y, 0.0], np.eye(3), before.com[2], 0.002 * view.painter.size, GREYS[0])
-    view.show(now, ghost=before, ghost_name=name, extra={"before/spot": spot, "before/stem": stem})
-    return view.camera(View(50.0, 32.0, 0.8))
+    spot = shapes.contact_patch([x, y, 0.0], [0.0, 0.0, 1.0], 0.035 * view.painter.size)
+    stem = shapes.rod([x, y, 0.0], np.eye(3), before.com[2], 0.005 * view.painter.size, GREYS[0])
+    view.show(now, ghost=before, ghost_name=name, extra={"earlier/spot": spot, "earlier/stem": stem})
+    return view.camera(View(20.0, 24.0, 0.75))
 
 
 def price_of_preference(weights: npt.ArrayLike, forces: npt.ArrayLike, lean: npt.ArrayLike, mu: float, wish: float) -> Figure:
@@ -92,5 +92,6 @@ def planned_pull(record: Rollout, until: float) -> Figure:
     plots.plot_forces(record, axis)
     axis.axhline(0.0, color=hexadecimal(GREYS[0]), linewidth=1.0)
     axis.set(xlim=(0.0, until), ylim=RANGE)
+    axis.legend(loc="lower left", fontsize="small")
     plt.close(figure)
     return figure
