@@ -1,4 +1,4 @@
-"""Lesson 05, Steering the centre of mass: forces with the wrench that they make, and what a preference costs."""
+"""Lesson 05, Steering the centre of mass: forces with the wrench that they make, a plan that pulls."""
 
 from __future__ import annotations
 
@@ -50,27 +50,6 @@ def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> 
     stem = shapes.rod([x, y, 0.0], np.eye(3), before.com[2], 0.005 * view.painter.size, GREYS[0])
     view.show(now, ghost=before, ghost_name=name, extra={"earlier/spot": spot, "earlier/stem": stem})
     return view.camera(View(20.0, 24.0, 0.75))
-
-
-def price_of_preference(weights: npt.ArrayLike, forces: npt.ArrayLike, lean: npt.ArrayLike, mu: float, wish: float) -> Figure:
-    """What is left of a wish, and how far the worst force leans, over the weight of a preference.
-
-    weights: shape (n,). forces: shape (n,), N, f_c along the wish. lean: shape (n,), the largest lean of any foot.
-    mu: drawn beside the lean. wish: N, drawn beside the force.
-    """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained", sharex=True)
-    dark, light = hexadecimal(GREYS[0]), hexadecimal(GREYS[1])
-    for ax, values, limit, name, label in (
-        (left, forces, wish, "wished for", "force at the centre of mass [N]"),
-        (right, lean, mu, "μ", "largest lean of a foot"),
-    ):
-        ax.semilogx(np.asarray(weights), np.asarray(values), color=dark, linewidth=2)
-        ax.axhline(limit, color=light, linestyle="--", linewidth=1.5, label=name)
-        ax.set(xlabel="weight of the preference", ylabel=label, ylim=(0, None))
-        ax.grid(alpha=0.3)
-        ax.legend(loc="lower left")
-    plt.close(figure)
-    return figure
 
 
 def two_norms() -> Figure:
