@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from hints import missed, right
-from matplotlib.colors import to_hex
 
 import floatbase as fb
 from floatbase.dynamics import internal_forces, torque_force_matrix
@@ -25,7 +24,6 @@ from floatbase.lessons.lesson05 import (
     show_moved_com,
     squeezes,
     three_feet,
-    two_norms,
 )
 from floatbase.objectives import (
     com_wrench,
@@ -37,7 +35,6 @@ from floatbase.objectives import (
     torque_for_forces,
     wrench_objective,
 )
-from floatbase.viewer import GREYS, hexadecimal
 
 GO2 = fb.load("go2")
 EOM = standing_go2()
@@ -153,10 +150,14 @@ def test_05_4_knows_what_is_wrong() -> None:
     share = GO2.weight / 4
     wrong = [
         (COST + 1e-3 * force_bias(EOM.contacts, 0.1, share), "foot FL leans 0.79"),
-        (COST + force_bias(EOM.contacts, 0.1, share), "f_c is 46.8 N"),
+        (COST + force_bias(EOM.contacts, 0.1, share), "f_c is (46.8, 0, 158) N"),
         (COST + 1e-3 * force_bias(EOM.contacts, 10.0, share), "the moment is not"),
         (fb.Quadratic.from_residual(np.eye(12), pulling), "a foot pulls"),
         (COST.pullback(fb.forces_from_torques(arm_robot())), "18 numbers"),
+        (COST.pullback(fb.forces_from_torques(EOM)), "a cost on τ"),
+        (leaning().pullback(fb.forces_from_torques(EOM)), "a cost on τ"),
+        (force_bias(EOM.contacts, 0.1, share), "f_c is (0, 0, 158) N"),
+        (leaning(direction=[30.0, 0.0, GO2.weight]), "leans"),
         (smallest, "Give the cost"),
         (-1.0 * COST, "no least point"),
         (None, "no answer yet"),
@@ -236,9 +237,3 @@ def test_the_pictures_are_drawn() -> None:
         np.testing.assert_allclose(drawn["earlier/spot"].matrix[:2, 3], reaching(0.0).com[:2], atol=ROUNDING)
     finally:
         arm_view.close()
-
-
-def test_curves_of_anything_but_forces_are_grey() -> None:
-    greys = {hexadecimal(grey) for grey in GREYS}
-    drawn = {to_hex(line.get_color()).upper() for line in two_norms().axes[0].lines}
-    assert len(drawn) == 2 and drawn <= greys

@@ -12,9 +12,9 @@ from floatbase.lessons.lesson05.helpers import (
     squeezes,
     three_feet,
 )
-from floatbase.lessons.lesson05.pictures import planned_pull, show_forces, show_moved_com, two_norms
+from floatbase.lessons.lesson05.pictures import planned_pull, show_forces, show_moved_com
 
 __all__ = [
     "EXERCISES", "GivenForces", "arm_robot", "com_in_base", "leans", "planned_pull", "pressed",
-    "reaching", "rose_controller", "show_forces", "show_moved_com", "squeezes", "three_feet", "two_norms",
+    "reaching", "rose_controller", "show_forces", "show_moved_com", "squeezes", "three_feet",
 ]  # fmt: skip

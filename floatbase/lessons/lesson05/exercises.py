@@ -13,11 +13,13 @@ from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
 from floatbase.lessons.lesson03 import standing_go2, standing_still
 from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, three_feet
+from floatbase.lessons.rounding import about
 from floatbase.objectives import force_bias, momentum_rate, tangential_bias, wrench_objective
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
 FORWARDS = 60.0  # N, of exercise 05.4
 MOST_LEAN, MISSED_FORCE, MISSED_MOMENT = 0.5, 1.0, 0.1  # of a foot; N; N·m: what exercise 05.4 allows
+ROUNDING = 1e-6  # of a lean that is just what is allowed
 SHORT = 0.1  # s on the physics
 MOST_SLIP = 0.005  # m; the engine's soft contact gives way by 2 mm without a slip
 
@@ -161,18 +163,26 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
     force = points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight]
     moment = np.cross(eom.contacts.positions(state) - state.com, points).sum(axis=0)
     if np.linalg.norm(force) > MISSED_FORCE:
-        f_c = f"{force[0] + FORWARDS:.1f} N forwards and {force[2] + eom.robot.weight:.1f} N upwards"
-        return Verdict(False, f"The wish pays: f_c is {f_c}. A smaller weight for the preference, or a better preference.")
+        if _is_on_torques(eom, forces):
+            return Verdict(False, "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the pullback.")
+        f_c = about(points.sum(axis=0), "N", digits=3)
+        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. A smaller weight for the preference, or a better preference.")
     if np.linalg.norm(moment) > MISSED_MOMENT:
         return Verdict(False, f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.")
     if points[:, 2].min() <= 0:
         return Verdict(False, "The wrench is right, but a foot pulls on the ground.")
     lean = leans(eom.contacts, forces)
-    if lean.max() > MOST_LEAN:
+    if lean.max() > MOST_LEAN + ROUNDING:
         worst = eom.contacts.names[int(np.argmax(np.round(lean, 4)))].split("_")[0]
         prefers = "What does your preference call a good direction for a force, and which would be better?"
         return Verdict(False, f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}")
     return None
+
+
+def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
+    """Whether a least point of twelve numbers has the wrench that is wished for, or nearly, when it is taken as τ."""
+    points = fb.forces_from_torques(eom)(torques).reshape(-1, 3)
+    return bool(np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight]) < 0.1 * eom.robot.weight)
 
 
 def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:

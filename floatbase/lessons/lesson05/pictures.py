@@ -52,19 +52,6 @@ def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> 
     return view.camera(View(20.0, 24.0, 0.75))
 
 
-def two_norms() -> Figure:
-    """‖x‖ and ½‖x‖² of one number: only the second is quadratic."""
-    x = np.linspace(-2, 2, 81)
-    figure, ax = plt.subplots(figsize=(4.6, 2.6), layout="constrained")
-    for y, colour, style, name in ((np.abs(x), GREYS[1], "--", "½‖x‖"), (x**2, GREYS[0], "-", "½‖x‖²")):
-        ax.plot(x, 0.5 * y, style, color=hexadecimal(colour), label=name, linewidth=2)
-    ax.set(xlabel="friction at a foot [N]", ylabel="cost")
-    ax.grid(alpha=0.3)
-    ax.legend()
-    plt.close(figure)
-    return figure
-
-
 def planned_pull(record: Rollout, until: float) -> Figure:
     """Normal forces that were planned and measured up to a time in s, N, with a line at zero. Beyond `RANGE` they are cut."""
     figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
