@@ -44,6 +44,7 @@ PICTURE = VIEW.painter.picture(STATE, CONTACTS)
 COST = fb.Quadratic(np.eye(12), np.ones(12))
 NORMAL = np.array([0.1, 0.0, 1.0])
 AXES = plt.figure().gca()
+POLAR = plt.figure().add_subplot(projection="polar")
 SIM = fb.Simulation(ROBOT)
 LIVE = Live(SIM, CONTROLLER, lambda record: None)
 GAIT = Gait.trot(ROBOT, start=0.0)
@@ -122,7 +123,7 @@ EXAMPLES: dict[str, Any] = {
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
     "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
-    "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
+    "plot_roses.axis": POLAR, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,
     "bulk_modulus": 1.3e9,
     "column": "force", "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,

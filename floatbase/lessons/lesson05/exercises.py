@@ -1,0 +1,269 @@
+"""Exercises of lesson 05, Steering the centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
+from floatbase.lessons.lesson03 import standing_go2, standing_still
+from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, three_feet
+from floatbase.lessons.rounding import about
+from floatbase.objectives import force_bias, momentum_rate, tangential_bias, wrench_objective
+
+UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
+FORWARDS = 60.0  # N, of exercise 05.4
+MOST_LEAN, MISSED_FORCE, MISSED_MOMENT = 0.5, 1.0, 0.1  # of a foot; N; N·m: what exercise 05.4 allows
+ROUNDING = 1e-6  # of a lean that is just what is allowed
+SHORT = 0.1  # s on the physics
+MOST_SLIP = 0.005  # m; the engine's soft contact gives way by 2 mm without a slip
+
+
+def _moments_by_jacobian() -> Array:
+    """G_τ from the base's rows of J: the moment at the base's origin, moved to the centre of mass."""
+    state, J = three_feet().state, three_feet().J
+    pose = state.frame_pose("base")
+    at_base = pose.rotation @ J[:, 3:6].T
+    return at_base + _blocks([pose.translation - state.com] * 3)
+
+
+def _blocks(levers: Any, order: float = 1.0) -> Array:
+    """One matrix of a cross product for each lever, side by side."""
+    return order * np.hstack([np.cross(lever, np.eye(3)).T for lever in levers])
+
+
+def _moments() -> dict[str, Callable[[], Any]]:
+    def moments(about: Callable[[fb.State], Any], factor: float = 1.0, feet: Any = (0, 1, 2)) -> Callable[[], Array]:
+        def value() -> Array:
+            state = three_feet().state
+            return factor * _blocks(three_feet().contacts.positions(state)[list(feet)] - about(state))
+
+        return value
+
+    def com(state: fb.State) -> Any:
+        return state.com
+
+    return {
+        "There is nothing there yet: a foot beside the centre of mass has a lever.": lambda: np.zeros((3, 9)),
+        "The opposite moment: the lever goes from x_c to the foot, and r × y, r × x are columns, not rows.": moments(com, -1.0),
+        "These are moments about the base's origin; x_c is another point.": moments(
+            lambda state: state.frame_pose("base").translation
+        ),
+        "These are moments about the world's origin: subtract x_c.": moments(lambda state: np.zeros(3)),
+        "The unit: this is in N·mm; lengths are in m.": moments(com, 1000.0),
+        "The right blocks in the opposite order: λ begins with the first row of `x_feet`.": moments(com, feet=(2, 1, 0)),
+        "The right blocks in a wrong order: λ has the feet as `x_feet` has them.": moments(com, feet=(1, 0, 2)),
+    }
+
+
+def _force_by_momentum() -> Array:
+    """By the momentum of all links: some q̈ that accelerates the centre of mass so, and what has to change it."""
+    state = standing_go2().state
+    rate = momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
+    return np.asarray(rate - state.robot.mass * state.robot.model.gravity.linear)
+
+
+def _forces() -> dict[str, Callable[[], Any]]:
+    robot = standing_go2().robot
+    m, weight = robot.mass, np.array([0.0, 0.0, robot.weight])
+    g = weight / m
+    return {
+        "That holds it still. What accelerates it comes on top.": lambda: weight,
+        "Gravity is forgotten: the ground must carry the weight, too.": lambda: m * UPWARDS,
+        "The sign of gravity: it pulls down, so the ground must push up by more.": lambda: m * UPWARDS - weight,
+        "The weight counts twice.": lambda: m * UPWARDS + 2 * weight,
+        "The mass is forgotten: these are m/s², not N.": lambda: UPWARDS + g,
+        "The mass is forgotten in one of the two parts.": lambda: UPWARDS + weight,
+        "9.81 is an acceleration; times the mass it is a force.": lambda: m * UPWARDS + g,
+        "Weight times acceleration: the weight is m g already.": lambda: robot.weight * UPWARDS + weight,
+    }
+
+
+def _smallest_by_zeta() -> Array:
+    """By (9) alone: the shortest τ with ζ(τ) = λ."""
+    zeta = fb.forces_from_torques(arm_robot())
+    return np.asarray(np.linalg.pinv(zeta.A) @ (pressed() - zeta.b))
+
+
+def _torques() -> dict[str, Callable[[], Any]]:
+    def torques(offset: float = 1.0, forces: float = 1.0, back: Callable[[Array], Array] = np.linalg.pinv) -> Callable[[], Any]:
+        def value() -> Array:
+            C, a = torque_force_matrix(arm_robot())
+            return back(C[:, :18]) @ (offset * a - forces * C[:, 18:] @ pressed())
+
+        return value
+
+    def whole() -> Array:
+        C, a = torque_force_matrix(arm_robot())
+        return np.asarray((np.linalg.pinv(C) @ a)[:18])
+
+    def still(forces: Callable[[], Array]) -> Callable[[], Array]:
+        return lambda: arm_robot().h[6:] - arm_robot().J[:, 6:].T @ forces()
+
+    def standing_forces() -> Array:
+        space = fb.feasible_space(arm_robot())
+        return space.forces(standing_still(space))
+
+    return {
+        "There is nothing there yet: without torques the feet carry hardly anything.": lambda: np.zeros(18),
+        "The pseudo-inverse of the whole C gives the shortest (τ, λ). λ is not to be chosen: it is `pressed`.": whole,
+        "a is forgotten: gravity is in it.": torques(offset=0.0),
+        "λ is forgotten: move C_λ λ to the right side, then solve for τ.": torques(forces=0.0),
+        "The sign of C_λ λ: it changes when it moves to the right side.": torques(forces=-1.0),
+        "The sign of a.": torques(offset=-1.0),
+        "A transpose is no inverse: use the pseudo-inverse of C_τ.": torques(back=np.transpose),
+        "These hold all joints still, the arm too. The same forces can be had for less.": still(pressed),
+        "These hold the robot still without the squeeze.": still(standing_forces),
+        "These are for the forces of standing still; `pressed` has 20 N more between the front feet.": lambda: (
+            np.linalg.pinv(fb.forces_from_torques(arm_robot()).A) @ (standing_forces() - fb.forces_from_torques(arm_robot()).b)
+        ),
+    }
+
+
+def _cost_60(eom: EquationsOfMotion) -> fb.Quadratic:
+    return wrench_objective(eom.state, eom.contacts, [FORWARDS, 0.0, eom.robot.weight], [0.0, 0.0, 0.0])
+
+
+def _first_design() -> dict[str, Any]:
+    """What the stub of exercise 05.4 names."""
+    eom = standing_go2()
+    return {
+        "cost60": _cost_60(eom),
+        "force_bias": force_bias,
+        "tangential_bias": tangential_bias,
+        "contacts": eom.contacts,
+        "robot": eom.robot,
+    }
+
+
+def _judge_design(answer: Any) -> Verdict:
+    """Any cost on λ whose least point does what exercise 05.4 states, on paper and on the physics."""
+    eom = standing_go2()
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
+    if not isinstance(answer, fb.Quadratic):
+        return Verdict(False, f"Give the cost, an fb.Quadratic on λ, not its minimiser or {type(answer).__name__}.")
+    if answer.n != eom.k:
+        return Verdict(False, f"This is a cost on {answer.n} numbers; λ has {eom.k}.")
+    try:
+        forces = answer.minimiser()
+    except fb.FloatbaseError as error:
+        return Verdict(False, f"It has no least point: {error}")
+    return _wrong_forces(eom, forces) or _on_physics(eom, forces)
+
+
+def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
+    """What the forces of a design miss on paper; None where they miss nothing."""
+    points, state = forces.reshape(-1, 3), eom.state
+    force = points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight]
+    moment = np.cross(eom.contacts.positions(state) - state.com, points).sum(axis=0)
+    if np.linalg.norm(force) > MISSED_FORCE:
+        if _is_on_torques(eom, forces):
+            return Verdict(False, "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the pullback.")
+        f_c = about(points.sum(axis=0), "N", digits=3)
+        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. A smaller weight for the preference, or a better preference.")
+    if np.linalg.norm(moment) > MISSED_MOMENT:
+        return Verdict(False, f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.")
+    if points[:, 2].min() <= 0:
+        return Verdict(False, "The wrench is right, but a foot pulls on the ground.")
+    lean = leans(eom.contacts, forces)
+    if lean.max() > MOST_LEAN + ROUNDING:
+        worst = eom.contacts.names[int(np.argmax(np.round(lean, 4)))].split("_")[0]
+        prefers = "What does your preference call a good direction for a force, and which would be better?"
+        return Verdict(False, f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}")
+    return None
+
+
+def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
+    """Whether a least point of twelve numbers has the wrench that is wished for, or nearly, when it is taken as τ."""
+    points = fb.forces_from_torques(eom)(torques).reshape(-1, 3)
+    return bool(np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight]) < 0.1 * eom.robot.weight)
+
+
+def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
+    """Give the forces for a moment on a floor with μ = 0.5."""
+    record = fb.rollout(fb.Simulation(eom.robot, MOST_LEAN), GivenForces(eom.robot, eom.contacts, forces), SHORT)
+    slip = record.slip().max() if record.outcome == "completed" else np.inf
+    if slip > MOST_SLIP:
+        return Verdict(False, "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further inside.")
+    speed = record.final.com_velocity[0]
+    return Verdict(True, f"On MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
+
+
+EXERCISES = (
+    Exercise(
+        name="05.1",
+        statement="G_τ of (21) for three feet, shape (3, 9), from `x_feet` (3, 3) and `x_com` (3,), m, world.",
+        stub="G_three = np.zeros((3, 9))  # replace: from x_feet and x_com",
+        solution="x_feet = three_feet().contacts.positions(three_feet().state)\n"
+        "x_com = three_feet().state.com\n"
+        "levers = x_feet - x_com\n"
+        "G_three = np.hstack([np.cross(lever, np.eye(3)).T for lever in levers])",
+        judge=Shaped(
+            Numeric(
+                right=_moments_by_jacobian,
+                praise="One block for each foot; the base's rows of J say the same.",
+                mistakes=_moments(),
+            ),
+            {
+                (3, 12): "Twelve columns are for four feet; FL is in the air.",
+                (9, 3): "The blocks stand side by side, not below each other: `np.hstack`.",
+                (3, 3): "The blocks stand side by side; added up, they would need one force for all feet.",
+                (3,): "That is a moment. G_τ is the matrix that makes it from λ.",
+            },
+        ),
+        explanation="(21): the columns of a block are r × x, r × y and r × z with r = x_i - x_c.",
+    ),
+    Exercise(
+        name="05.2",
+        statement="f̃_c, shape (3,), N, world: go2 shall accelerate by 0.5 m/s² forwards and 1 m/s² upwards.",
+        stub="f_wish = np.array([0, 0, robot.weight])  # replace",
+        solution="f_wish = robot.mass * np.array([0.5, 0, 1.0]) + np.array([0, 0, robot.weight])",
+        judge=Numeric(
+            right=_force_by_momentum,
+            praise="m a, and m g on top: gravity is the one outside force that is not in λ.",
+            mistakes=_forces(),
+        ),
+        names=lambda: {"robot": standing_go2().robot},
+        explanation="Newton: m a = f_c + m g with g pointing down. `desired_wrench(state, a)` of floatbase.objectives does it.",
+    ),
+    Exercise(
+        name="05.3",
+        statement="The smallest torques, shape (18,), N·m, with which anymal_kinova's feet get the forces `pressed`.",
+        stub="tau_pressed = np.zeros(18)  # replace: from C_tau, C_forces, a and pressed",
+        solution="tau_pressed = np.linalg.pinv(C_tau) @ (a - C_forces @ pressed)",
+        judge=Shaped(
+            Numeric(
+                right=_smallest_by_zeta,
+                praise="(25) in one line: what λ leaves to τ, by the pseudo-inverse of C_τ alone.",
+                mistakes=_torques(),
+            ),
+            {
+                (12,): "12 numbers: those are forces. anymal_kinova has 18 motors.",
+                (30,): "30 numbers: that is (τ, λ); λ is given.",
+                (24,): "24 numbers: those are accelerations, or torques with six zeros for the base.",
+                (18, 1): "This is a matrix with one column; the answer is a vector of shape (18,).",
+            },
+        ),
+        names=lambda: {"pressed": pressed()},
+        explanation="(10) reads C_τ τ + C_λ λ = a. For a given λ that is a linear system for τ, with more unknowns than rows; "
+        "the pseudo-inverse gives its shortest solution. No β is needed.",
+    ),
+    Exercise(
+        name="05.4",
+        statement="A cost on λ: 60 N forwards beside the weight, within 1 N and 0.1 N·m, and no foot leans by more than 0.5.",
+        stub="design = cost60 + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
+        solution="whole = np.array([60, 0, robot.weight])  # where all forces together point\n"
+        "leaning = fb.Contacts.points(robot, normals=whole / np.linalg.norm(whole))\n"
+        "design = cost60 + 1e-3 * tangential_bias(leaning)",
+        judge=_judge_design,
+        names=_first_design,
+        explanation="(23) calls a force without friction the best, and shares the friction equally. Where friction is the "
+        "wish, a better preference is the direction of the whole: then each foot leans as the sum does, by 60 / 158.",
+    ),
+)
