@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 import floatbase as fb
 from floatbase._arrays import Array
-from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose
+from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, wrench_set
 from floatbase.viewer import GREYS, MEASURED, View, Viewer, below, hexadecimal, roses, shapes
 
 NEWTON = 0.01  # m drawn for 1 N at a single foot
@@ -92,6 +92,19 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
     return f"planned lean from the true normal: front {front:.2f}, rear {rear:.2f}; the ground holds 0.70"
 
 
+def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
+    """Draw a robot that stands on a slope, turned with it; from above, as SVG, where its centre of mass may be.
+
+    slope: degrees, up towards x. mu, facets: of its friction polyhedra.
+    """
+    robot, n = view.robot, uphill(slope)
+    start = fb.Simulation(robot, fb.Ground(normal=n)).state
+    contacts = fb.Contacts.points(robot, mu, normals=n)
+    view.draw(view.painter.picture(start, contacts))
+    region = wrench_set(start, contacts, facets=facets).support_region()
+    return region_picture(start, contacts.positions(start), region)
+
+
 def uphill(degrees: float) -> Array:
     """Unit normal of a slope that rises towards x, shape (3,)."""
     angle = np.deg2rad(degrees)
@@ -114,13 +127,14 @@ def region_picture(state: fb.State, feet: Array, region: Array) -> str:
     def seen(points: Array) -> Array:
         return half + s * np.asarray(points)[:, :2] * [1, -1]
 
+    words = "filled: where the CoM may be" if len(region) else "nowhere: the feet cannot carry it"
     drawn = _polygon(seen(feet[ConvexHull(feet[:, :2]).vertices]), "6 4")
     if len(region) > 2:
         drawn += _polygon(seen(region), "", 0.35)
     x, y = seen(state.com[None])[0]
     dots = "".join(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="currentColor"/>' for a, b in seen(feet))
     dots += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="{hexadecimal(GREYS[1])}" stroke="currentColor"/>'
-    return _svg(drawn + dots, "from above, forward to the right", "filled: where the CoM may be", "dashed: the feet's hull")
+    return _svg(drawn + dots, "from above, forward to the right", words, "dashed: the feet's hull, dot: the CoM")
 
 
 def _polygon(corners: Array, dashes: str, opacity: float = 0.12) -> str:
