@@ -13,7 +13,6 @@ from floatbase._arrays import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
 from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson06.pictures import uphill
-from floatbase.objectives import com_wrench
 
 BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5  # of exercise 06.1: normal, not unit; μ; facets
 FACETS, MU = 8, 0.7  # of exercise 06.2
@@ -72,37 +71,48 @@ def _judge_forces(answer: Any) -> Verdict:
     given = numbers(answer, (12,))
     if isinstance(given, Verdict):
         return given
+    f = given.reshape(4, 3)
+    return _out_of_balance(f) or _judge_margins(f)
+
+
+def _out_of_balance(f: Array) -> Verdict | None:
+    """What is wrong with the sum or the moment of forces on the hill, shape (4, 3), N; None where nothing is."""
     state, contacts = on_hill()
-    robot, f = state.robot, given.reshape(4, 3)
-    missing = f.sum(axis=0) - [0.0, 0.0, robot.weight]
-    n = uphill(HILL)
-    if not np.any(f):
-        return Verdict(False, "Nobody carries the robot yet.")
-    if np.linalg.norm(missing + 2 * np.array([0.0, 0.0, robot.weight])) < BALANCE:
-        return Verdict(False, "The sign: λ is what the ground does to the robot, and it pushes upwards.")
-    if np.linalg.norm(f.sum(axis=0) - robot.weight * np.cos(np.deg2rad(HILL)) * n) < BALANCE:
-        return Verdict(False, "These forces carry only the weight's part along the normal: the rest slides downhill.")
-    if np.linalg.norm(f.sum(axis=0) - robot.weight * n) < BALANCE:
-        return Verdict(False, "They add up to the weight along the slope's normal; gravity is vertical.")
-    if np.linalg.norm(missing) > BALANCE:
-        return Verdict(False, f"The sum is {np.linalg.norm(missing):.1f} N away from what carries the weight.")
-    moment = sum(np.cross(x - state.com, each) for x, each in zip(contacts.positions(state), f, strict=True))
-    if np.linalg.norm(moment) > BALANCE:
-        return Verdict(False, f"The sum is right, but a moment of {np.linalg.norm(moment):.1f} N·m is left: go2 would turn over.")
+    weight, n = state.robot.weight, uphill(HILL)
+    carried = weight * np.array([0.0, 0.0, 1.0])
+    missing = float(np.linalg.norm(f.sum(axis=0) - carried))
+    sums = {
+        "Nobody carries the robot yet.": 0.0 * n,
+        "The sign: λ is what the ground does to the robot, and it pushes upwards.": -carried,
+        "These forces carry only the weight's part along the normal: the robot slides.": weight * n[2] * n,
+        "They add up to the weight, but along the slope's normal; gravity is vertical.": weight * n,
+    }
+    for hint, total in sums.items():
+        if np.linalg.norm(f.sum(axis=0) - total) < BALANCE:
+            return Verdict(False, hint)
+    if missing > BALANCE:
+        return Verdict(False, f"The sum is {missing:.1f} N away from what carries the weight.")
+    moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
+    if moment > BALANCE:
+        return Verdict(False, f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.")
+    return None
+
+
+def _judge_margins(f: Array) -> Verdict:
+    """Of forces in balance on the hill, shape (4, 3), N: whether each has room enough in its cone."""
+    names, n = on_hill()[1].names, uphill(HILL)
     margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
-    worst = contacts.names[int(np.argmin(margins))]
+    least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
     if margins.min() >= ROOM:
         return Verdict(True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N.")
-    if upright.min() >= ROOM:
-        return Verdict(False, f"Room enough in cones about the vertical; in the slope's cone {worst} has {margins.min():.1f} N.")
-    slides = np.array([decompose(each, n).f_par for each in f])
-    if np.ptp(slides, axis=0).max() < BALANCE:
-        equal = "All feet get the same tangential force, and the upper ones carry little"
-        return Verdict(False, f"In balance. {equal}: {worst} has a margin of {margins.min():.1f} N.")
+    if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
+        return Verdict(False, f"In balance. But all feet hold alike against sliding, and the upper ones carry little: {least}.")
     if margins.min() >= -BALANCE:
-        return Verdict(False, f"In balance and in the cones, but {worst} has a margin of {margins.min():.1f} N only.")
-    return Verdict(False, f"In balance, but {worst} is outside its cone: its margin is {margins.min():.1f} N.")
+        return Verdict(False, f"In balance and in the cones, but {least} only.")
+    if upright.min() >= ROOM:
+        return Verdict(False, f"In balance, with room enough in cones about the vertical; in the slope's own, {least}.")
+    return Verdict(False, f"In balance, but outside of a cone: {least}.")
 
 
 EXERCISES = (
@@ -125,8 +135,8 @@ EXERCISES = (
                     "That polyhedron lies outside the cone: its facets touch it in their middle.": partial(
                         _rows_from_edges, BANK_MU / np.cos(np.pi / 5)
                     ),
-                    "The normal is not of length one: make it so before its length counts as friction.": lambda: (
-                        _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK)
+                    "The normal is not of length one: make it so before its length counts as friction.": lambda: _with_tangents(
+                        BANK_MU * np.cos(np.pi / 5), BANK
                     ),
                     "The sign: rows @ f ≤ 0 must hold for forces inside.": lambda: -_rows_from_edges(),
                     "The sign of the normal's part: with + the rows forbid to push.": lambda: _with_tangents(
@@ -158,9 +168,11 @@ EXERCISES = (
             mistakes={
                 "At 45° a force straight up needs μ = 1.": lambda: 45.0,
                 "That is in radians.": lambda: np.deg2rad(_slip_angle()),
-                "That is the round cone. A facet faces downhill, and its middle allows less than μ.": partial(_slip_angle, None),
+                "That is the round cone. A facet faces downhill, and its middle allows less than μ.": partial(
+                    _slip_angle, None
+                ),
                 "That is the angle in radians, and of the round cone.": lambda: np.deg2rad(_slip_angle(None)),
-                "A sine: on a slope α_∥ / α_⊥ is the tangent of the angle.": lambda: np.rad2deg(np.arcsin(MU * np.cos(np.pi / 8))),
+                "A sine: on a slope α_∥ / α_⊥ is a tangent.": lambda: np.rad2deg(np.arcsin(MU * np.cos(np.pi / 8))),
                 "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet allows less than μ.": lambda: np.rad2deg(
                     np.arcsin(MU)
                 ),

@@ -102,4 +102,4 @@ def beside_its_feet(robot: fb.Robot, mu: float = 1.0) -> tuple[fb.State, fb.Cont
         at = np.array([robot.standing().frame_pose(foot.frame).translation[0], y, slope * abs(y)])
         places[foot.frame] = at + foot.radius * normals[foot.frame]
     state = with_feet(robot, [0.0, HIGH + 0.03, slope * HIGH + 0.2], places)
-    return state, fb.Contacts.points(robot, mu, normals=normals), fb.Ground(1.2 * mu, normal=[sides["L"], sides["R"]])
+    return state, fb.Contacts.points(robot, mu, normals=normals), fb.Ground(1.2 * mu, normal=np.array([sides["L"], sides["R"]]))

@@ -15,7 +15,8 @@ from floatbase.viewer import GREYS, MEASURED, View, Viewer, below, hexadecimal, 
 
 NEWTON = 0.01  # m drawn for 1 N at a single foot
 TALL = 0.7  # m: height of a single cone
-AROUND = View(25.0, 16.0, 1.0, around=((0.0, 0.0, 0.36), 0.62))
+AROUND = View(25.0, 20.0, 1.0, around=((0.0, 0.0, 0.36), 0.52))  # of a single foot
+FROM_ABOVE = View(180.0, 89.0, 1.0)  # forwards is up, as in the plots
 SIDE = 250  # pixels of a drawing from above
 
 
@@ -46,31 +47,32 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
     """
     inner, outer = (FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside) for inside in (True, False))
     picture = below("inside", shapes.friction_polyhedron(np.zeros(3), inner, TALL, "inside"))
-    picture["cone"] = shapes.friction_cone(np.zeros(3), inner.normal, mu, TALL, "idle")
+    picture["round"] = shapes.friction_cone(np.zeros(3), inner.normal, mu, TALL, "idle")
     picture["patch"] = shapes.contact_patch(np.zeros(3), inner.normal, 0.05)
     view.draw(view.painter.stage() | picture)
     rays = {"inside": (inner.rays, ""), "outside": (outer.rays, "6 4")}
     half = SIDE / 2
     s = 0.64 * half / mu  # pixels for 1: a triangle outside reaches 2 μ, and its corners may be cut
-    drawn = "".join(_polygon(half + s * corners[:, :2] * [1, -1], dashes) for corners, dashes in rays.values())
+    drawn = "".join(_polygon(half + s * _from_above(corners), dashes) for corners, dashes in rays.values())
     circle = f'<circle cx="{half}" cy="{half}" r="{s * mu:.1f}" fill="none" stroke="currentColor" stroke-width="2"/>'
     areas = " · ".join(f"{name} {100 * cone.area_ratio:.0f} %" for name, cone in (("inside", inner), ("outside", outer)))
     weakest = f"weakest {inner.mu_facet:.2f} inside, strongest {np.linalg.norm(outer.rays[0, :2]):.2f} outside"
-    return _svg(drawn + circle, f"{facets} facets from above, forward to the right", f"area: {areas}", weakest)
+    return _svg(drawn + circle, f"{facets} facets from above; forwards is up", f"area: {areas}", weakest)
 
 
 def compass_row(**stances: WrenchSet) -> Figure:
     """Compasses side by side, in one scale: title=the wrenches of a stance. "_" in a title shows as a blank."""
     polar = {"projection": "polar"}
-    figure, axes = plt.subplots(1, len(stances), figsize=(4 * len(stances), 4.6), layout="constrained", subplot_kw=polar)
-    axes = np.atleast_1d(axes)
+    figure, grid = plt.subplots(1, len(stances), figsize=(4 * len(stances), 4.6), layout="constrained", subplot_kw=polar)
+    axes = np.atleast_1d(grid)
     for axis, (title, wrenches) in zip(axes, stances.items(), strict=True):
         roses.plot_compass(wrenches, axis, n=48).set_title(title.replace("_", " "), pad=14)
     most = max(axis.get_rmax() for axis in axes)
     for axis in axes:
         axis.set_rlim(0.0, most)
+        axis.set_xticks(np.pi / 2 * np.arange(4), ["x", "y", "-x", ""])  # the last would lie upon its neighbour's
         axis.get_legend().remove()
-    figure.suptitle("horizontal force at full weight without moment [N]; x is forward", fontsize="medium")
+    figure.suptitle("horizontal force at full weight without moment [N], from above", fontsize="medium")
     plt.close(figure)
     return figure
 
@@ -112,7 +114,7 @@ def uphill(degrees: float) -> Array:
 
 
 def lean(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
-    """α_∥ / α_⊥ of the force at each point, shape (n,): how far it leans from the normal, 0.7 at the surface of a cone of 0.7."""
+    """α_∥ / α_⊥ of the force at each point, shape (n,): how far it leans from the normal; μ at the surface of its cone."""
     parts = [decompose(f, normal) for f in np.reshape(forces, (-1, 3))]
     return np.array([part.alpha_par / part.alpha_perp for part in parts])
 
@@ -122,19 +124,24 @@ def region_picture(state: fb.State, feet: Array, region: Array) -> str:
 
     feet: shape (n, 3), m. region: vertices, shape (k, 2), m, as `support_region` gives them; none says nowhere.
     """
-    half, s = SIDE / 2, SIDE / 0.6  # pixels for 1 m
+    half, s, middle = SIDE / 2, SIDE / 0.6, feet[:, :2].mean(axis=0)  # s: pixels for 1 m
 
     def seen(points: Array) -> Array:
-        return half + s * np.asarray(points)[:, :2] * [1, -1]
+        return half + s * _from_above(np.asarray(points) - middle)
 
     words = "filled: where the CoM may be" if len(region) else "nowhere: the feet cannot carry it"
-    drawn = _polygon(seen(feet[ConvexHull(feet[:, :2]).vertices]), "6 4")
+    drawn = _polygon(seen(feet[ConvexHull(feet[:, :2]).vertices, :2]), "6 4")
     if len(region) > 2:
         drawn += _polygon(seen(region), "", 0.35)
-    x, y = seen(state.com[None])[0]
-    dots = "".join(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="currentColor"/>' for a, b in seen(feet))
+    x, y = seen(state.com[None, :2])[0]
+    dots = "".join(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="currentColor"/>' for a, b in seen(feet[:, :2]))
     dots += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="{hexadecimal(GREYS[1])}" stroke="currentColor"/>'
-    return _svg(drawn + dots, "from above, forward to the right", words, "dashed: the feet's hull, dot: the CoM")
+    return _svg(drawn + dots, "from above; forwards is up", words, "dashed: the feet's hull, dot: the CoM")
+
+
+def _from_above(points: Array) -> Array:
+    """Where horizontal places, shape (n, 2) or more, are in a drawing with x upwards and y to the left."""
+    return np.column_stack([-points[:, 1], -points[:, 0]])
 
 
 def _polygon(corners: Array, dashes: str, opacity: float = 0.12) -> str:
