@@ -150,7 +150,7 @@ def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed
     assert isinstance(controller, ConeController)
     still = fb.rollout(fb.Simulation(controller.robot), controller, 0.1)
     assert still.outcome == "completed" and np.allclose(still.planned[-1], still.measured[-1], atol=1.0)
-    push = fb.Push([0.0, 90.0, 0.0], start=0.0, duration=0.1)
+    push = fb.Push(np.array([0.0, 90.0, 0.0]), start=0.0, duration=0.1)
     pushed = fb.rollout(fb.Simulation(controller.robot), controller, 0.3, [push])
     cones = [FrictionPolyhedron(n, mu, 4) for n, mu in zip(controller.contacts.normals, controller.contacts.mus, strict=True)]
     margins = [[c.margin(f) for c, f in zip(cones, row.reshape(4, 3), strict=True)] for row in pushed.planned]
@@ -167,6 +167,7 @@ def test_torques_of_the_controller_bring_about_the_forces_that_it_plans() -> Non
     now = fb.State(controller.robot, q, 0.1 * np.random.default_rng(1).normal(size=18))
     command = controller(now.q, now.v)
     eom = fb.equations_of_motion(now, controller.contacts)
+    assert command.forces is not None
     assert np.allclose(fb.forces_from_torques(eom)(command.tau), command.forces, atol=1e-6)
 
 

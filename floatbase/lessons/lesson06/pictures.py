@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, wrench_set
-from floatbase.viewer import GREYS, MEASURED, View, Viewer, below, hexadecimal, roses, shapes
+from floatbase.viewer import GREYS, MEASURED, PLANNED, View, Viewer, below, hexadecimal, roses, shapes
 
 NEWTON = 0.01  # m drawn for 1 N at a single foot
 TALL = 0.7  # m: height of a single cone
@@ -41,12 +41,16 @@ def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
 
 
 def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
-    """Draw the polyhedra inside a cone, and the cone; from above, those inside and outside, as SVG with their areas.
+    """Draw the polyhedron inside a cone, the cone, and a force that leans as far forwards as the polyhedron lets it.
+
+    From above, as SVG with their areas: the polyhedra inside and outside.
 
     mu, facets: as for `FrictionPolyhedron`.
     """
     inner, outer = (FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside) for inside in (True, False))
-    picture = below("inside", shapes.friction_polyhedron(np.zeros(3), inner, TALL, "inside"))
+    most = 45.0 * np.array([inner.mu_facet, 0.0, 1.0])  # N: the furthest that facet 0 lets a force lean forwards
+    picture = below("cone", shapes.friction_polyhedron(np.zeros(3), inner, TALL, inner.status(most)))
+    picture["planned"] = shapes.arrow(np.zeros(3), NEWTON * most, PLANNED, view.painter.size)
     picture["round"] = shapes.friction_cone(np.zeros(3), inner.normal, mu, TALL, "idle")
     picture["patch"] = shapes.contact_patch(np.zeros(3), inner.normal, 0.05)
     view.draw(view.painter.stage() | picture)
@@ -63,7 +67,7 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
 def compass_row(**stances: WrenchSet) -> Figure:
     """Compasses side by side, in one scale: title=the wrenches of a stance. "_" in a title shows as a blank."""
     polar = {"projection": "polar"}
-    figure, grid = plt.subplots(1, len(stances), figsize=(4 * len(stances), 4.6), layout="constrained", subplot_kw=polar)
+    figure, grid = plt.subplots(1, len(stances), figsize=(4 * len(stances), 5.0), subplot_kw=polar)
     axes = np.atleast_1d(grid)
     for axis, (title, wrenches) in zip(axes, stances.items(), strict=True):
         roses.plot_compass(wrenches, axis, n=48).set_title(title.replace("_", " "), pad=14)
@@ -72,7 +76,8 @@ def compass_row(**stances: WrenchSet) -> Figure:
         axis.set_rlim(0.0, most)
         axis.set_xticks(np.pi / 2 * np.arange(4), ["x", "y", "-x", ""])  # the last would lie upon its neighbour's
         axis.get_legend().remove()
-    figure.suptitle("horizontal force at full weight without moment [N], from above", fontsize="medium")
+    figure.subplots_adjust(left=0.05, right=0.97, bottom=0.14, top=0.84, wspace=0.25)
+    figure.supxlabel("horizontal force at full weight without moment [N], from above", fontsize="medium")
     plt.close(figure)
     return figure
 
