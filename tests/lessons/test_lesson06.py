@@ -30,7 +30,7 @@ from floatbase.lessons.lesson06 import (
     with_feet,
 )
 from floatbase.objectives import com_wrench
-from floatbase.viewer import CONE, MEASURED, Picture, hexadecimal, shapes
+from floatbase.viewer import CONE, GREYS, MEASURED, Picture, hexadecimal, shapes
 
 UP = np.array([0.0, 0.0, 1.0])
 BANK = np.array([0.3, -0.2, 1.0])
@@ -235,3 +235,16 @@ def test_the_pictures_are_drawn() -> None:
     feet = contacts.positions(state)
     assert region_picture(state, feet, feet[[0, 1, 3, 2], :2]).count("<polygon") == 2
     assert region_picture(state, feet, np.zeros((0, 2))).count("<polygon") == 1
+
+
+def test_drawings_from_above_have_greys_and_the_colour_of_text() -> None:
+    robot = judges.load("go2")
+    state, contacts = robot.standing(), fb.Contacts.points(robot)
+    view = fb.Viewer(robot)
+    try:
+        drawn = [show_polyhedron(view, 0.7, 4), region_picture(state, contacts.positions(state), np.zeros((0, 2)))]
+    finally:
+        view.close()
+    for svg in drawn:
+        assert set(re.findall(r"#[0-9A-F]{6}", svg)) <= {hexadecimal(grey) for grey in GREYS}
+        assert 'fill="currentColor"' in svg and re.findall(r"<text[^>]*\sfill=", svg) == []
