@@ -18,15 +18,11 @@ from floatbase.lessons.controllers import Torques
 from floatbase.objectives import desired_wrench, force_bias, rotational_inertia, torque_for_forces, wrench_objective
 
 STIFFNESS, DAMPING = 100.0, 20.0  # 1/s² and 1/s of the centre of mass and of the base's rotation, as in lesson 05
+FACETS = 4  # of each foot's polyhedron, inside its cone
 BIAS, NORMAL_BIAS = 1e-3, 0.1  # weight of (23) beside (22), and its α, as in lesson 05
 STEEP = 40.0  # degrees: each side of the valley in which the centre of mass stands beside the feet
 HIGH, LOW = 0.16, -0.06  # m: where the left and the right feet stand on its sides, y
 _STEPS, _REACHED, _LARGEST_STEP = 50, 1e-9, 0.2  # of Newton's method for the legs; m; rad
-
-
-def polyhedra(contacts: fb.Contacts, facets: int = 4, inside: bool = True) -> list[FrictionPolyhedron]:
-    """The friction polyhedron of every point of the contacts."""
-    return [FrictionPolyhedron(n, mu, facets, inside) for n, mu in zip(contacts.normals, contacts.mus, strict=True)]
 
 
 class ConeController:
@@ -42,7 +38,8 @@ class ConeController:
 
     def __init__(self, robot: fb.Robot, contacts: fb.Contacts, state: fb.State):
         self.robot, self.contacts, self.state = robot, contacts, of_kind("state", state, fb.State)
-        self._rows = block_diag(*(cone.rows for cone in polyhedra(contacts)))
+        cones = zip(contacts.normals, contacts.mus, strict=True)
+        self._rows = block_diag(*(FrictionPolyhedron(n, mu, FACETS).rows for n, mu in cones))
         self._bias = BIAS * force_bias(contacts, NORMAL_BIAS, robot.weight / contacts.n_points)
 
     def __call__(self, q: Array, v: Array, t: float = 0.0) -> Torques:
