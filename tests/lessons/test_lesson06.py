@@ -53,6 +53,7 @@ def test_06_1_knows_inside_length_sign_friction_turn_normal_and_shape() -> None:
         "Nothing there yet": np.zeros((5, 3)),
         "outside the cone": rows_of(0.5, inside=False),
         "not of length one": d - mu * BANK,
+        "another scale": rows_of(0.5) / np.linalg.norm(rows_of(0.5), axis=1)[:, None],
         "The sign: rows": -rows_of(0.5),
         "The sign of the normal's part": d + mu * n,
         "μ is missing": rows_of(1.0),

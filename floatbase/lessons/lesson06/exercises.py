@@ -19,6 +19,7 @@ FACETS, MU = 8, 0.7  # of exercise 06.2
 LOSS = 0.05  # of exercise 06.3
 HILL, ROOM = 20.0, 3.0  # of exercise 06.4: degrees; N
 BALANCE = 0.1  # N, and N·m: what may be missing in exercise 06.4
+SOLVED = 1e-3  # N: what any solver may leave of the margin in exercise 06.4
 
 
 def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: float = 0.0) -> Array:
@@ -104,7 +105,7 @@ def _judge_margins(f: Array) -> Verdict:
     margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
     least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
-    if margins.min() >= ROOM:
+    if margins.min() >= ROOM - SOLVED:
         return Verdict(True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N.")
     if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
         return Verdict(False, f"In balance. But all feet hold alike against sliding, and the upper ones carry little: {least}.")
@@ -138,6 +139,9 @@ EXERCISES = (
                     "The normal is not of length one: make it so before its length counts as friction.": lambda: _with_tangents(
                         BANK_MU * np.cos(np.pi / 5), BANK
                     ),
+                    "The right half-spaces, in another scale: without the normal's part each row has length one.": lambda: (
+                        _rows_from_edges() / np.linalg.norm(_rows_from_edges(), axis=1)[:, None]
+                    ),
                     "The sign: rows @ f ≤ 0 must hold for forces inside.": lambda: -_rows_from_edges(),
                     "The sign of the normal's part: with + the rows forbid to push.": lambda: _with_tangents(
                         -BANK_MU * np.cos(np.pi / 5)
@@ -168,7 +172,7 @@ EXERCISES = (
             mistakes={
                 "At 45° a force straight up needs μ = 1.": lambda: 45.0,
                 "That is in radians.": lambda: np.deg2rad(_slip_angle()),
-                "That is the round cone. A facet faces downhill, and its middle allows less than μ.": partial(
+                "That is the round cone. A facet faces uphill, where this force leans, and its middle allows less than μ.": partial(
                     _slip_angle, None
                 ),
                 "That is the angle in radians, and of the round cone.": lambda: np.deg2rad(_slip_angle(None)),

@@ -89,7 +89,7 @@ def with_feet(robot: fb.Robot, base: npt.ArrayLike, centres: Mapping[str, npt.Ar
 def beside_its_feet(robot: fb.Robot, mu: float = 1.0) -> tuple[fb.State, fb.Contacts, fb.Ground]:
     """A robot in a steep valley along x, right feet low on one side, left feet high on the other, and the body beyond these.
 
-    mu: friction that the contacts count on; the ground has a little more.
+    mu: friction of the ground, and what the contacts count on.
     """
     angle, slope = np.deg2rad(STEEP), np.tan(np.deg2rad(STEEP))
     sides = {"L": np.array([0.0, -np.sin(angle), np.cos(angle)]), "R": np.array([0.0, np.sin(angle), np.cos(angle)])}
@@ -99,4 +99,4 @@ def beside_its_feet(robot: fb.Robot, mu: float = 1.0) -> tuple[fb.State, fb.Cont
         at = np.array([robot.standing().frame_pose(foot.frame).translation[0], y, slope * abs(y)])
         places[foot.frame] = at + foot.radius * normals[foot.frame]
     state = with_feet(robot, [0.0, HIGH + 0.03, slope * HIGH + 0.2], places)
-    return state, fb.Contacts.points(robot, mu, normals=normals), fb.Ground(1.2 * mu, normal=np.array([sides["L"], sides["R"]]))
+    return state, fb.Contacts.points(robot, mu, normals=normals), fb.Ground(mu, normal=np.array([sides["L"], sides["R"]]))
