@@ -172,7 +172,7 @@ EXERCISES = (
             mistakes={
                 "At 45° a force straight up needs μ = 1.": lambda: 45.0,
                 "That is in radians.": lambda: np.deg2rad(_slip_angle()),
-                "That is the round cone. A facet faces uphill, where this force leans, and its middle allows less than μ.": partial(
+                "That is the round cone. A facet faces uphill, as this force leans; its middle allows less than μ.": partial(
                     _slip_angle, None
                 ),
                 "That is the angle in radians, and of the round cone.": lambda: np.deg2rad(_slip_angle(None)),
