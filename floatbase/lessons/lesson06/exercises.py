@@ -1,0 +1,245 @@
+"""Exercises of lesson 06, Friction cones."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
+from floatbase.lessons.lesson06.pictures import uphill
+
+BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5  # of exercise 06.1: normal, not unit; μ; facets
+FACETS, MU = 8, 0.7  # of exercise 06.2
+LOSS = 0.05  # of exercise 06.3
+HILL, ROOM = 20.0, 3.0  # of exercise 06.4: degrees; N
+BALANCE = 0.1  # N, and N·m: what may be missing in exercise 06.4
+SOLVED = 1e-3  # N: what any solver may leave of the margin in exercise 06.4
+
+
+def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: float = 0.0) -> Array:
+    """Rows of exercise 06.1 from the polyhedron's edges, which are on the cone: each row is at right angles to two of them."""
+    n = np.asarray(normal) / np.linalg.norm(normal)
+    t1, t2 = tangents(n)
+    angles = turn + 2 * np.pi * (np.arange(BANK_FACETS + 1) - 0.5) / BANK_FACETS
+    edges = n + mu * (np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2))
+    rows = np.cross(edges[:-1], edges[1:])
+    rows *= np.sign(rows @ -n)[:, None]
+    return np.asarray(rows / np.linalg.norm(rows - np.outer(rows @ n, n), axis=1)[:, None])
+
+
+def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
+    """The steepest slope, degrees, whose cone or polyhedron holds a vertical force, by bisection."""
+    low, high = 0.0, 89.0
+    while high - low > 1e-9:  # degrees
+        middle = 0.5 * (low + high)
+        n = uphill(middle)
+        cone = FrictionCone(n, MU) if facets is None else FrictionPolyhedron(n, MU, facets, inside)
+        low, high = (middle, high) if cone.contains([0.0, 0.0, 1.0]) else (low, middle)
+    return low
+
+
+def _fewest(lost: Any) -> int:
+    """The smallest number of facets that loses less than `LOSS`. lost: number of facets -> part that is lost."""
+    return next(n for n in range(3, 100) if lost(n) < LOSS)
+
+
+def _lost_force(facets: int, inside: bool = True) -> float:
+    """What the middle of a facet misses of the cone, part of μ, tried with a force: how far it may lean along t1."""
+    cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets, inside)
+    leans = np.linalg.norm(cone.rays[0, :2]) if not inside else 1.0 + cone.margin([1.0, 0.0, 1.0])
+    return abs(1.0 - float(leans))
+
+
+def _lost_area(facets: int) -> float:
+    return 1.0 - FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets).area_ratio
+
+
+@cache
+def on_hill() -> tuple[fb.State, fb.Contacts]:
+    """go2 standing on the slope of exercise 06.4, and its contacts."""
+    robot, n = fb.load("go2"), uphill(HILL)
+    return fb.Simulation(robot, fb.Ground(normal=n)).state, fb.Contacts.points(robot, MU, normals=n)
+
+
+def _judge_forces(answer: Any) -> Verdict:
+    """Any forces that do what exercise 06.4 states, judged with forces and levers one by one."""
+    given = numbers(answer, (12,))
+    if isinstance(given, Verdict):
+        return given
+    f = given.reshape(4, 3)
+    return _out_of_balance(f) or _judge_margins(f)
+
+
+def _out_of_balance(f: Array) -> Verdict | None:
+    """What is wrong with the sum or the moment of forces on the hill, shape (4, 3), N; None where nothing is."""
+    state, contacts = on_hill()
+    weight, n = state.robot.weight, uphill(HILL)
+    carried = weight * np.array([0.0, 0.0, 1.0])
+    missing = float(np.linalg.norm(f.sum(axis=0) - carried))
+    sums = {
+        "Nobody carries the robot yet.": 0.0 * n,
+        "The sign: λ is what the ground does to the robot, and it pushes upwards.": -carried,
+        "These forces carry only the weight's part along the normal: the robot slides.": weight * n[2] * n,
+        "They add up to the weight, but along the slope's normal; gravity is vertical.": weight * n,
+    }
+    for hint, total in sums.items():
+        if np.linalg.norm(f.sum(axis=0) - total) < BALANCE:
+            return Verdict(False, hint)
+    if missing > BALANCE:
+        return Verdict(False, f"The sum is {missing:.1f} N away from what carries the weight.")
+    moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
+    if moment > BALANCE:
+        return Verdict(False, f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.")
+    return None
+
+
+def _judge_margins(f: Array) -> Verdict:
+    """Of forces in balance on the hill, shape (4, 3), N: whether each has room enough in its cone."""
+    names, n = on_hill()[1].names, uphill(HILL)
+    margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
+    upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
+    least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
+    if margins.min() >= ROOM - SOLVED:
+        return Verdict(True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N.")
+    if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
+        return Verdict(False, f"In balance. But all feet hold alike against sliding, and the upper ones carry little: {least}.")
+    if margins.min() >= -BALANCE:
+        return Verdict(False, f"In balance and in the cones, but {least} only.")
+    if upright.min() >= ROOM:
+        return Verdict(False, f"In balance, with room enough in cones about the vertical; in the slope's own, {least}.")
+    return Verdict(False, f"In balance, but outside of a cone: {least}.")
+
+
+EXERCISES = (
+    Exercise(
+        name="06.1",
+        statement="Rows of the polyhedron inside the cone for a normal that is not unit, shape (5, 3).",
+        stub="rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets, inside the cone",
+        solution="from floatbase.friction import tangents\n\n"
+        "n_bank = bank / np.linalg.norm(bank)\n"
+        "t1, t2 = tangents(n_bank)\n"
+        "turns = 2 * np.pi * np.arange(5) / 5\n"
+        "directions = np.outer(np.cos(turns), t1) + np.outer(np.sin(turns), t2)\n"
+        "rows = directions - 0.5 * np.cos(np.pi / 5) * n_bank",
+        judge=Shaped(
+            Numeric(
+                right=_rows_from_edges,
+                praise="Five half-spaces; where two meet is an edge, and the edges lie on the cone.",
+                mistakes={
+                    "Nothing there yet: zero rows allow every force.": lambda: np.zeros((5, 3)),
+                    "That polyhedron lies outside the cone: its facets touch it in their middle.": partial(
+                        _rows_from_edges, BANK_MU / np.cos(np.pi / 5)
+                    ),
+                    "The normal is not of length one: make it so before its length counts as friction.": lambda: _with_tangents(
+                        BANK_MU * np.cos(np.pi / 5), BANK
+                    ),
+                    "The right half-spaces, in another scale: without the normal's part each row has length one.": lambda: (
+                        _rows_from_edges() / np.linalg.norm(_rows_from_edges(), axis=1)[:, None]
+                    ),
+                    "The sign: rows @ f ≤ 0 must hold for forces inside.": lambda: -_rows_from_edges(),
+                    "The sign of the normal's part: with + the rows forbid to push.": lambda: _with_tangents(
+                        -BANK_MU * np.cos(np.pi / 5)
+                    ),
+                    "μ is missing: these are the facets for μ = 1.": lambda: _rows_from_edges(1.0),
+                    "The facets are turned by half a facet: facet 0 must face t1.": lambda: _rows_from_edges(turn=np.pi / 5),
+                    "These are the rows of level ground: use the normal that is given.": lambda: _rows_from_edges(
+                        normal=[0.0, 0.0, 1.0]
+                    ),
+                },
+            ),
+            {
+                (3, 5): "This is the transpose: one row for each facet.",
+                (4, 3): "Four rows; five facets are asked for.",
+                (5,): "Five numbers; each facet needs a row of three.",
+            },
+        ),
+        explanation="A facet's row takes the force along d_i and subtracts what friction allows in its middle, μ cos(π/5) nᵀf.",
+    ),
+    Exercise(
+        name="06.2",
+        statement="The steepest slope, degrees, on which a force straight up stays in 8 facets inside the cone, μ = 0.7.",
+        stub="steepest = 45.0  # degrees; replace by your expression",
+        solution="steepest = np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 8)))",
+        judge=Numeric(
+            right=_slip_angle,
+            praise="Two degrees less than the cone itself: the price of flat facets.",
+            mistakes={
+                "At 45° a force straight up needs μ = 1.": lambda: 45.0,
+                "That is in radians.": lambda: np.deg2rad(_slip_angle()),
+                "That is the round cone. A facet faces uphill, as this force leans; its middle allows less than μ.": partial(
+                    _slip_angle, None
+                ),
+                "That is the angle in radians, and of the round cone.": lambda: np.deg2rad(_slip_angle(None)),
+                "A sine: on a slope α_∥ / α_⊥ is a tangent.": lambda: np.rad2deg(np.arcsin(MU * np.cos(np.pi / 8))),
+                "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet allows less than μ.": lambda: np.rad2deg(
+                    np.arcsin(MU)
+                ),
+                "That is for 4 facets, as before; here are 8.": partial(_slip_angle, 4),
+                "That is for facets outside the cone; ask what their middle allows inside.": lambda: np.rad2deg(
+                    np.arctan(MU / np.cos(np.pi / 8))
+                ),
+                "That is the loss in degrees on the angle itself; the cosine goes with μ.": lambda: (
+                    _slip_angle(None) * np.cos(np.pi / 8)
+                ),
+            },
+        ),
+        explanation="α_∥ / α_⊥ of a vertical force is the slope's tangent, and the middle of a facet allows μ cos(π/8).",
+    ),
+    Exercise(
+        name="06.3",
+        statement="The fewest facets inside the cone whose middles lose less than 5 % of the tangential force.",
+        stub="fewest = 4  # replace this number",
+        solution="fewest = min(n for n in range(3, 50) if 1 - np.cos(np.pi / n) < 0.05)",
+        judge=Numeric(
+            count=True,
+            right=partial(_fewest, _lost_force),
+            praise="With 10 facets 4.9 % are lost in their middle, nothing at the edges.",
+            mistakes={
+                "That many are needed to lose less than 5 % of the area; the question is about force.": partial(
+                    _fewest, _lost_area
+                ),
+                "That is for a polyhedron outside: what its edges promise too much.": lambda: _fewest(
+                    partial(_lost_force, inside=False)
+                ),
+                "One facet too few: it loses 6 %.": lambda: _fewest(_lost_force) - 1,
+                "Four lose 29 %.": lambda: 4,
+                "Eight lose 7.6 %.": lambda: 8,
+                "Enough, but not the fewest.": lambda: 16,
+            },
+        ),
+        explanation="1 - cos(π/n) < 0.05; for small angles it is about 5 / n².",
+    ),
+    Exercise(
+        name="06.4",
+        statement="Forces on a slope of 20°, shape (12,), N, world: in balance, each with a margin of 3 N to its true cone.",
+        stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
+        solution="from floatbase.friction import FrictionPolyhedron\n"
+        "from floatbase.objectives import com_wrench\n\n"
+        "state_on_hill, contacts_on_hill = on_hill()\n"
+        "G_hill = com_wrench(state_on_hill, contacts_on_hill).A\n"
+        "carry = np.array([0, 0, robot.weight, 0, 0, 0])\n"
+        "facets = [FrictionPolyhedron(n, 0.7, 8).rows for n in contacts_on_hill.normals]\n"
+        "rows_on_hill = block_diag(*facets)\n"
+        "room = np.full(len(rows_on_hill), -3.0)  # N: each facet with 3 N to spare\n"
+        "least = (np.eye(12), np.zeros(12))\n"
+        "forces_on_hill = fb.solve(fb.QP(*least, G_hill, carry, rows_on_hill, room)).x",
+        judge=_judge_forces,
+        names=lambda: {"robot": fb.load("go2"), "on_hill": on_hill},
+        explanation="The rows of all feet with -3 on their right side, the balance as equalities, and least forces to choose.",
+    ),
+)
+
+
+def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
+    """d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
+    n = BANK / np.linalg.norm(BANK)
+    t1, t2 = tangents(n)
+    angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS
+    directions = np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
+    return np.asarray(directions - mu_facet * (n if subtracted is None else np.asarray(subtracted)))

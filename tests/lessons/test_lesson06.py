@@ -1,0 +1,251 @@
+"""Lesson 06: its helpers do what they say, and wrong answers of each kind get the hint that fits."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import judges
+import numpy as np
+import pytest
+from hints import missed, right
+
+import floatbase as fb
+from floatbase.errors import InputError
+from floatbase.friction import FrictionCone, FrictionPolyhedron, tangents, wrench_set
+from floatbase.lessons.lesson06 import (
+    ConeController,
+    beside_its_feet,
+    compass_row,
+    lean,
+    least_inside,
+    on_hill,
+    region_picture,
+    rose_controller,
+    show_force,
+    show_polyhedron,
+    show_region,
+    show_slope,
+    uphill,
+    with_feet,
+)
+from floatbase.objectives import com_wrench
+from floatbase.viewer import CONE, GREYS, MEASURED, Picture, hexadecimal, shapes
+
+UP = np.array([0.0, 0.0, 1.0])
+BANK = np.array([0.3, -0.2, 1.0])
+LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
+SOLVED = 1e-5  # N: what the QP solver leaves in rows of forces up to 200 N
+
+
+def rows_of(mu: float, normal: Any = BANK, turn: float = 0.0, inside: bool = True) -> np.ndarray:
+    return FrictionPolyhedron(normal, mu, 5, inside, turn).rows
+
+
+def test_06_1_takes_the_rows_of_the_polyhedron() -> None:
+    assert right("06.1", rows_of(0.5))
+
+
+def test_06_1_knows_inside_length_sign_friction_turn_normal_and_shape() -> None:
+    n, mu = BANK / np.linalg.norm(BANK), 0.5 * np.cos(np.pi / 5)
+    d = rows_of(0.5) + mu * n
+    wrong = {
+        "Nothing there yet": np.zeros((5, 3)),
+        "outside the cone": rows_of(0.5, inside=False),
+        "not of length one": d - mu * BANK,
+        "another scale": rows_of(0.5) / np.linalg.norm(rows_of(0.5), axis=1)[:, None],
+        "The sign: rows": -rows_of(0.5),
+        "The sign of the normal's part": d + mu * n,
+        "μ is missing": rows_of(1.0),
+        "turned by half a facet": rows_of(0.5, turn=np.pi / 5),
+        "rows of level ground": rows_of(0.5, UP),
+        "transpose": rows_of(0.5).T,
+        "Four rows": FrictionPolyhedron(BANK, 0.5, 4).rows,
+        "each facet needs a row": np.zeros(5),
+        "shape": np.zeros((2, 2)),
+        "no answer yet": None,
+        "Neither right": np.ones((5, 3)),
+    }
+    assert missed("06.1", [(answer, hint) for hint, answer in wrong.items()]) == []
+    assert np.allclose(tangents(BANK)[0], d[0])
+
+
+def test_06_2_knows_units_sine_cone_and_facets() -> None:
+    angle, mu = np.arctan(0.7 * np.cos(np.pi / 8)), 0.7 * np.cos(np.pi / 8)
+    assert right("06.2", np.rad2deg(angle))
+    wrong = {
+        "in radians.": angle,
+        "That is the round cone": np.rad2deg(np.arctan(0.7)),
+        "in radians, and of the round cone": np.arctan(0.7),
+        "A sine: on": np.rad2deg(np.arcsin(mu)),
+        "A sine, and": np.rad2deg(np.arcsin(0.7)),
+        "for 4 facets": np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 4))),
+        "outside the cone": np.rad2deg(np.arctan(0.7 / np.cos(np.pi / 8))),
+        "on the angle itself": np.rad2deg(np.arctan(0.7)) * np.cos(np.pi / 8),
+        "needs μ = 1": 45.0,
+        "no answer yet": None,
+        "Neither right": 12.0,
+    }
+    assert missed("06.2", [(answer, hint) for hint, answer in wrong.items()]) == []
+
+
+def test_06_3_knows_each_wrong_count() -> None:
+    assert right("06.3", 10)
+    hints = {12: "of the area", 11: "outside", 9: "One facet too few", 4: "29 %", 8: "7.6 %", 16: "not the fewest"}
+    assert missed("06.3", [*hints.items(), (5, "Neither right"), (None, "no answer yet")]) == []
+
+
+def in_balance(rows: np.ndarray, room: float) -> np.ndarray:
+    """The smallest forces on the hill, shape (12,), N, that carry go2 and keep rows @ λ ≤ -room."""
+    state, contacts = on_hill()
+    carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
+    G = com_wrench(state, contacts).A
+    return fb.solve(fb.QP(np.eye(12), np.zeros(12), G, carry, rows, np.full(len(rows), -room))).x
+
+
+def all_feet(normal: np.ndarray, facets: int = 16) -> np.ndarray:
+    return np.kron(np.eye(4), FrictionPolyhedron(normal, 0.7, facets).rows)
+
+
+def test_06_4_takes_any_forces_in_balance_with_room_in_their_cones() -> None:
+    for facets, room in ((8, 3.0), (16, 3.0), (16, 4.0)):
+        assert right("06.4", in_balance(all_feet(uphill(20), facets), room))
+
+
+def test_06_4_knows_what_is_wrong() -> None:
+    state, contacts = on_hill()
+    weight, n = state.robot.weight, uphill(20)
+    G = com_wrench(state, contacts).A
+    smallest = np.linalg.pinv(G) @ [0, 0, weight, 0, 0, 0]
+    hugging = in_balance(all_feet(n), 0.1)
+    level = np.tile([0.0, 0.0, weight / 4], 4)
+    squeeze = np.zeros(12)  # the left feet against the right ones: it changes neither sum nor moment
+    squeeze[[7, 10]] = 1.0, -1.0
+    wrong = [
+        (np.zeros(12), "Nobody carries"),
+        (-smallest, "The sign"),
+        (np.tile(weight * n[2] * n / 4, 4), "along the normal: the robot slides"),
+        (np.tile(weight * n / 4, 4), "gravity is vertical"),
+        (0.9 * smallest, "away from what carries"),
+        (level, "a moment of"),
+        (smallest, "hold alike"),
+        (smallest + squeeze, "cones about the vertical"),
+        (hugging, "in the cones, but"),
+        (smallest + 40 * squeeze, "outside of a cone"),
+        (np.zeros((4, 3)), "should have shape"),
+        (None, "no answer yet"),
+    ]
+    assert missed("06.4", wrong) == []
+
+
+def test_the_smallest_cost_within_rows_is_found() -> None:
+    cost = fb.Quadratic.from_residual(np.eye(3), [3.0, 0.0, 1.0])
+    rows = FrictionPolyhedron(UP, 0.5, 4).rows
+    found = least_inside(cost, rows)
+    assert np.allclose(found, FrictionPolyhedron(UP, 0.5, 4).project([3.0, 0.0, 1.0]), atol=SOLVED)
+    assert np.allclose(least_inside(cost, FrictionPolyhedron(UP, 5.0, 4).rows), [3.0, 0.0, 1.0], atol=SOLVED)
+
+
+def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed() -> None:
+    controller = rose_controller()
+    assert isinstance(controller, ConeController)
+    still = fb.rollout(fb.Simulation(controller.robot), controller, 0.1)
+    assert still.outcome == "completed" and np.allclose(still.planned[-1], still.measured[-1], atol=1.0)
+    push = fb.Push(np.array([0.0, 90.0, 0.0]), start=0.0, duration=0.1)
+    pushed = fb.rollout(fb.Simulation(controller.robot), controller, 0.3, [push])
+    cones = [FrictionPolyhedron(n, mu, 4) for n, mu in zip(controller.contacts.normals, controller.contacts.mus, strict=True)]
+    margins = [[c.margin(f) for c, f in zip(cones, row.reshape(4, 3), strict=True)] for row in pushed.planned]
+    assert np.min(margins) > -SOLVED  # always inside
+    assert np.min(margins) < SOLVED  # and at some time at a limit
+    assert pushed.outcome == "completed"
+
+
+def test_torques_of_the_controller_bring_about_the_forces_that_it_plans() -> None:
+    controller = rose_controller()
+    state = controller.robot.random_state(3, spread=0.05)
+    q = controller.robot.standing().q.copy()
+    q[7:] = state.q[7:] * 0.02 + q[7:] * 0.98
+    now = fb.State(controller.robot, q, 0.1 * np.random.default_rng(1).normal(size=18))
+    command = controller(now.q, now.v)
+    eom = fb.equations_of_motion(now, controller.contacts)
+    assert command.forces is not None
+    assert np.allclose(fb.forces_from_torques(eom)(command.tau), command.forces, atol=1e-6)
+
+
+def test_legs_reach_given_places_or_say_that_they_do_not() -> None:
+    robot = judges.load("go2")
+    home = robot.standing()
+    places = {foot.frame: np.array(home.frame_pose(foot.frame).translation) + [0.02, 0.01, 0.03] for foot in robot.feet}
+    reached = with_feet(robot, home.q[:3], places)
+    for name, place in places.items():
+        assert np.allclose(reached.frame_pose(name).translation, place, atol=LENGTHS)
+    with pytest.raises(InputError, match="cannot put its feet"):
+        with_feet(robot, home.q[:3] + [0.0, 0.0, 1.0], places)
+
+
+def test_in_the_valley_the_centre_of_mass_is_beside_the_feet_and_the_feet_touch() -> None:
+    state, contacts, ground = beside_its_feet(judges.load("go2"))
+    points = contacts.positions(state)
+    assert np.allclose(ground.clearances(points).min(axis=1), 0.0, atol=LENGTHS)
+    assert state.com[1] > points[:, 1].max() + 0.015
+    assert wrench_set(state, contacts, facets=8).support_region()[:, 1].max() > state.com[1]
+
+
+def test_lean_is_the_tangent_of_the_angle_to_the_normal() -> None:
+    assert np.allclose(uphill(20), [-np.sin(np.deg2rad(20)), 0.0, np.cos(np.deg2rad(20))])
+    assert np.allclose(lean([0, 0, 50.0, 30.0, 0, 40.0], UP), [0.0, 0.75])
+    assert np.allclose(lean([0, 0, 50.0], uphill(20)), np.tan(np.deg2rad(20)))
+
+
+@pytest.mark.parametrize(("force", "status"), [((20, 0, 40), "inside"), ((28, 0, 40), "active"), ((0, 30, 40), "outside")])
+def test_a_single_cone_has_the_colour_of_its_force(force: tuple[float, ...], status: str) -> None:
+    view = fb.Viewer(judges.load("go2"))
+    try:
+        text = show_force(view, force, 0.7)
+        picture = view.canvas.picture
+    finally:
+        view.close()
+    margin = FrictionCone(UP, 0.7).margin(force)
+    assert f"= {margin:.0f} N" in text and ("no friction" in text) == (margin < 0)
+    assert {hexadecimal(MEASURED), hexadecimal(CONE[status])} <= colours(picture)
+
+
+def colours(picture: Picture) -> set[str]:
+    """Colours of a picture's items: of those that may change theirs, and of arrows."""
+    found = {hexadecimal(item.colour[:3]) for item in picture.values() if item.colour is not None}
+    arrow = shapes.arrow(np.zeros(3), UP, MEASURED)
+    return found | {hexadecimal(MEASURED) for item in picture.values() if item.shape is arrow.shape}
+
+
+def test_the_pictures_are_drawn() -> None:
+    robot = judges.load("go2")
+    view = fb.Viewer(robot)
+    try:
+        assert "4 facets" in (drawn := show_polyhedron(view, 0.7, 4))
+        assert "inside 64 %" in drawn and "outside 127 %" in drawn and "weakest 0.49 inside" in drawn
+        assert "front 0.84" in show_slope(view, 22.0, 0.0)
+        level = show_slope(view, 0.0, 0.0)
+        assert all(float(x) < 0.1 for x in re.findall(r"(?:front|rear) (\d\.\d+)", level))
+        assert "where the CoM may be" in show_region(view, 20.0, 0.7)
+        assert "nowhere" in show_region(view, 20.0, 0.3)
+    finally:
+        view.close()
+    state, contacts = robot.standing(), fb.Contacts.points(robot)
+    figure = compass_row(one=wrench_set(state, contacts), two_turned=wrench_set(state, contacts, turn=np.pi / 4))
+    assert [axis.get_title() for axis in figure.axes] == ["one", "two turned"]
+    feet = contacts.positions(state)
+    assert region_picture(state, feet, feet[[0, 1, 3, 2], :2]).count("<polygon") == 2
+    assert region_picture(state, feet, np.zeros((0, 2))).count("<polygon") == 1
+
+
+def test_drawings_from_above_have_greys_and_the_colour_of_text() -> None:
+    robot = judges.load("go2")
+    state, contacts = robot.standing(), fb.Contacts.points(robot)
+    view = fb.Viewer(robot)
+    try:
+        drawn = [show_polyhedron(view, 0.7, 4), region_picture(state, contacts.positions(state), np.zeros((0, 2)))]
+    finally:
+        view.close()
+    for svg in drawn:
+        assert set(re.findall(r"#[0-9A-F]{6}", svg)) <= {hexadecimal(grey) for grey in GREYS}
+        assert 'fill="currentColor"' in svg and re.findall(r"<text[^>]*\sfill=", svg) == []
