@@ -346,7 +346,7 @@ class Viewer:
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
         """Set the title, and the legend of the colours in the picture."""
-        colours = {"push": self.painter.text}
+        colours = dict.fromkeys(("push", "price"), self.painter.text)
         items = [
             [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text]
             for kind, colour, text in LEGEND
