@@ -15,6 +15,7 @@ from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numb
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson07.helpers import LENGTH, MU, START, leaning, pushed, tuned
 from floatbase.lessons.rounding import about
+from floatbase.qp import RowLabel
 from floatbase.simulation import Rollout
 
 INNER = MU * np.cos(np.pi / 4)  # of a pyramid inside the cone
@@ -54,8 +55,10 @@ def _judge_rows(answer: Any) -> Verdict:
         return Verdict(True, "Four rows of 42 numbers, three of them at work: that is all a solver knows of a friction cone.")
     for hint, wrong in {
         "The sign: these rows are G x ≥ 0. A force straight up must give G x ≤ 0.": _agrees(-own, INNER),
-        "This pyramid lies around the cone: it believes in more than μ at its edges. Inside, μ is times cos 45°.": _agrees(own, MU),
-        "The pyramid must lie inside the cone: 45° is the angle from a side's middle to its edge.": _agrees(own, INNER / 2),
+        "This pyramid lies around the cone: at its edges it believes in more than μ. Inside, μ' is μ cos 45°.": _agrees(
+            own, MU
+        ),
+        "np.cos takes radians: 45° is π/4.": _agrees(own, MU * np.cos(45)),
         "This is the pyramid of a ground with μ = 1/0.7: which of the two forces is at most how much of the other?": _agrees(
             own, 1 / INNER
         ),
@@ -85,8 +88,8 @@ def _agrees(rows: Array, slope: float) -> bool:
     """Whether rows allow exactly the forces of |f_x| ≤ slope f_z, |f_y| ≤ slope f_z, but for those on the border."""
     forces = _tried()
     room = slope * forces[:, 2] - np.abs(forces[:, :2]).max(axis=1)
-    clear = np.abs(room) > 5e-3  # a number with two digits may move the border so far
-    return bool(np.all((rows @ forces.T <= 0).all(axis=0)[clear] == (room > 0)[clear]))
+    allowed = np.max(rows @ forces.T, axis=0) <= 0
+    return bool(np.all((allowed == (room > 0)) | (np.abs(room) < 5e-3)))  # a number with two digits may move the border so far
 
 
 # 07.3 ---------------------------------------------------------------------------------------------------------------------
@@ -106,8 +109,9 @@ def _changes() -> dict[str, Callable[[], Any]]:
             f = solution["forces"].reshape(4, 3)
             of = {"own": f[:, 2], "all": np.full(4, f[:, 2].sum()), "1": np.ones(4), "tangent": np.hypot(f[:, 0], f[:, 1])}
             names = standing_go2().contacts.names
-            prices = [(names.index(row.owner), price) for row, price in solution.multipliers.items() if row.kind == "friction"]  # type: ignore[attr-defined]
-            return float(sign * sum(price * of[part][i] * np.cos(cos) * grows for i, price in prices))
+            rows = [(row, price) for row, price in solution.multipliers.items() if isinstance(row, RowLabel)]
+            room = {row: of[part][names.index(row.owner)] * np.cos(cos) * grows for row, _ in rows if row.kind == "friction"}
+            return float(sign * sum(price * room.get(row, 0.0) for row, price in rows))
 
         return value
 
@@ -153,12 +157,16 @@ def _judge_design(answer: Any) -> Verdict:
     if away[-1] > BACK:
         return Verdict(False, f"It creeps home too slowly: {told}. A damper without a spring behind it forgets the place.")
     if away.max() > AWAY and strayed > STRAYED:
-        return Verdict(False, f"It goes too far, and its feet slip: {told}. A spring pulls hardest at the far end; a damper earlier.")
+        return Verdict(
+            False, f"It goes too far, and a foot strays: {told}. A spring pulls hardest at the far end, a damper earlier."
+        )
     if away.max() > AWAY:
         return Verdict(False, f"It goes too far: {told}. When is there most to gain, early or late in the push?")
     if strayed > STRAYED:
         return Verdict(False, f"A foot strays: {told}. It pulls home harder than it needs to.")
-    return Verdict(True, f"On the physics: {told}. Damping brakes while the push still lasts; the spring then only brings it home.")
+    return Verdict(
+        True, f"On the physics: {told}. Damping brakes while the push still lasts; the spring then only brings it home."
+    )
 
 
 EXERCISES = (
@@ -205,7 +213,7 @@ EXERCISES = (
     Exercise(
         name="07.3",
         statement="Predict from the prices in `solution` how ψ changes when μ goes from 0.5 to 0.505.",
-        stub="change = 0.0  # replace: from solution.multipliers and solution[\"forces\"]",
+        stub='change = 0.0  # replace: from solution.multipliers and solution["forces"]',
         solution='normal = dict(zip(contacts.names, solution["forces"][2::3]))\n'
         "more = 0.005 * np.cos(np.pi / 8)  # of μ'\n"
         "change = -sum(\n"
@@ -223,12 +231,12 @@ EXERCISES = (
     ),
     Exercise(
         name="07.4",
-        statement="kp, kd and weight of the centre of mass and the weight of the posture, four numbers: after a push of 150 N x_c "
-        "strays at most 53 mm, no foot more than 9 mm, and 1 s after the push x_c is within 3 mm of its place.",
+        statement="kp, kd and weight of the centre of mass and the weight of the posture, four numbers: after a push of 150 N "
+        "x_c strays at most 53 mm, no foot more than 9 mm, and 1 s after the push x_c is within 3 mm of its place.",
         stub="design = [100, 20, 10, 1e-3]  # change: kp, kd, weight; weight of the posture",
         solution="design = [400, 80, 10, 1e-3]",
         judge=_judge_design,
-        explanation="Twice the critical damping of a stiff spring: the damper answers the speed, which is there before any error "
-        "is; and a stiff spring brings it home although the damper is slow.",
+        explanation="Twice the critical damping of a stiff spring: the damper answers the speed, which is there before any "
+        "error is, and a stiff spring brings it home although the damper is slow.",
     ),
 )
