@@ -26,6 +26,7 @@ from floatbase.lessons.lesson07 import (
     rose_controller,
     tuned,
 )
+from floatbase.viewer import GREYS, hexadecimal
 
 STATE = standing_go2().state
 GO2 = STATE.robot
@@ -144,7 +145,8 @@ def test_rows_are_taken_away_and_added() -> None:
     np.testing.assert_allclose(within.tau, alone.tau, atol=1e-6)  # where it stands no row is active
     hurried = STATE.replace(v=np.eye(18)[1] * 1.5)  # to the left, 1.5 m/s
     pulls = costs(hurried.q, hurried.v).forces[2::3].min()
-    assert pulls < -1 < -1e-6 < WithRows(costs, stands)(hurried.q, hurried.v, 0.0).forces[2::3].min()
+    planned = WithRows(costs, stands)(hurried.q, hurried.v, 0.0).forces
+    assert planned is not None and pulls < -1 < -1e-6 < planned[2::3].min()
 
 
 def test_a_push_goes_to_the_left_for_a_tenth_of_a_second() -> None:
@@ -163,14 +165,17 @@ def test_a_note_names_the_dearest_rows_first() -> None:
 
 
 def test_pictures_show_what_they_are_given() -> None:
-    figure = plot_rounds([0, 1, 2], {"cold": [3, 4, 5], "warm": [1, 1, 1]})
+    figure: Any = plot_rounds([0, 1, 2], {"cold": [3, 4, 5], "warm": [1, 1, 1]})
     assert [line.get_ydata().tolist() for line in figure.axes[0].lines] == [[3, 4, 5], [1, 1, 1]]
     record = pushed(rose_controller(), 60.0, 0.3)
-    com, feet = plot_ways({"one": record}).axes
+    ways: Any = plot_ways({"one": record})
+    com, feet = ways.axes
     assert com.lines[0].get_ydata().max() == pytest.approx(
         1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1).max()
     )
     assert feet.lines[0].get_ydata().max() == pytest.approx(1e3 * record.slip().max())
+    lines = [line for drawn in (figure, ways) for axis in drawn.axes for line in axis.lines]
+    assert {line.get_color() for line in lines} <= {hexadecimal(grey) for grey in GREYS}
     plt.close("all")
 
 

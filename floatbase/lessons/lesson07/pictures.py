@@ -15,7 +15,7 @@ from floatbase.simulation import Rollout
 from floatbase.viewer import GREYS, hexadecimal
 
 _STYLES = ("-", "--", ":")
-_MOST = 6  # rows that a note lists
+_MOST = 4  # rows that a note lists
 
 
 def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figure:
@@ -51,4 +51,4 @@ def named(solution: Solution) -> str:
     prices = sorted(solution.multipliers.items(), key=lambda row: -row[1])
     shown = [f"{name} {about(price)}" for name, price in prices if price > 1e-3]
     more = f" and {len(shown) - _MOST} more" if len(shown) > _MOST else ""
-    return "prices: " + ", ".join(shown[:_MOST]) + more if shown else "no row has a price"
+    return "dearest rows: " + ", ".join(shown[:_MOST]) + more if shown else "no row has a price"
