@@ -173,13 +173,14 @@ EXERCISES = (
     Exercise(
         name="07.1",
         statement="go2 on three feet, six facets each, and its twelve motors: how many inequality rows?",
-        stub="rows = 44  # replace this number by what you find",
+        stub="rows = 24  # replace this number by what you find",
         solution="rows = 3 * (6 + 1) + 2 * 12",
         judge=Numeric(
             count=True,
             right=_rows_on_three_feet,
             praise="Six sides and a normal force for each foot that stands, two limits for each motor.",
             mistakes={
+                "Those are the motors alone. What does each foot that stands add?": lambda: 24,
                 "That is the lesson's own count: four feet with four facets.": lambda: 44,
                 "The rows of the normal forces are missing: feet do not pull.": lambda: 3 * 6 + 24,
                 "A motor has two limits, one each way.": lambda: 3 * 7 + 12,
