@@ -234,8 +234,8 @@ EXERCISES = (
         name="07.4",
         statement="kp, kd and weight of the centre of mass and the weight of the posture, four numbers: after a push of 150 N "
         "x_c strays at most 53 mm, no foot more than 9 mm, and 1 s after the push x_c is within 3 mm of its place.",
-        stub="design = [100, 20, 10, 1e-3]  # change: kp, kd, weight; weight of the posture",
-        solution="design = [400, 80, 10, 1e-3]",
+        stub="design = np.array([100, 20, 10, 1e-3])  # kp, kd, weight; weight of the posture",
+        solution="design = np.array([400, 80, 10, 1e-3])",
         judge=_judge_design,
         explanation="Twice the critical damping of a stiff spring: the damper answers the speed, which is there before any "
         "error is, and a stiff spring brings it home although the damper is slow.",
