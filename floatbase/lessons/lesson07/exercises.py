@@ -151,7 +151,8 @@ def _judge_design(answer: Any) -> Verdict:
         return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.")
     away = 1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
     strayed = 1e3 * record.slip().max()
-    told = f"{about(away.max(), 'mm')} away, {about(round(away[-1], 1), 'mm', floor=0.5)} at the end; a foot strays {about(strayed, 'mm')}"
+    end = about(round(away[-1], 1), "mm", floor=0.5)
+    told = f"{about(away.max(), 'mm')} away, {end} at the end; a foot strays {about(strayed, 'mm')}"
     if away.max() > AWAY and away[-1] > BACK:
         return Verdict(False, f"It goes too far and does not come back: {told}. Look at what each gain does to e.")
     if away[-1] > BACK:
