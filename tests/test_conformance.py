@@ -144,7 +144,7 @@ EXAMPLES: dict[str, Any] = {
     "H": np.eye(12), "h": np.ones(12), "Viewer.height": 300, "height": 0.27, "high": 1.0,
     "hydraulics": HYDRAULIC.cylinders.hydraulics, "i": 0, "idle": 10.0, "inequality_names": tuple("abcdefghijkl"),
     "inside": False, "items": tuple(CONTACTS), "kd": 20.0, "kind": "planned", "kp": 100.0, "labels": True, "leakage": 2e-14,
-    "lesson": "05", "limits": CONTROLLER.limits, "load.locked": ["FL_hip_joint"],
+    "lesson": "07", "limits": CONTROLLER.limits, "load.locked": ["FL_hip_joint"],
     "load_urdf.locked": [], "listener": lambda status: None, "loop_bandwidth": 50.0, "low": 0.0, "m": 6,
     "WrenchSet.max_normal_force": 200.0 * np.ones(4), "max_normal_force": 200.0, "min_normal_force": 1.0,
     "minimum": (0.5, 1.0), "moment": UP, "mu": 0.7, "N": np.eye(12)[:, :3], "n": 3, "Command.force.name": "FL_foot",

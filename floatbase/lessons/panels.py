@@ -26,7 +26,8 @@ class SliderPanel(widgets.VBox):
     """
 
     def __init__(self, view: Viewer, sliders: dict[str, widgets.FloatSlider], beside: bool):
-        self._picture = widgets.HTML(layout=widgets.Layout(width="62%" if beside else "auto"))
+        wide = widgets.Layout(width="62%", flex="0 0 auto") if beside else widgets.Layout(width="auto")
+        self._picture = widgets.HTML(layout=wide)  # a long note beside it wraps, and takes nothing of it
         note = widgets.HTML()
         top = [widgets.HBox([self._picture, note])] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])

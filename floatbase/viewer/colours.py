@@ -24,7 +24,7 @@ WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
 SUPPORT = CALM
-PUSH = _rgb("#222222")  # and the ZMP; on a dark background they are light, as text is
+PUSH = _rgb("#222222")  # and the ZMP, and prices; on a dark background they are light, as text is
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
@@ -48,6 +48,7 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("cone", WARNING, "friction cone: surface reached"),
     ("cone", ALARM, "friction cone: force outside"),
     ("idle cone", IDLE, "friction cone: no force"),
+    ("price", PUSH, "price of a limit: its multiplier"),
     ("support", SUPPORT, "support region"),
     ("dcm", COM, "capture point"),
     ("zmp", PUSH, "planned ZMP"),

@@ -388,7 +388,7 @@ class Viewer:
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
         """Set the title, and the legend of the colours in the picture."""
-        colours = dict.fromkeys(("push", "zmp"), self.painter.text)
+        colours = dict.fromkeys(("push", "price", "zmp"), self.painter.text)
         items = [
             [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text, SYMBOLS.get(kind, "patch")]
             for kind, colour, text in LEGEND

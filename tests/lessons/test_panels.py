@@ -60,6 +60,12 @@ def test_bounds_that_are_not_round_get_a_fine_step(view: fb.Viewer) -> None:
     assert drawn[0] == pytest.approx(2.0 / 3.0, abs=1e-4)
 
 
+def test_a_picture_keeps_its_width_beside_a_note_of_any_length(view: fb.Viewer) -> None:
+    panel = slider_panel(view, lambda x: "long " * 200, beside=True, x=(0.0, 0.5, 1.0))
+    picture, note = panel.children[0].children
+    assert (picture.layout.width, picture.layout.flex) == ("62%", "0 0 auto") and note is panel.note
+
+
 def test_a_range_with_no_width_does_not_fail(view: fb.Viewer) -> None:
     assert slider_of(view, 2.0, 2.0, 2.0)[1] == [2.0]
 
