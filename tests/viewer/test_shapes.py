@@ -265,7 +265,7 @@ def test_prices_stand_at_the_middle_of_their_facets(
         assert float(picture[f"price/{name}"].shape.name) == pytest.approx(price, rel=0.05)
     viewer.show(standing, contacts, extra=picture)
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
-    assert [hexadecimal(viewer.painter.text), "price of a limit: its multiplier"] in legend
+    assert [hexadecimal(viewer.painter.text), "price of a limit: its multiplier", "patch"] in legend
     with pytest.raises(InputError, match="not one of these contacts"):
         viewer.prices(standing, contacts.only("FL_foot"), answer)
 
