@@ -153,6 +153,7 @@ EXAMPLES: dict[str, Any] = {
     "Ground.offset": 0.1, "standing.offset": 0.1,
     "offset": UP, "omega": UP, "omega_rate": UP, "package_dirs": (), "parts": fb.Affine(np.eye(12), ZERO),
     "joint_servo.path": lambda t: ZERO, "load_urdf.path": str(judges.load("ur5").urdf), "path": "readable",
+    "save.size": (320, 200),
     "save.path": f"{FOLDER}/view.html", "paused": True, "pictures": [PICTURE, PICTURE], "Viewer.play.planned": True,
     "planned": 30.0 * np.tile(UP, 4), "plate": True, "points": CONTACTS.positions(STATE), "port": 0, "position": UP,
     "AnalyticController.posture": 1e-3, "load_urdf.posture": [0.0] * 6 + [1.0] + [0.0] * 6, "posture": ROBOT.posture,
