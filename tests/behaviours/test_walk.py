@@ -188,6 +188,38 @@ def test_contacts_that_need_not_give_way_stand_as_held_ones_do() -> None:
     assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot") and len(other.tasks) == len(soft.tasks)
 
 
+def test_a_walk_gives_way_where_no_forces_hold_its_feet() -> None:
+    robot = judges.load("talos")
+    weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
+    moving = robot.standing().replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
+    walk = Walk(robot, judges.stance(robot), Gait.walk(robot), **weak)
+    with pytest.raises(fb.InfeasibleError):
+        fb.WholeBodyController(robot, judges.stance(robot), (), **weak)(moving.q, moving.v)
+    command = walk(moving.q, moving.v)
+    assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6) and command.forces.shape == (walk.contacts.k,)
+
+
+def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
+    robot, ways = judges.load("go2"), []
+    feet = [foot.frame for foot in robot.feet]
+    for yaw in (0.0, 2.0):
+        c, s = np.cos(yaw), np.sin(yaw)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        q = np.array(robot.standing().q)
+        q[:3], q[3:7] = turn @ q[:3] + [1.0, -2.0, 0.0], [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
+        sim = fb.Simulation(robot)
+        sim.reset(robot.standing().replace(q=q))
+        walk = walk_of("go2", Gait.trot, (0.2, 0.0), turn=yaw)  # of the facets of friction
+        record = fb.rollout(sim, walk, 3.0, [fb.Push(turn @ [0.0, 200.0, 0.0], start=1.6)], PERIOD)
+        assert record.outcome == "completed"
+        ways.append((record.com - record.com[0]) @ turn)
+        for step in walk.history:  # no foot lands on the other side of the body
+            i = int(np.searchsorted(record.time, step.time))
+            at = {foot: (record.state(i).point(foot) - record.com[i]) @ turn for foot in feet}
+            assert all(np.sign(at[foot][1]) == np.sign(robot.standing().point(foot)[1]) for foot in feet)
+    assert np.abs(ways[0] - ways[1]).max() < 0.02  # m, of 0.3: what rounds otherwise grows
+
+
 # the falls on the way, each a test ------------------------------------------------------------------------------------------
 
 
@@ -198,6 +230,7 @@ def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
         for step in walk.history for foot in step.stance if step.time > 1.5
     )  # fmt: skip
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
+    assert record.outcome == "completed"  # limited about the plan it falls
     assert reach < leg + walk.reach + 0.05  # from the body; from the plan they would be where the push has led it
 
 
