@@ -36,7 +36,8 @@ class Reference:
 
     standing: the robot's posture.
     nominal: (3,) m, where each foot's frame is in it, from the middle of the feet on the ground.
-    asked, gait: the gait that was asked for, and what is walked by: that without the lift-offs that were over.
+    asked, gait: the gait that was asked for, and what is walked by: that without the lift-offs that were over; no gait is
+        asked for any more while feet come down for another.
     began, time: s, of the first and of the last tick.
     place, yaw: (2,) m, world, and rad, where the body is to be then.
     velocity: (3,) of the path: forwards, to the left, m/s, and yaw, rad/s, on their way to the desired ones.
@@ -53,7 +54,7 @@ class Reference:
 
     standing: State
     nominal: dict[str, Array]
-    asked: Gait
+    asked: Gait | None
     gait: Gait
     began: float
     time: float

@@ -258,12 +258,12 @@ class Walk:
     def _take_gait(self, t: float) -> None:
         """Where another gait is asked for, walk by that once all feet stand; those in the air come down as they were to."""
         now = self._now
-        if self._gait is now.asked:
+        if now.asked is not None and vars(self._gait) == vars(now.asked):
             return
         if not now.swinging:
             now.asked, now.gait, now.renew = self._gait, self._gait.after(t), t
         elif now.gait.stop is None or now.gait.stop > t:
-            now.gait = replace(now.gait, stop=t)
+            now.asked, now.gait = None, replace(now.gait, stop=t)
 
     def _stance_at(self, t: float) -> tuple[str, ...]:
         gait = self._now.gait

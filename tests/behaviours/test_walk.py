@@ -336,6 +336,21 @@ def test_another_gait_takes_over_when_all_feet_stand() -> None:
     assert standing[0] == 4 and set(standing) == {3, 4}
 
 
+def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked() -> None:
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.1), (0.2, 0.0))
+    sim = fb.Simulation(walk.robot)
+    for _ in range(10):
+        walk.gait = Gait.trot(walk.robot, start=0.1)
+        fb.rollout(sim, walk, 0.08, control_period=PERIOD)
+    assert [round(step.time, 2) for step in walk.history] == [0.0, 0.1, 0.35, 0.6]
+    trot = walk.gait
+    for gait in (Gait.crawl(walk.robot), trot):  # a control that is moved, and moved back
+        walk.gait = gait
+        fb.rollout(sim, walk, 0.002, control_period=PERIOD)
+    assert fb.rollout(sim, walk, 0.8, control_period=PERIOD).outcome == "completed"
+    assert len(walk.stance) == 2 and walk.gait is trot
+
+
 def test_it_begins_anew_where_another_controller_had_the_robot() -> None:
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.0), (0.3, 0.0))
     standing = walk.robot.standing()
