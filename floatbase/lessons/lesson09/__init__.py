@@ -10,9 +10,19 @@ from floatbase.lessons.lesson09.helpers import (
     rose_controller,
     standing_rose_controller,
 )
-from floatbase.lessons.lesson09.pictures import ONE_SOLE, SOLES, kinds_of, plot_walk, show_sole, show_soles, soles_from_above
+from floatbase.lessons.lesson09.pictures import (
+    ONE_SOLE,
+    SOLES,
+    kinds_of,
+    play_resultants,
+    plot_lean,
+    plot_walk,
+    show_sole,
+    show_soles,
+    soles_from_above,
+)
 
 __all__ = [
     "EXERCISES", "ONE_SOLE", "ROSE_WATCH", "SOLES", "ankle_sensor", "corner_forces", "held", "kinds_of", "leaned", "leaning",
-    "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles", "soles_from_above", "standing_rose_controller",
+    "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles", "soles_from_above", "standing_rose_controller",
 ]  # fmt: skip

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
 
 import floatbase as fb
 from floatbase._arrays import Array
+from floatbase.behaviours import Step
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.lesson09.helpers import corner_forces, pressure
 from floatbase.simulation import Rollout
@@ -19,6 +21,8 @@ from floatbase.viewer import GREYS, PLANNED, Picture, View, Viewer, hexadecimal,
 SOLES = View(30.0, 25.0, 1.0, around=((0.0, 0.0, 0.1), 0.34))  # where Talos stands
 ONE_SOLE = View(30.0, 25.0, 1.0, around=((0.0, 0.085, 0.08), 0.26))
 NEWTON = 0.0008  # m drawn for 1 N at a sole
+_RATE = 30.0  # 1/s: pictures of a movie
+_FAR = 1.0  # m from a sole: a plan that wants to be pushed there is not drawn
 QUIET = 1.0  # N: a force that is not drawn
 WIDE, HIGH = 300, 250  # pixels of a drawing
 _COLUMNS = 261  # of a slice: one for each mm
@@ -79,6 +83,27 @@ def show_sole(view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSe
     return _slice(limits, w, told, nearest)
 
 
+def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> Viewer:
+    """Play a record whose plan holds a wrench for each sole, about its frame's origin: its force, where the plan wants it.
+
+    speed: 1 for real time. title: a line in the corner.
+    """
+    rows = range(0, len(record), max(1, round(speed / (_RATE * (record.time[1] - record.time[0])))))
+    pictures = []
+    for i in rows:
+        state = record.state(i)
+        picture = view.painter.picture(state)
+        for contact, wrench in zip(record.contacts, record.planned[i].reshape(-1, 6), strict=True):
+            f, tau = wrench[:3], wrench[3:]
+            ahead = np.array([-tau[1], tau[0], 0.0]) / f[2] if f[2] > QUIET else np.full(3, np.inf)
+            if np.linalg.norm(ahead) < _FAR:
+                at = state.point(contact.name) + ahead
+                picture[f"planned/{contact.name}"] = shapes.arrow(at, view.scale * f, PLANNED, view.painter.size, halo=True)
+        pictures.append(picture)
+    view.play_pictures(record.time[list(rows)].tolist(), pictures, speed=speed, title=title)
+    return view
+
+
 def _broken(limits: WrenchSet, wrench: Array) -> str:
     """Which kinds of rows a wrench breaks."""
     broken = limits.rows[limits.rows @ wrench > _BORDER * wrench[2]]
@@ -115,19 +140,34 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     return _svg(drawn, axes, *lines)
 
 
-def plot_walk(record: Rollout, steps: Sequence[npt.ArrayLike]) -> Axes:
-    """A walk from above: where x_c was, where the ground pushed, and the soles' places.
-
-    steps: corners of each sole that stood, shape (4, 2), m.
-    """
+def plot_walk(record: Rollout, steps: Iterable[Step]) -> Axes:
+    """A walk from above: where x_c was, where the ground pushed, and the soles that stood. steps: `walk.history`."""
     figure, axis = plt.subplots(figsize=(8.5, 3.0), layout="constrained")
-    for corners in steps:
-        axis.add_patch(plt.Polygon(np.asarray(corners), closed=True, color=hexadecimal(GREYS[2]), alpha=0.3, linewidth=0))
+    for step in steps:
+        state = record.state(min(int(np.searchsorted(record.time, step.time)), len(record) - 1))
+        for name in step.stance:
+            corners = record.contacts.only(name).positions(state)[:, :2]
+            axis.add_patch(Polygon(corners, closed=True, color=hexadecimal(GREYS[2]), alpha=0.3, linewidth=0))
     pushed, com = pressure(record), record.com
     axis.plot(pushed[:, 0], pushed[:, 1], color=hexadecimal(GREYS[1]), linewidth=1.5, label="centre of pressure")
     axis.plot(com[:, 0], com[:, 1], "--", color=hexadecimal(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="forwards [m]", ylabel="to the left [m]", aspect="equal")
-    axis.legend(loc="upper right", fontsize="small")
+    axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
+    plt.close(figure)
+    return axis
+
+
+def plot_lean(record: Rollout) -> Axes:
+    """Forwards and backwards through time: x_c, the centre of pressure, and between which edges of the soles it must stay."""
+    figure, axis = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
+    edges = record.foot_positions[..., 0]
+    axis.fill_between(
+        record.time, edges.min(axis=1), edges.max(axis=1), color=hexadecimal(GREYS[2]), alpha=0.3, linewidth=0, label="soles"
+    )
+    axis.plot(record.time, pressure(record)[:, 0], color=hexadecimal(GREYS[1]), linewidth=1.5, label="centre of pressure")
+    axis.plot(record.time, record.com[:, 0], "--", color=hexadecimal(GREYS[0]), linewidth=2.5, label="x_c")
+    axis.set(xlabel="time [s]", ylabel="forwards [m]", ylim=(-0.15, 0.15))
+    axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
     plt.close(figure)
     return axis
 
