@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from hints import missed, right
+from matplotlib.colors import to_hex
 from matplotlib.patches import Polygon
 
 import floatbase as fb
-from floatbase.behaviours import Gait, Walk
+from floatbase.behaviours import Gait, Swing, Walk
 from floatbase.dynamics import LinearConstraint
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench, wrench_set
 from floatbase.lessons import all_exercises
@@ -34,8 +34,8 @@ from floatbase.lessons.lesson09 import (
     show_soles,
     soles_from_above,
     standing_rose_controller,
+    talos,
 )
-from floatbase.lessons.lesson09.helpers import talos
 from floatbase.simulation import Rollout
 from floatbase.viewer import GREYS, MEASURED, PLANNED, hexadecimal
 
@@ -98,8 +98,9 @@ def test_09_1_knows_height_order_sign_unit_and_what_divides() -> None:
 def test_09_2_knows_each_wrong_count() -> None:
     assert right("09.2", np.array([24, 30, 56]))
     wrong = [
-        ([12, 18, 44], "four corners"), ([12, 12, 50], "one sole"), ([12, 30, 44], "has rank 12"), ([0, 30, 32], "no rows of motion"),
-        ([30, 24, 56], "swapped"), ([24, 30, 44], "dim β"), ([24, 24, 56], "six dimensions"), ([36, 30, 56], "length of λ"),
+        ([12, 18, 44], "four corners"), ([12, 12, 50], "one sole"), ([12, 30, 44], "has rank 12"),
+        ([0, 30, 32], "no rows of motion"), ([30, 24, 56], "swapped"),
+        ([24, 30, 44], "dim β"), ([24, 24, 56], "six dimensions"), ([36, 30, 56], "length of λ"),
         (24, "Three numbers"), ([1, 2, 3], "Neither right"), (None, "no answer yet"),
     ]  # fmt: skip
     assert missed("09.2", [(np.array(answer) if answer is not None else None, hint) for answer, hint in wrong]) == []
@@ -155,7 +156,7 @@ def test_a_filed_corner_changes_the_corners_and_not_the_wrench() -> None:
     even, filed = stood(), held(SOLES, 0.4, sim=sim)
     assert np.abs(filed.measured[-1] - even.measured[-1]).max() > 50.0
     wrenches = [contact_wrench(run.final, LEFT, run.measured[-1, :12], MIDDLE) for run in (even, filed)]
-    assert np.allclose(*wrenches, atol=0.1)
+    assert np.allclose(wrenches[0], wrenches[1], atol=0.1)
 
 
 def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_where_they_do_not() -> None:
@@ -171,12 +172,13 @@ def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_w
 def test_rows_of_a_sole_have_names() -> None:
     kinds = kinds_of(limits().rows)
     assert [kinds.count(kind) for kind in ("sliding", "tipping", "twisting")] == [4, 4, 8]
-    assert kinds_of([[1, 0, -0.5, 0, 0, 0], [0, 0, -0.1, 0, 1, 0], [0.1, 0, -0.1, 0, 0, -1]]) == ["sliding", "tipping", "twisting"]
+    rows = [[1, 0, -0.5, 0, 0, 0], [0, 0, -0.1, 0, 1, 0], [0.1, 0, -0.1, 0, 0, -1]]
+    assert kinds_of(rows) == ["sliding", "tipping", "twisting"]
 
 
 def test_a_lean_goes_where_it_should_at_its_time() -> None:
     path = next(task for task in leaning(6.0, 1.0, 0.01).tasks if isinstance(task, fb.CoMTask)).position
-    assert callable(path)
+    assert isinstance(path, Swing)
     assert np.allclose(path(0.1)[0], STATE.com) and np.allclose(path(1.3)[0], STATE.com + [0.06, 0.0, 0.0])
     record = leaned(1.5, 0.01)
     assert np.isclose(record.final.com[0] - STATE.com[0], 0.06, atol=2e-3)
@@ -233,6 +235,6 @@ def test_a_walk_and_a_lean_are_plotted_in_greys() -> None:
     walk = Walk(TALOS, SOLES, Gait.walk(TALOS, start=0.2), velocity=(0.2, 0.0))
     record = fb.rollout(fb.Simulation(TALOS), walk, 0.4, control_period=4e-3)
     for axis, patches in ((plot_walk(record, walk.history), 1), (plot_lean(leaned(1.5, 0.01)), 0)):
-        colours = {hexadecimal(tuple(plt.matplotlib.colors.to_rgb(line.get_color()))) for line in axis.get_lines()}
+        colours = {to_hex(line.get_color()).upper() for line in axis.get_lines()}
         assert colours == {hexadecimal(GREYS[0]), hexadecimal(GREYS[1])} and hexadecimal(MEASURED) not in colours
         assert sum(isinstance(patch, Polygon) for patch in axis.patches) >= patches

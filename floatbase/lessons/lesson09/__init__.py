@@ -9,6 +9,7 @@ from floatbase.lessons.lesson09.helpers import (
     pressure,
     rose_controller,
     standing_rose_controller,
+    talos,
 )
 from floatbase.lessons.lesson09.pictures import (
     ONE_SOLE,
@@ -24,5 +25,6 @@ from floatbase.lessons.lesson09.pictures import (
 
 __all__ = [
     "EXERCISES", "ONE_SOLE", "ROSE_WATCH", "SOLES", "ankle_sensor", "corner_forces", "held", "kinds_of", "leaned", "leaning",
-    "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles", "soles_from_above", "standing_rose_controller",
+    "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles", "soles_from_above",
+    "standing_rose_controller", "talos",
 ]  # fmt: skip

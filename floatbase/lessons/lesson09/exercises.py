@@ -31,7 +31,7 @@ LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: what exercise 09
 
 @cache
 def ankle_sensor() -> Array:
-    """What a sensor in the left ankle of the standing Talos reads, shape (6,): force, N, and moment about itself, N·m, world."""
+    """What a sensor in the left ankle of Talos reads, shape (6,): force, N, and moment about itself, N·m, world."""
     state = talos().standing()
     sole = fb.Contacts.flat_feet(talos()).only("left_sole_link")
     return contact_wrench(state, sole, np.array(CORNER_FORCES), state.point("left_sole_link") + [0.0, 0.0, ANKLE])
@@ -122,15 +122,16 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     told = f"{about(short, 'mm', floor=0.05)} short at the end; the centre of pressure stays {about(ahead, 'mm', floor=0.5)} "
     told += f"from the toes and {about(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
-        return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with. Who starts later brakes harder.")
+        return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.")
     if ahead < EDGE and abs(short) > NEAR:
         return Verdict(False, f"Too near to the toes, and it does not get there either: {told}.")
     if ahead < EDGE:
-        return Verdict(False, f"Too near to the toes: {told}. Braking pushes there: how does the deceleration go with the time?")
+        return Verdict(False, f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?")
     if abs(short) > NEAR:
         return Verdict(False, f"It does not get there: {told}. Another wish holds it back.")
     if seconds > QUICK:
-        return Verdict(False, f"All is well, but it takes {about(seconds, 's', digits=3)}: {told}. There is room to be quicker.")
+        slow = about(seconds, "s", digits=3)
+        return Verdict(False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.")
     return Verdict(True, f"On the physics: {told}.")
 
 
@@ -150,10 +151,10 @@ EXERCISES = (
                 "The height goes in with the wrong sign: the ground is below the sensor.": _read(ANKLE),
                 "x and y are swapped: a push that is further ahead makes a moment about y.": _read(swap=True),
                 "Height forgotten, and x and y swapped.": _read(0.0, swap=True),
-                "The sign: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).": lambda: np.array(
-                    [ankle_sensor()[4] + ANKLE * ankle_sensor()[0], -ankle_sensor()[3] + ANKLE * ankle_sensor()[1]]
-                )
-                / ankle_sensor()[2],
+                "The sign: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).": lambda: (
+                    np.array([ankle_sensor()[4] + ANKLE * ankle_sensor()[0], -ankle_sensor()[3] + ANKLE * ankle_sensor()[1]])
+                    / ankle_sensor()[2]
+                ),
                 "That is in mm.": lambda: 1e3 * _pushed(),
                 "Divide by the normal force: these are moments.": lambda: _pushed() * ankle_sensor()[2],
                 "The normal force is f_z alone, not the length of f.": lambda: (
@@ -236,7 +237,7 @@ EXERCISES = (
         stub="design = np.array([1.0, 0.1])  # seconds, weight of the posture",
         solution="design = np.array([1.5, 0.01])",
         judge=_judge_lean,
-        explanation="Braking takes the centre of pressure ahead of x_c by its deceleration over ω², which falls with the square "
-        "of the time. The posture is a wish, too: with a tenth of its weight the lean ends where it should.",
+        explanation="Braking takes the centre of pressure ahead of x_c by the deceleration over ω², which falls with the "
+        "square of the time. The posture is a wish, too: with a tenth of its weight the lean ends where it should.",
     ),
 )

@@ -1,4 +1,4 @@
-"""Lesson 09, Feet with area: Talos held upright, where the ground pushes in a record, a lean, and the controllers of its roses."""
+"""Lesson 09, Feet with area: Talos held upright, where the ground pushes, a lean, and the controllers of its roses."""
 
 from __future__ import annotations
 

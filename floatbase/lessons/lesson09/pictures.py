@@ -16,7 +16,7 @@ from floatbase.behaviours import Step
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.lesson09.helpers import corner_forces, pressure
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, PLANNED, Picture, View, Viewer, hexadecimal, shapes
+from floatbase.viewer import GREYS, PLANNED, View, Viewer, hexadecimal, shapes
 
 SOLES = View(30.0, 25.0, 1.0, around=((0.0, 0.0, 0.1), 0.34))  # where Talos stands
 ONE_SOLE = View(30.0, 25.0, 1.0, around=((0.0, 0.085, 0.08), 0.26))
@@ -40,7 +40,7 @@ def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt
 
 
 def soles_from_above(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Soles from above, as SVG: corners as dots whose area is their normal force, centres of pressure as crosses, x_c as a ring.
+    """Soles from above, as SVG: corners as dots with their normal force as area, centres of pressure as crosses, x_c as a ring.
 
     forces: at the corners, shape (k,), N, world.
     """
@@ -180,7 +180,7 @@ def _seen(places: Array) -> Array:
 
 def _cross(at: Array, half: float) -> str:
     x, y = at
-    path = f"M{x - half:.1f} {y - half:.1f}L{x + half:.1f} {y + half:.1f}M{x - half:.1f} {y + half:.1f}L{x + half:.1f} {y - half:.1f}"
+    path = f"M{x - half:.1f} {y - half:.1f}l{2 * half} {2 * half}m{-2 * half} 0l{2 * half} {-2 * half}"
     return f'<path d="{path}" stroke="currentColor" stroke-width="2.5"/>'
 
 
