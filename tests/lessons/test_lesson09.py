@@ -219,9 +219,9 @@ def test_the_slice_is_as_wide_as_the_sole_and_as_high_as_the_twist(view: fb.View
     points = re.search(r'<polygon points="([^"]*)"', drawn)
     assert points is not None
     corners = np.array([[float(x) for x in pair.split(",")] for pair in points[1].split()])
-    assert np.allclose(np.ptp(corners[:, 0]) * 260 / 300, 200.0, atol=2.0)  # mm
+    assert np.allclose(np.ptp(corners[:, 0]) * 300 / 300, 200.0, atol=2.0)  # mm
     most = limits().reach([0, 0, 0, 0, 0, 1], weight)
-    assert np.allclose(np.ptp(corners[:, 1]) * 100 / 250, 2 * most, atol=1.0)  # N·m
+    assert np.allclose(np.ptp(corners[:, 1]) * 120 / 250, 2 * most, atol=1.0)  # N·m
 
 
 def test_a_plan_without_corners_is_played_with_its_resultants(view: fb.Viewer) -> None:

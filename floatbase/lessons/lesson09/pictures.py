@@ -16,14 +16,15 @@ from floatbase.behaviours import Step
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.lesson09.helpers import corner_forces, pressure
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, PLANNED, View, Viewer, hexadecimal, shapes
+from floatbase.viewer import GREYS, PLANNED, Picture, View, Viewer, below, hexadecimal, shapes
 
-SOLES = View(30.0, 25.0, 1.0, around=((0.0, 0.0, 0.1), 0.34))  # where Talos stands
-ONE_SOLE = View(30.0, 25.0, 1.0, around=((0.0, 0.085, 0.08), 0.26))
-NEWTON = 0.0008  # m drawn for 1 N at a sole
+SOLES = View(30.0, 30.0, 1.0, around=((0.0, 0.03, 0.06), 0.27))  # where Talos stands
+ONE_SOLE = View(30.0, 30.0, 1.0, around=((0.0, 0.1, 0.07), 0.2))
 _RATE = 30.0  # 1/s: pictures of a movie
 _FAR = 1.0  # m from a sole: a plan that wants to be pushed there is not drawn
 QUIET = 1.0  # N: a force that is not drawn
+_ABOVE = ("robot", "com", "scale")  # what is drawn of Talos beside its feet
+_BESIDE, _SIZE = (-0.1, 0.21, 0.002), 0.3  # m, world: where the scale of forces is, and the size of two feet
 WIDE, HIGH = 300, 250  # pixels of a drawing
 _COLUMNS = 261  # of a slice: one for each mm
 _BORDER = 1e-6  # of the normal force: a wrench this near to a limit is within it
@@ -35,8 +36,16 @@ def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt
 
     forces: at the corners, shape (k,), N, world.
     """
-    view.show(state, contacts, planned=forces)
+    view.draw(_feet_only(view, view.painter.picture(state, contacts, planned=forces)))
     return soles_from_above(state, contacts, forces)
+
+
+def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
+    """A picture of Talos without what is above its feet, its scale of forces beside them. side: of the one foot to keep."""
+    feet = tuple(f"robot/leg_{name}_6" for name in ("left", "right") if side in ("", name))
+    kept = {path: item for path, item in picture.items() if path.startswith(feet) or path.split("/")[0] not in _ABOVE}
+    bar = shapes.scale_bar(_BESIDE, 100.0, 100.0 * view.scale, _SIZE, view.painter.text)
+    return kept | below("scale", bar)
 
 
 def soles_from_above(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
@@ -74,8 +83,9 @@ def show_sole(view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSe
     picture = view.painter.picture(state, sole, planned=forces, com=False)
     if forces[2::3].sum() > QUIET:
         at = centre_of_pressure(state, sole, forces)
-        picture |= {"planned/sum": shapes.arrow(at, view.scale * forces.reshape(4, 3).sum(axis=0), PLANNED, view.painter.size)}
-    view.draw(picture)
+        total = view.scale * forces.reshape(-1, 3).sum(axis=0)
+        picture["planned/sum"] = shapes.arrow(at, total, PLANNED, _SIZE, halo=True)
+    view.draw(_feet_only(view, picture, "left"))
     missed = np.abs(contact_wrench(state, sole, forces, limits.about) - w)
     possible = bool(np.max(limits.rows @ w) <= _BORDER * w[2])
     told = "corner forces exist" if possible else f"no corner forces make this: {_broken(limits, w)}"
@@ -120,7 +130,7 @@ def kinds_of(rows: npt.ArrayLike) -> list[str]:
 
 def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     """As SVG: all centres of pressure along x with all twists that the sole can make at this force; the wrench as a dot."""
-    half, most = 130.0, 50.0  # mm, N·m: the ends of the axes
+    half, most = 150.0, 60.0  # mm, N·m: the ends of the axes
     sx, sy = WIDE / (2 * half), HIGH / (2 * most)
     x = np.linspace(-half, half, _COLUMNS)
     many = np.tile(wrench, (len(x), 1))
@@ -136,8 +146,8 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     drawn += _polygon(corners, 0.35) if len(corners) else ""
     at = -1e3 * wrench[4] / wrench[2], wrench[5]
     drawn += f'<circle cx="{WIDE / 2 + sx * at[0]:.1f}" cy="{HIGH / 2 - sy * at[1]:.1f}" r="6" fill="currentColor"/>'
-    axes = "across: centre of pressure ±130 mm, up: twist ±50 N·m"
-    return _svg(drawn, axes, *lines)
+    axes = f"across: centre of pressure, ±{half:.0f} mm", f"up: twist, ±{most:.0f} N·m; filled: allowed"
+    return _svg(drawn, *axes, *lines)
 
 
 def plot_walk(record: Rollout, steps: Iterable[Step]) -> Axes:
