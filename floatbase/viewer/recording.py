@@ -16,6 +16,7 @@ from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture, tidy
 
 if TYPE_CHECKING:
+    from floatbase.dynamics import Contacts
     from floatbase.simulation import Rollout
 
 REPETITIONS = 10_000  # meshcat's default is 1: it plays once and returns to the start
@@ -121,6 +122,13 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
         if push.acts_at(now) or 0.0 <= now - push.start < push.duration + seen - 1e-9:
             return push.frame, push.force
     return None
+
+
+def drawn_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
+    """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot be drawn."""
+    drawn = [contact.k == 3 * len(contact.point_names) for contact in contacts]
+    names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
+    return contacts.only(*names), np.repeat(drawn, [contact.k for contact in contacts])
 
 
 def lifted_at(rollout: Rollout, row: int) -> frozenset[str]:
