@@ -11,12 +11,12 @@ import numpy.typing as npt
 import umsgpack
 
 from floatbase._arrays import Array, checked, flag, of_kind, positive, said, text, whole
+from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture, tidy
 
 if TYPE_CHECKING:
-    from floatbase.dynamics import Contacts
     from floatbase.simulation import Rollout
 
 REPETITIONS = 10_000  # meshcat's default is 1: it plays once and returns to the start
@@ -126,6 +126,7 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
 
 def drawn_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
     """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot be drawn."""
+    of_kind("contacts", contacts, Contacts)
     drawn = [contact.k == 3 * len(contact.point_names) for contact in contacts]
     names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
     return contacts.only(*names), np.repeat(drawn, [contact.k for contact in contacts])
