@@ -18,12 +18,13 @@ from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State
 
 _SLOW = 0.1  # m/s of the centre of mass, below which it stops stepping
+_CLEARLY = 0.05  # m by which other feet must be nearer to the capture point for the gait to begin with those that then lift
 
 
 class Stand(Walk):
     """Stands where it is; with `steps` it walks in place once the capture point comes near the edge of the feet, until slow.
 
-    The feet that the capture point runs away from lift first: those that stay must be able to stop it.
+    It begins where in its period the feet that stay can stop the capture point: those that it runs away from lift first.
 
     robot, contacts, options: as for `Walk`.
     steps: the gait to step by, such as `Gait.trot(robot)`, whose start and stop do not count; None to stand only.
@@ -65,11 +66,14 @@ class Stand(Walk):
             self.gait = self._never
 
     def _begun(self, steps: Gait, state: State, dcm: Array) -> Gait:
-        """The gait from where in its period the feet that stay are nearest to the capture point, (2,) m."""
+        """The gait, begun where in its period the feet that stay are clearly nearer to the capture point, (2,) m."""
 
         def margin(first: float) -> float:
             stay = [name for name in self._all.names if steps.offsets.get(name) != first]
             return support_margin(dcm, self._all.only(*stay).positions(state)[:, :2]) if stay else -inf
 
-        first = max(sorted(set(steps.offsets.values())), key=margin)
+        own, *others = sorted(set(steps.offsets.values()))
+        first = max(others, key=margin, default=own)
+        if margin(first) < margin(own) + _CLEARLY:
+            return steps
         return replace(steps, offsets={foot: (offset - first) % 1.0 for foot, offset in steps.offsets.items()})

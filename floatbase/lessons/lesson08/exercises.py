@@ -99,9 +99,7 @@ _BUMPS: Mapping[str, Callable[[], Any]] = {
     ),
     "The shape is right; its height is 1. It should be 0.05 m.": lambda: np.array([0, 0, 0, 64, -192, 192, -64]),
     "In metres, please: this is in mm.": lambda: 1e3 * CLEARANCE * np.array([0, 0, 0, 64, -192, 192, -64]),
-    "The order: the first number belongs to u⁰, the last to u⁶.": lambda: (
-        CLEARANCE * np.array([-64, 192, -192, 64, 0, 0, 0])
-    ),
+    "The order: the first number belongs to u⁰, the last to u⁶.": lambda: CLEARANCE * np.array([-64, 192, -192, 64, 0, 0, 0]),
     "The sign: this foot digs.": lambda: -CLEARANCE * np.array([0, 0, 0, 64, -192, 192, -64]),
 }
 
@@ -110,7 +108,7 @@ _BUMPS: Mapping[str, Callable[[], Any]] = {
 
 
 def _backwards() -> tuple[fb.State, float, float, float]:
-    """anymal_kinova standing, the height of its centre of mass, and how far its hind and its front feet are from it along x, m."""
+    """anymal_kinova standing; how high its centre of mass is, and how far its hind and its front feet are from it along x, m."""
     state = fb.load("anymal_kinova").standing()
     x = fb.Contacts.points(state.robot).positions(state)[:, 0] - state.com[0]
     return state, float(state.com[2]), float(-x.min()), float(x.max())
@@ -194,7 +192,7 @@ def _judge_crawl(answer: Any) -> Verdict:
         return Verdict(False, f"Too near to the edge: {told}. The centre of mass shifts while all feet stand.")
     if pressed > PRESSED:
         return Verdict(False, f"A foot stamps: {told}. How fast does a foot fly for a step of that length?")
-    return Verdict(True, f"On the physics: {told}. Pauses buy margin, long swings buy gentle feet, and both cost nothing but steps.")
+    return Verdict(True, f"On the physics: {told}. Pauses buy margin, slow swings quiet feet; the price is longer steps.")
 
 
 EXERCISES = (
@@ -203,7 +201,7 @@ EXERCISES = (
         statement="RR stands 6 cm further back. The shortest shift of x_c, (2,), mm, forwards and to the left, after which "
         "FR can be lifted.",
         stub="shift = np.zeros(2)  # replace: forwards and to the left, mm",
-        solution='feet = dict(zip(contacts.names, contacts.positions(uneven)))\n'
+        solution="feet = dict(zip(contacts.names, contacts.positions(uneven)))\n"
         'a, b = feet["FL_foot"][:2], feet["RR_foot"][:2]\n'
         "across = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)\n"
         "shift = 1000 * ((a - uneven.com[:2]) @ across) * across",
@@ -221,8 +219,8 @@ EXERCISES = (
     ),
     Exercise(
         name="08.2",
-        statement="The coefficients of u⁰ to u⁶, (7,), m, of a bump that is at rest at u = 0 and 1, without acceleration there, "
-        "and 0.05 m high half-way.",
+        statement="The coefficients of u⁰ to u⁶, (7,), m, of a bump that is at rest at u = 0 and 1, without acceleration "
+        "there, and 0.05 m high half-way.",
         stub="bump = np.zeros(7)  # replace: coefficients of u⁰, u¹, …, u⁶, in m",
         solution="bump = 0.05 * 64 * np.array([0, 0, 0, 1, -3, 3, -1])  # 64 u³ (1 - u)³",
         judge=Shaped(
@@ -240,8 +238,8 @@ EXERCISES = (
     ),
     Exercise(
         name="08.3",
-        statement="anymal_kinova stands and is pushed backwards for 0.1 s: the largest force, N, by the rule of the capture point, the "
-        "push taken as an impulse.",
+        statement="anymal_kinova stands and is pushed backwards for 0.1 s: the largest force, N, by the rule of the "
+        "capture point, the push taken as an impulse.",
         stub="force = 0.0  # replace: N",
         solution='arm = fb.load("anymal_kinova")\n'
         "stands = arm.standing()\n"
@@ -258,12 +256,12 @@ EXERCISES = (
     ),
     Exercise(
         name="08.4",
-        statement="A crawl, (swing, pause, speed), s, s and m/s: at least 600 mm in 6 s, x_c at least 32 mm inside the feet that "
-        "stand, and never more than 80 N at a foot.",
+        statement="A crawl, (swing, pause, speed), s, s and m/s: at least 600 mm in 6 s, x_c at least 32 mm inside the feet "
+        "that stand, and never more than 80 N at a foot.",
         stub="design = np.array([0.3, 0.1, 0.08])  # swing, pause, s; speed, m/s",
         solution="design = np.array([0.3, 0.25, 0.12])",
         judge=_judge_crawl,
-        explanation="Margin comes from pauses, in which x_c shifts; quiet feet come from slow swings. Shorter steps, more often, "
-        "would stamp; the speed itself is nearly free.",
+        explanation="Margin comes from pauses, in which x_c shifts; quiet feet come from slow swings. Speed costs little: "
+        "the steps become longer.",
     ),
 )

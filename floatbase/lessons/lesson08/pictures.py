@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import ipywidgets as widgets
@@ -51,7 +52,7 @@ def plot_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
 
 
 def plot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: float) -> Figure:
-    """The normal force of one foot, planned and measured, N, of several records from begin to end, s. records: title -> record."""
+    """The normal force of one foot, planned and measured, N, from begin to end, s. records: title -> record."""
     figure, axes = plt.subplots(1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained")
     for ax, (title, record) in zip(np.atleast_1d(axes), records.items(), strict=True):
         rows = (record.time >= begin) & (record.time <= end)
@@ -83,7 +84,7 @@ def plot_paths(records: Mapping[str, Rollout]) -> Figure:
 
 
 def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
-    """Marks on the ground, for `extra` of `view.show`: (2,) m, world, of each name; names of feet get a patch, others a label."""
+    """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label."""
     feet = {foot.frame for foot in view.robot.feet}
     picture: Picture = {}
     for name, place in places.items():
@@ -109,12 +110,12 @@ class PushTogether(widgets.VBox):
             sim = fb.Simulation(one.robot)
             self.views[title].show(sim.state, contacts=sim.feet, cones=False)
             self.runs[title] = live(sim, one, self.views[title])
-            self.runs[title].on_status(lambda status, line=self.lines[title]: setattr(line, "value", advice(status)))
+            self.runs[title].on_status(partial(self._tell, title))
         self.force = _slider("push [N]", 0.0, 200.0, _MOST, 10.0)
         self.towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
         self.button, self.reset = widgets.Button(description="push both"), widgets.Button(description="reset")
         self.button.on_click(lambda _: self.push())
-        self.reset.on_click(lambda _: [run.reset() for run in self.runs.values()])
+        self.reset.on_click(lambda _: self.begin_anew())
         self._pictures = {title: widgets.HTML() for title in controllers}
         columns = [
             widgets.VBox([widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]], layout=_HALF)
@@ -129,6 +130,22 @@ class PushTogether(widgets.VBox):
         for run in self.runs.values():
             run.push([self.force.value * math.cos(angle), self.force.value * math.sin(angle), 0.0])
 
+    def begin_anew(self) -> None:
+        """Put all of them back on their feet."""
+        for run in self.runs.values():
+            run.reset()
+
+    def _tell(self, title: str, status: str) -> None:
+        self.lines[title].value = advice(status)
+
+    def close(self) -> None:
+        """Stop the runs and close the pictures."""
+        for run in self.runs.values():
+            run.close()
+        for view in self.views.values():
+            view.close()
+        super().close()
+
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The pictures are put in only here, as those of a slider panel."""
         for title, picture in self._pictures.items():
@@ -138,6 +155,4 @@ class PushTogether(widgets.VBox):
 
 def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:
     layout = widgets.Layout(width="60%")
-    return widgets.FloatSlider(
-        value=first, min=low, max=high, step=step, description=text, readout_format=".0f", layout=layout
-    )
+    return widgets.FloatSlider(value=first, min=low, max=high, step=step, description=text, readout_format=".0f", layout=layout)
