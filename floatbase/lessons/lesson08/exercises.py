@@ -108,7 +108,7 @@ _BUMPS: Mapping[str, Callable[[], Any]] = {
 
 
 def _backwards() -> tuple[fb.State, float, float, float]:
-    """anymal_kinova standing; how high its centre of mass is, and how far its hind and its front feet are from it along x, m."""
+    """anymal_kinova standing; how high its centre of mass is, and how far hind and front feet are from it along x, m."""
     state = fb.load("anymal_kinova").standing()
     x = fb.Contacts.points(state.robot).positions(state)[:, 0] - state.com[0]
     return state, float(state.com[2]), float(-x.min()), float(x.max())
