@@ -58,7 +58,7 @@ def tilt(record: Rollout) -> float:
     return float(np.rad2deg(np.arccos(np.clip(upright, -1.0, 1.0)).max()))
 
 
-def speed(record: Rollout, seconds: float = 1.0) -> Array:
+def speed(record: Rollout, seconds: float = 0.5) -> Array:
     """Mean velocity of the centre of mass in the last seconds of a record, shape (3,), m/s."""
     first = int(np.searchsorted(record.time, record.time[-1] - seconds))
     mean: Array = (record.com[-1] - record.com[first]) / (record.time[-1] - record.time[first])
