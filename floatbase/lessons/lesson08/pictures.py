@@ -87,12 +87,14 @@ def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
     """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label."""
     feet = {foot.frame for foot in view.robot.feet}
     picture: Picture = {}
+    aside = np.array([0.0, 0.12, 0.03])  # of the first label; the next one stands on the other side
     for name, place in places.items():
         at = np.array([*np.asarray(place, dtype=np.float64)[:2], _LIFTED])
         foot = name in feet
         picture[f"place/{name}"] = shapes.contact_patch(at, _UP, _SIZES["foothold" if foot else "point"])
         if not foot:
-            picture[f"label/{name}"] = shapes.label(at + [0.0, 0.0, 0.03], name, 0.03)
+            picture[f"label/{name}"] = shapes.label(at + aside, name, 0.035)
+            aside = aside * [1.0, -1.0, 1.0]
     return picture
 
 
