@@ -23,7 +23,6 @@ from floatbase.lessons.lesson08 import (
     moved_body,
     plot_fall,
     plot_loads,
-    plot_paths,
     rose_controller,
     run_of,
     shortest_shift,
@@ -201,7 +200,6 @@ def test_plots_have_greys_and_the_colours_of_forces_alone() -> None:
     assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hexadecimal(grey) for grey in GREYS}
     record = run_of(Stand(robot, contacts), 0.2)
     assert len(plot_loads({"a": record, "b": record}, "FR_foot", 0.0, 0.2).axes) == 2
-    assert len(plot_paths({"a": record, "b": record}).axes[0].lines) == 2
     falls = plot_fall([0.0, 0.1], [0.01, 0.02], 5.0).axes[0].lines
     assert np.allclose(falls[1].get_ydata(), [10.0, 10.0 * np.cosh(0.5)])
 

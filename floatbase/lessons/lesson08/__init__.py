@@ -13,9 +13,9 @@ from floatbase.lessons.lesson08.helpers import (
     torque_jump,
     uneven_stance,
 )
-from floatbase.lessons.lesson08.pictures import PushTogether, footholds, plot_fall, plot_loads, plot_paths, triangles
+from floatbase.lessons.lesson08.pictures import PushTogether, footholds, plot_fall, plot_loads, triangles
 
 __all__ = [
-    "EXERCISES", "PushTogether", "crawled", "footholds", "least_margin", "moved_body", "plot_fall", "plot_loads", "plot_paths",
+    "EXERCISES", "PushTogether", "crawled", "footholds", "least_margin", "moved_body", "plot_fall", "plot_loads",
     "rose_controller", "run_of", "shortest_shift", "speed", "tilt", "torque_jump", "triangles", "uneven_stance",
 ]  # fmt: skip

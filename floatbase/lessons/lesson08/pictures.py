@@ -67,22 +67,6 @@ def plot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: flo
     return figure
 
 
-def plot_paths(records: Mapping[str, Rollout]) -> Figure:
-    """Centres of mass from above, mm from where they began; forwards is up, as in the roses. records: name -> record."""
-    figure, ax = plt.subplots(figsize=(4.5, 4.5), layout="constrained")
-    styles = zip(GREYS, ("-", "--", ":"), strict=False)
-    for (name, record), (colour, style) in zip(records.items(), styles, strict=False):
-        x, y = 1e3 * (record.com - record.com[0])[:, :2].T
-        ax.plot(y, x, style, color=hexadecimal(colour), label=name, linewidth=2)
-    ax.invert_xaxis()
-    ax.set(xlabel="to the left [mm]", ylabel="forwards [mm]")
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.grid(alpha=0.3)
-    ax.legend()
-    plt.close(figure)
-    return figure
-
-
 def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
     """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label."""
     feet = {foot.frame for foot in view.robot.feet}
