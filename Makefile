@@ -99,7 +99,7 @@ lock: | python
 	"$(BASE)" -m venv build/uv
 	build/uv/bin/python -m pip --disable-pip-version-check install -q uv
 	build/uv/bin/uv pip compile -q --universal --python-version 3.11 --fork-strategy fewest \
-		--extra test --extra cluster --extra meshes --extra pages --no-annotate --no-emit-index-url \
+		--extra test --extra cluster --extra meshes --extra video --extra pages --no-annotate --no-emit-index-url \
 		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
 
 clean:

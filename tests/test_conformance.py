@@ -123,7 +123,7 @@ EXAMPLES: dict[str, Any] = {
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
     "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
-    "plot_roses.axis": POLAR, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
+    "plot_roses.axis": POLAR, "rolling": True, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,
     "bulk_modulus": 1.3e9,
     "column": "force", "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,
@@ -153,6 +153,7 @@ EXAMPLES: dict[str, Any] = {
     "Ground.offset": 0.1, "standing.offset": 0.1,
     "offset": UP, "omega": UP, "omega_rate": UP, "package_dirs": (), "parts": fb.Affine(np.eye(12), ZERO),
     "joint_servo.path": lambda t: ZERO, "load_urdf.path": str(judges.load("ur5").urdf), "path": "readable",
+    "save.size": (320, 200),
     "save.path": f"{FOLDER}/view.html", "paused": True, "pictures": [PICTURE, PICTURE], "Viewer.play.planned": True,
     "planned": 30.0 * np.tile(UP, 4), "plate": True, "points": CONTACTS.positions(STATE), "port": 0, "position": UP,
     "AnalyticController.posture": 1e-3, "load_urdf.posture": [0.0] * 6 + [1.0] + [0.0] * 6, "posture": ROBOT.posture,
@@ -286,8 +287,8 @@ def methods_of(room: str, name: str, kind: type) -> Iterator[Callee]:
 
 
 def parameters_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
-    """But for more arguments by name, which go to another callee here."""
-    return [p for p in inspect.signature(function).parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
+    """But for `options`: more arguments by name, which go to another callee here."""
+    return [p for p in inspect.signature(function).parameters.values() if p.name != "options"]
 
 
 def entry(table: dict[str, Any], callee: Callee, parameter: str, default: Any = None) -> Any:

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import sqrt
+from math import copysign, hypot, sqrt
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -340,18 +340,20 @@ class Walk:
         assert now.plan is not None
         error = capture_point(state.com, state.com_velocity, self.omega) - now.plan.dcm(now.time)
         dead_zone = _DEAD_ZONE if len(now.stance) > 2 or self._flat else 0.0
-        for foot, each in now.swinging.items():
-            left = each.path.land - now.time
-            end = each.planned[:2] + step_adjustment(error, left, self.omega, dead_zone)
-            body = state.com[:2] + state.com_velocity[:2] * left
-            each.path = replace(each.path, end=now.on_ground(foot, self._within_reach(foot, end, body)))
+        for land in {each.path.land for each in now.swinging.values()}:  # feet of a trot land together
+            shift = step_adjustment(error, land - now.time, self.omega, dead_zone)
+            body = state.com[:2] + state.com_velocity[:2] * (land - now.time)
+            for foot, each in now.swinging.items():
+                if each.path.land == land:
+                    end = self._within_reach(foot, each.planned[:2] + shift, body)
+                    each.path = replace(each.path, end=now.on_ground(foot, end))
 
     def _within_reach(self, foot: str, end: Array, body: Array) -> Array:
         """The foothold nearest to `end`, (2,) m, that the leg reaches from the body, (2,) m, and that is on the foot's side."""
         nominal, yaw = self._nominal[foot][:2], self._now.yaw
         away = turned(end - body, -yaw) - nominal
-        place = nominal + away * min(1.0, self.reach / (float(np.linalg.norm(away)) or 1.0))
-        side = np.sign(nominal[1])
+        place = nominal + away * min(1.0, self.reach / (hypot(*away) or 1.0))
+        side = copysign(1.0, nominal[1])
         place[1] = side * max(side * place[1], _OWN_SIDE * abs(nominal[1]))
         return body + turned(place, yaw)
 

@@ -77,7 +77,7 @@ def vector_text(vector: npt.ArrayLike, digits: int = 0) -> str:
 class Exercise:
     """One exercise of a lesson.
 
-    name: number of the lesson and its own, "01.2".
+    name: of the lesson, and its own number, "01.2" or "C.2".
     statement: what is to be found, with shape, unit and frame.
     stub: the code that a learner starts from; it runs.
     solution: the code that replaces the stub.

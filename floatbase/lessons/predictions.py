@@ -25,7 +25,7 @@ _unkept: dict[str, dict[str, Any]] = {}
 def predict(name: str, *answer: Any, unit: str = "", choices: Sequence[str] = (), count: int = 1) -> None:
     """Say what will happen before a cell shows it. Prints a line; what is no answer is told in words and not kept.
 
-    name: of the lesson and the prediction, "02.c".
+    name: of the lesson and the prediction, "02.c" or "C.a".
     answer: a number; a list of `count` numbers; one of `choices`, of which the beginning is enough; `...` or none skips it.
     unit: of the number.
     choices: the texts to choose from; without them the answer is a number.
@@ -72,11 +72,13 @@ def compare(name: str, value: Any) -> None:
 
 
 def review(lesson: str = "") -> None:
-    """Print what was predicted in a lesson, such as "02", or in all of them: name, what was said, what it is, how far off.
+    """Print what was predicted in a lesson, "02" or "C", or in all of them: name, what was said, what it is, how far off.
 
     The name of one prediction, such as "02.c", prints that one.
     """
-    lesson = f"0{lesson}" if len(text("lesson", lesson)) == 1 and lesson.isdigit() else lesson
+    lesson = text("lesson", lesson)
+    if len(lesson) == 1:  # 2 is lesson 02, and c is lesson C
+        lesson = f"0{lesson}" if lesson.isdigit() else lesson.upper()
     stored = progress.predictions()
     known = {name: stored.get(name, {}) | _unkept.get(name, {}) for name in sorted({*stored, *_unkept})}
     rows = [("", "you said", "it is", "")]

@@ -45,9 +45,12 @@ def plot_roses(lesson: str, axis: Axes | None = None) -> Axes:
     return roses.plot(measured_rose(lesson), axis, theory=False, before=_before(lesson))
 
 
-def draw_roses(lesson: str) -> Picture:
-    """What `plot_roses` plots, on the ground below the robot: items for `extra` of `Viewer.show`."""
-    return roses.picture(measured_rose(lesson), theory=False, before=_before(lesson))
+def draw_roses(lesson: str, scale: float | None = None) -> Picture:
+    """What `plot_roses` plots, on the ground below the robot: items for `extra` of `Viewer.show`.
+
+    scale: length of a drawn push, m/N; None makes the widest rose half as wide again as the stance.
+    """
+    return roses.picture(measured_rose(lesson), scale, theory=False, before=_before(lesson))
 
 
 def rose_controller(lesson: str) -> Callable[[], Any]:

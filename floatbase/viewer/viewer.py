@@ -17,7 +17,7 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import marks, page, recording, shapes, walks, wire
+from floatbase.viewer import film, marks, page, recording, shapes, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
@@ -310,18 +310,27 @@ class Viewer:
         away = np.zeros(3) if self._last is None else self._last.com - self.painter.home.com
         return np.array([*away[:2], 0.0])
 
-    def save(self, path: str | Path, title: str | None = None) -> Path:
-        """Write the scene, still or moving, as one HTML file that needs neither server nor network. Returns its path.
+    def save(self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)) -> Path:
+        """Write the scene to a file, by its name's ending, and return its path.
 
-        Raises `ViewerError` when nothing is drawn yet, when the name does not end in .html, and when it cannot be written.
+        path: .html is one page, still or moving, that needs neither server nor network. .mp4 and .gif are the recording at
+            the speed of `play`, .png its first picture; these need a browser and `pip install "floatbase[video]"`.
+        title: of the page.
+        size: (width, height) of films and images in pixels, even numbers.
+
+        Raises `ViewerError` when nothing is drawn yet, for another ending, and when it cannot be written.
         """
         target = Path(path if isinstance(path, Path) else text("path", path))
         if self.window.scene.is_empty:
             raise ViewerError("nothing is drawn yet, so there is nothing to save; call show(state) or play(rollout) first.")
-        if target.suffix.lower() not in (".html", ".htm"):
-            raise ViewerError(f"cannot save {target.name!r}: the scene is saved as a web page; end the name in .html.")
+        size = film.pixels(size)
+        if target.suffix.lower() not in (".html", ".htm", *film.RATES):
+            raise ViewerError(f"cannot save {target.name!r}: end the name in .html, .mp4, .gif or .png.")
         try:
-            target.write_text(self.static_html(title), encoding="utf-8")
+            if target.suffix.lower() in film.RATES:
+                film.shoot(self.static_html(title), target, size)
+            else:
+                target.write_text(self.static_html(title), encoding="utf-8")
         except OSError as error:
             raise ViewerError(f"cannot write {target} ({error.strerror}); choose a folder that exists.") from None
         return target

@@ -182,6 +182,18 @@ def test_a_lesson_is_reviewed_and_all_of_them_are(said: Any) -> None:
         assert [line.split()[0] for line in said()] == ["you", *rows]
 
 
+def test_a_lesson_named_by_a_letter_comes_after_the_numbered_ones(said: Any) -> None:
+    for name in ("C.b", "07.a", "C.a", "A.a"):
+        predict(name, 2)
+        compare(name, 3)
+    said()
+    for lesson, rows in (("", ["07.a", "A.a", "C.a", "C.b"]), ("C", ["C.a", "C.b"]), ("c", ["C.a", "C.b"]), ("C.b", ["C.b"])):
+        review(lesson)
+        assert [line.split()[0] for line in said()][1:] == rows
+    review("B")
+    assert said() == ["Nothing was predicted in lesson B yet."]
+
+
 DAMAGED = (
     "null", "5", "[1]", '"a"', "\0", "[" * 100_000, '{"02.c": 5}', '{"02.c": {}}', '{"02.c": {"said": null}}',
     '{"02.c": {"said": NaN, "is": Infinity}}', '{"02.c": {"said": [], "unit": 3}}', '{"02.c": {"said": [1, "a"]}}',

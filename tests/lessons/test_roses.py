@@ -39,6 +39,13 @@ def test_the_former_lesson_is_grey(lesson: str) -> None:
     assert {path.split("/")[0] for path in draw_roses(lesson)} == {"rose", *["before" for _ in former]}
 
 
+@pytest.mark.parametrize("scale", [0.002, 0.003])
+def test_roses_on_the_ground_are_drawn_in_a_scale_that_is_asked_for(scale: float) -> None:
+    items = draw_roses("06", scale)
+    apart = items["rose/label 200 N"].matrix[:2, 3] - items["rose/label 100 N"].matrix[:2, 3]
+    assert np.isclose(np.linalg.norm(apart), 100.0 * scale)
+
+
 def test_lessons_without_a_rose_are_told() -> None:
     with pytest.raises(InputError, match="no push rose"):
         measured_rose("00")

@@ -15,7 +15,7 @@ from floatbase.robots import catalogue, load, load_urdf, unbolted
 from floatbase.viewer import robot_meshes, urdf_visuals
 
 MESHES = Path(__file__).parents[2] / "assets" / "meshes"
-BOX = 0.007  # m: by which decimation may move an outermost vertex; two pixels in a picture of a whole robot
+BOX = 0.01  # m: by which decimation may move an outermost vertex; three pixels in a picture of a whole robot
 REACH = 0.03  # m from a contact to the nearest vertex: a foot's ball has a radius of 2 cm, and a sole few vertices
 
 

@@ -175,8 +175,8 @@ def test_wrong_records_and_file_names_are_explained(viewer: Viewer, go2: Robot, 
         viewer.save(tmp_path / "x.html")
     assert not (tmp_path / "x.html").exists()
     viewer.show(standing)
-    with pytest.raises(ViewerError, match=r"cannot save 'x.png': .* end the name in .html"):
-        viewer.save(tmp_path / "x.png")
+    with pytest.raises(ViewerError, match=r"cannot save 'x.svg': end the name in .html"):
+        viewer.save(tmp_path / "x.svg")
     with pytest.raises(ViewerError, match="cannot write .* choose a folder that exists"):
         viewer.save(tmp_path / "nowhere" / "x.html")
 

@@ -166,7 +166,8 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
         if _is_on_torques(eom, forces):
             return Verdict(False, "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the pullback.")
         f_c = about(points.sum(axis=0), "N", digits=3)
-        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. A smaller weight for the preference, or a better preference.")
+        better = "A smaller weight for the preference, or a better preference."
+        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. {better}")
     if np.linalg.norm(moment) > MISSED_MOMENT:
         return Verdict(False, f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.")
     if points[:, 2].min() <= 0:

@@ -1,0 +1,127 @@
+"""Films and images of a saved scene, drawn by a browser without a window: .mp4, .gif, .png."""
+
+from __future__ import annotations
+
+import io
+import shutil
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from tqdm.auto import tqdm
+
+from floatbase._arrays import checked, said
+from floatbase.errors import InputError, ViewerError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+RATES = {".png": 0, ".mp4": 30, ".gif": 20}  # pictures a second of each kind of file; 0: only the first one
+_LONGEST = 120.0  # s
+_LEAST, _MOST = 100, 4000  # pixels
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
+_FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
+_PATIENCE = 60_000  # ms until the page must have drawn
+_NEEDS = (
+    'that needs a browser (Chromium or Chrome) and two packages: pip install "floatbase[video]". A name in .html needs none.'
+)
+_IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
+_DURATION = """() => {
+    const {animator} = viewer;
+    const unused = [part("player"), viewer.gui.domElement, ...document.querySelectorAll("#legend.folded")];
+    for (const control of unused) control.style.visibility = "hidden";
+    if (!animator.duration) return 0;
+    animator.pause();
+    return animator.duration / animator.mixer.timeScale;
+}"""
+_SHOW = """t => {
+    if (viewer.animator.duration) viewer.animator.seek(t * viewer.animator.mixer.timeScale);
+    viewer.render();
+}"""
+
+
+def pixels(size: npt.ArrayLike) -> tuple[int, int]:
+    """Width and height of films, checked: films have even ones."""
+    width, height = (int(n) if n % 2.0 == 0.0 else 0 for n in checked("size", size, (2,), "pixels"))
+    if not (_LEAST <= width <= _MOST and _LEAST <= height <= _MOST):
+        raise InputError(f"size is {said(size)}; width and height must be even numbers of pixels from {_LEAST} to {_MOST}.")
+    return width, height
+
+
+def shoot(page: str, target: Path, size: tuple[int, int]) -> None:
+    """Write what a page with a scene shows: its recording as .mp4 or .gif, its first picture as .png.
+
+    page: its HTML. size: width and height in pixels, see `pixels`.
+    Raises `ViewerError` where browser or packages are missing, and for a recording that is too long.
+    """
+    target.open("ab").close()  # an `OSError` now, and not after the work
+    with ThreadPoolExecutor(1) as thread:  # playwright refuses one that has an event loop, such as a notebook's
+        thread.submit(_shoot, page, target, size).result()
+
+
+def _shoot(page: str, target: Path, size: tuple[int, int]) -> None:
+    kind = target.suffix.lower()
+    pictures = _pictures(page, size, RATES[kind])
+    if kind == ".png":
+        next(pictures).save(target)
+        pictures.close()  # type: ignore[attr-defined]
+    elif kind == ".gif":
+        _write_gif(target, pictures)
+    else:
+        _write_mp4(target, pictures, size)
+
+
+def _pictures(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
+    """The recording at `rate` pictures a second of film, played at its speed, or the first picture alone."""
+    try:
+        from PIL import Image
+        from playwright.sync_api import Error, sync_playwright
+    except ImportError as error:
+        raise ViewerError(f"a film cannot be made, {error.name} is not installed; {_NEEDS}") from None
+    path = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    with TemporaryDirectory() as folder, sync_playwright() as playwright:
+        file = Path(folder, "scene.html")
+        file.write_text(page, encoding="utf-8")
+        try:
+            browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
+        except Error as error:
+            raise ViewerError(f"no browser starts, so no film can be made; {_NEEDS} ({str(error).splitlines()[0]})") from None
+        with browser:
+            window = browser.new_page(viewport={"width": size[0], "height": size[1]})
+            window.goto(file.as_uri())
+            window.wait_for_function(_IS_DRAWN, timeout=_PATIENCE)
+            duration = window.evaluate(_DURATION)
+            if rate and duration > _LONGEST:
+                raise ViewerError(f"the film would last {duration:.0f} s, and may last {_LONGEST:g} s: play less, or faster.")
+            times = np.arange(0.0, duration + 1e-9, 1.0 / rate) if rate else np.zeros(1)
+            for t in tqdm(times, desc="film", unit="picture", leave=False, disable=not rate):
+                window.evaluate(_SHOW, float(t))
+                yield Image.open(io.BytesIO(window.screenshot())).convert("RGB")
+
+
+def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
+    from PIL.Image import Dither
+
+    none = Dither.NONE
+    first = next(pictures).quantize(dither=none)  # one palette for all: a palette for each flickers
+    rest = (picture.quantize(palette=first, dither=none) for picture in pictures)
+    first.save(target, save_all=True, append_images=rest, duration=1000 // RATES[".gif"], loop=0)
+
+
+def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -> None:
+    try:
+        import av
+    except ImportError as error:
+        raise ViewerError(f"a film cannot be made, {error.name} is not installed; {_NEEDS}") from None
+    with av.open(str(target), "w", options={"movflags": "faststart"}) as film:
+        stream = film.add_stream("libx264", rate=Fraction(RATES[".mp4"]), options={"crf": "20"})
+        stream.width, stream.height = size
+        stream.pix_fmt = "yuv420p"  # what browsers and slides play
+        for picture in pictures:
+            film.mux(stream.encode(av.VideoFrame.from_image(picture)))
+        film.mux(stream.encode())

@@ -1,0 +1,91 @@
+"""Films and images: what they show, and what is missing where they cannot be made."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browsers import needs_chromium
+from PIL import Image
+
+import floatbase as fb
+from floatbase.errors import InputError, ViewerError
+from floatbase.lessons import ConstantTorques
+from floatbase.simulation import Push
+
+SIZE = (320, 200)
+SOME = 20  # of 255: by which a pixel is another
+
+
+@pytest.fixture(scope="module")
+def view(request: pytest.FixtureRequest) -> fb.Viewer:
+    robot = fb.load("go2")
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+    run = fb.rollout(fb.Simulation(robot), controller, 0.2, [Push((0.0, 400.0, 0.0), 0.05, 0.1)])
+    view = fb.Viewer(robot)
+    view.play(run, speed=0.5, follow=False)
+    request.addfinalizer(view.close)
+    return view
+
+
+@needs_chromium
+def test_a_film_that_would_take_hours_is_refused(tmp_path: Path) -> None:
+    robot = fb.load("ur5")
+    run = fb.rollout(fb.Simulation(robot), ConstantTorques(np.zeros(6)), 0.2)
+    view = fb.Viewer(robot)
+    view.play(run, speed=1e-3)
+    with pytest.raises(ViewerError, match="would last 199 s, and may last 120 s: play less, or faster"):
+        view.save(tmp_path / "slow.gif", size=SIZE)
+    view.close()
+
+
+def share_of_others(first: np.ndarray, second: np.ndarray) -> float:
+    """Which part of the pixels of two images is another."""
+    return float(np.mean(np.abs(first.astype(int) - second).max(axis=2) > SOME))
+
+
+@needs_chromium
+def test_a_film_lasts_as_long_as_the_recording_in_slow_motion_and_shows_the_push(view: fb.Viewer, tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="av writes and reads films")
+    path = view.save(tmp_path / "push.mp4", size=SIZE)
+    with av.open(str(path)) as container:
+        pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        rate = float(container.streams.video[0].average_rate)
+    assert pictures[0].shape == (SIZE[1], SIZE[0], 3)
+    assert abs(len(pictures) / rate - 0.2 / 0.5) < 2.0 / rate
+    assert share_of_others(pictures[0], pictures[1]) < 0.01 < share_of_others(pictures[0], pictures[-1])
+
+
+@needs_chromium
+def test_a_gif_repeats_and_an_image_is_its_first_picture(view: fb.Viewer, tmp_path: Path) -> None:
+    gif = Image.open(view.save(tmp_path / "push.GIF", size=SIZE))
+    image = Image.open(view.save(tmp_path / "push.png", size=SIZE))
+    assert gif.size == image.size == SIZE and image.format == "PNG" and gif.info["loop"] == 0
+    assert getattr(gif, "n_frames", 1) == pytest.approx(0.4 * 20, abs=1)
+    assert share_of_others(np.array(gif.convert("RGB")), np.array(image)) < 0.1  # 256 colours
+    assert np.ptp(np.array(image), axis=(0, 1)).min() > 100  # a robot is in it
+
+
+def test_what_a_film_needs_is_told(view: fb.Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ViewerError, match="choose a folder that exists"):
+        view.save(tmp_path / "nowhere" / "push.gif")
+    with pytest.raises(ViewerError, match=r"end the name in .html, .mp4, .gif or .png"):
+        view.save(tmp_path / "push.avi")
+    for size in ((321, 200), (20, 20), (10_000, 200)):
+        with pytest.raises(InputError, match="even numbers of pixels from 100 to 4000"):
+            view.save(tmp_path / "push.mp4", size=size)
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
+    with pytest.raises(ViewerError, match=r"playwright.* is not installed; that needs .*floatbase\[video\]"):
+        view.save(tmp_path / "push.png", size=SIZE)
+
+
+@needs_chromium
+def test_a_machine_without_a_browser_is_told(view: fb.Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("playwright", reason="playwright is not installed")
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))
+    with pytest.raises(ViewerError, match="no browser starts, so no film can be made"):
+        view.save(tmp_path / "push.png", size=SIZE)
