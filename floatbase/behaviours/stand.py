@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from floatbase._arrays import Array, number, of_kind, positive
 from floatbase.behaviours.footholds import capture_point, support_margin
-from floatbase.behaviours.gait import SAME_TIME, Gait
+from floatbase.behaviours.gait import Gait, check_that_one_stands
 from floatbase.behaviours.walk import Walk
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
@@ -36,6 +36,8 @@ class Stand(Walk):
         self._never = replace(of_kind("steps", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0)
         self.steps, self.margin = steps, positive("margin", margin, "m", allow_zero=True)
         super().__init__(robot, contacts, self._never, **options)
+        if steps is not None and len(steps.feet) == len(contacts):
+            check_that_one_stands(replace(steps, stop=None))
 
     @property
     def stepping(self) -> bool:
@@ -45,11 +47,13 @@ class Stand(Walk):
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
         t = number("t", t, "s")
-        if self._reference is not None and t < self._reference.time - SAME_TIME:
-            self._reference, self.gait = None, self._never
-        if self.steps is not None and self._reference is not None:
+        if self.steps is not None and self._goes_on(t):
             self._decide(State(self.robot, q, v), t, self.steps)
         return super().__call__(q, v, t)
+
+    def _begin(self, state: State, t: float) -> None:
+        self.gait = self._never
+        super()._begin(state, t)
 
     def _decide(self, state: State, t: float, steps: Gait) -> None:
         """Begin to step, or end it."""
