@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import number, of_kind, positive
+from floatbase._arrays import Array, number, of_kind, positive
 from floatbase.behaviours.footholds import capture_point, support_margin
 from floatbase.behaviours.gait import Gait, check_that_one_stands
 from floatbase.behaviours.walk import Walk
@@ -17,10 +18,13 @@ from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State
 
 _SLOW = 0.1  # m/s of the centre of mass, below which it stops stepping
+_CLEARLY = 0.05  # m by which other feet must be nearer to the capture point for the gait to begin with those that then lift
 
 
 class Stand(Walk):
     """Stands where it is; with `steps` it walks in place once the capture point comes near the edge of the feet, until slow.
+
+    It begins where in its period the feet that stay can stop the capture point: those that it runs away from lift first.
 
     robot, contacts, options: as for `Walk`.
     steps: the gait to step by, such as `Gait.trot(robot)`, whose start and stop do not count; None to stand only.
@@ -55,12 +59,25 @@ class Stand(Walk):
         """Begin to step, or end it."""
         now = self._now
         if not self.stepping:
-            feet = self._all.positions(state)[:, :2]
-            if support_margin(capture_point(state.com, state.com_velocity, self.omega), feet) < self.margin:
-                self.gait = replace(steps, start=t, stop=None)
+            dcm = capture_point(state.com, state.com_velocity, self.omega)
+            if support_margin(dcm, self._all.positions(state)[:, :2]) < self.margin:
+                self.gait = replace(self._begun(steps, state, dcm), start=t, stop=None)
         elif self.gait.stop is None:
             slow = np.linalg.norm(state.com_velocity[:2]) < _SLOW
             if slow and t > self.gait.start + self.gait.period:
                 self.gait = replace(self.gait, stop=t)
         elif not now.swinging:
             self.gait = self._never
+
+    def _begun(self, steps: Gait, state: State, dcm: Array) -> Gait:
+        """The gait, begun where in its period the feet that stay are clearly nearer to the capture point, (2,) m."""
+
+        def margin(first: float) -> float:
+            stay = [name for name in self._all.names if steps.offsets.get(name) != first]
+            return support_margin(dcm, self._all.only(*stay).positions(state)[:, :2]) if stay else -inf
+
+        own, *others = sorted(set(steps.offsets.values()))
+        first = max(others, key=margin, default=own)
+        if margin(first) < margin(own) + _CLEARLY:
+            return steps
+        return replace(steps, offsets={foot: (offset - first) % 1.0 for foot, offset in steps.offsets.items()})

@@ -155,6 +155,15 @@ def test_steps_save_a_robot_that_would_fall() -> None:
     assert any(len(step.stance) < 4 for step in stepping.history)
 
 
+@pytest.mark.parametrize("towards", [(1.0, 1.0), (-1.0, -1.0)])
+def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float, float]) -> None:
+    robot = judges.load("go2")
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot))  # whose first pair stands along this diagonal
+    push = fb.Push(np.array([*towards, 0.0]) * 300.0 / np.sqrt(2.0), start=0.2)
+    assert run(stand, 2.0, push).outcome == "completed"  # it fell at 230 N, which standing alone survives
+    assert next(step.stance for step in stand.history if len(step.stance) == 2) == ("FL_foot", "RR_foot")
+
+
 def test_it_stands_without_a_step_as_long_as_the_capture_point_is_inside() -> None:
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
