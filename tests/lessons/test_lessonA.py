@@ -16,7 +16,7 @@ from floatbase.lessons.lessonA import circling, figure_of_eight, play_travel, pl
 from floatbase.viewer import GREYS, hexadecimal
 
 PAN, LIFT, ELBOW = 0, 1, 2
-MOVING = np.array([1.0, -0.8, 1.2, 0.5, 0.3, -0.4])
+MOVING = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
 DIFFERENCE = 1e-6  # of a central difference with 1e-4, in numbers of the order of 1 to 10
 
 

@@ -15,7 +15,7 @@ from floatbase.lessons.exercises import Exercise, Numeric
 TURNING, MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
 PLACE, WALK = np.array([2.0, 0.0, 0.0]), np.array([1.5, 0.0, 0.0])  # m and m/s, in the merry-go-round's axes
 LIFT, ELBOW = 1, 2  # of exercise A.2: ur5's joints
-MOVING = np.array([1.0, -0.8, 1.2, 0.5, 0.3, -0.4])  # rad/s, of exercise A.3
+MOVING = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # rad/s, of exercise A.3
 STEP = 1e-4  # s, and of differences
 
 
