@@ -21,11 +21,12 @@ START = np.array([-0.7, 0.3, 0.0])  # m: where the puck begins, from the axis
 AT_TABLE = View(-90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0))  # x to the right, y away, as in the rider's drawing
 PIECES = 24  # of a drawn path
 SIDE = 250  # pixels of a drawing
-ACCELERATION = 0.06  # m drawn for 1 m/s²
+ACCELERATION = 0.05  # m drawn for 1 m/s²
 NEWTON = 0.003  # m drawn for 1 N of what is called a force
-SIDEWAYS = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.5), 0.75))
-FROM_ABOVE = View(150.0, 38.0, 1.0, around=((0.0, 0.0, 0.12), 0.42))
+SIDEWAYS = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.62), 0.5))
+AT_FEET = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.5))
 SEEN = 1e-3  # m: a shorter rod is not drawn
+BESIDE = 0.05  # m: from a foot to its pin, away from the robot, where they are seen
 FRAMES = 10  # pictures for each second of the travelling feet
 
 
@@ -77,11 +78,11 @@ def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str
     sizes = [float(np.linalg.norm(each)) for each in (centrifugal, coriolis)]
     words = ("what the rider sees", f"dashed: centrifugal, {sizes[0]:.1f} m/s²", f"solid: Coriolis, {sizes[1]:.1f} m/s²")
     lines = "".join(
-        f'<text x="{half}" y="{SIDE + 18 + 18 * i}" text-anchor="middle" font-size="13">{word}</text>'
+        f'<text x="{half}" y="{SIDE + 40 + 18 * i}" text-anchor="middle" font-size="13">{word}</text>'
         for i, word in enumerate(words)
     )
     return (
-        f'<svg width="300" viewBox="-25 0 300 {SIDE + 18 * len(words) + 10}" style="max-width: 100%; overflow: visible" '
+        f'<svg width="300" viewBox="-25 -30 300 {SIDE + 18 * len(words) + 65}" style="max-width: 100%" '
         f'fill="currentColor">{drawn}{lines}</svg>'
     )
 
@@ -154,7 +155,7 @@ def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) 
 
 
 def play_travel(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
-    """A robot whose feet travel: a patch where each began to stand, and a line from there to where it stands now."""
+    """A robot whose feet travel: beside each a pin where it began to stand, and a line as far to the side as it is now."""
     contacts = record.contacts
     home = contacts.positions(record.state(0))
     rows = np.arange(0, len(record), max(1, round(1.0 / FRAMES / (record.time[1] - record.time[0]))))
@@ -163,12 +164,11 @@ def play_travel(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
         state = record.state(i)
         drawn = view.painter.picture(state, com=False)
         for j, (a, b) in enumerate(zip(home, contacts.positions(state), strict=True)):
-            drawn[f"home/{j}"] = shapes.contact_patch([*a[:2], 0.001], [0.0, 0.0, 1.0], 0.03)
-            post = shapes.rod([*a[:2], 0.0], np.eye(3), 0.12, 0.003, GREYS[0])
-            drawn[f"post/{j}"] = post
-            if rod := _rod(np.array([*a[:2], 0.004]), np.array([*b[:2], 0.004]), 0.006, GREYS[0]):
+            pin = np.array([a[0] + np.sign(a[0]) * BESIDE, a[1], 0.006])
+            drawn[f"pin/{j}"] = shapes.rod(pin, np.eye(3), 0.05, 0.004, GREYS[0])
+            if rod := _rod(pin, np.array([pin[0], b[1], pin[2]]), 0.006, GREYS[0]):
                 drawn[f"way/{j}"] = rod
         return drawn
 
     view.play_pictures(record.time[rows], [picture(int(i)) for i in rows], speed=speed)
-    return view.camera(FROM_ABOVE)
+    return view.camera(AT_FEET)
