@@ -50,7 +50,7 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
         Coriolis force; or the world's. A robot without a floating base has the same parts in both.
     """
     of_kind("state", state, State)
-    if axes not in ("base", "world"):
+    if not isinstance(axes, str) or axes not in ("base", "world"):
         raise unknown_name("axes", axes, ("base", "world"))
     model = state.robot.model
     data = model.createData()

@@ -24,7 +24,7 @@ SIDE = 250  # pixels of a drawing
 ACCELERATION = 0.05  # m drawn for 1 m/s²
 NEWTON = 0.003  # m drawn for 1 N of what is called a force
 SIDEWAYS = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.62), 0.5))
-AT_FEET = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.5))
+AT_FEET = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.44))
 SEEN = 1e-3  # m: a shorter rod is not drawn
 BESIDE = 0.05  # m: from a foot to its pin, away from the robot, where they are seen
 FRAMES = 10  # pictures for each second of the travelling feet
