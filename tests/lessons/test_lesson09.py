@@ -22,6 +22,7 @@ from floatbase.lessons.lesson09 import (
     ankle_sensor,
     corner_forces,
     held,
+    how_it_ended,
     kinds_of,
     leaned,
     leaning,
@@ -36,6 +37,7 @@ from floatbase.lessons.lesson09 import (
     standing_rose_controller,
     talos,
 )
+from floatbase.lessons.lesson09.exercises import _judge_record
 from floatbase.simulation import Rollout
 from floatbase.viewer import GREYS, MEASURED, PLANNED, hexadecimal
 
@@ -139,6 +141,14 @@ def test_09_4_knows_what_is_wrong() -> None:
     assert missed("09.4", wrong) == []
 
 
+def test_09_4_takes_no_lean_that_lets_arms_and_trunk_go() -> None:
+    loose = all_exercises()["09.4"].judge([1.5, 0.0])
+    assert not loose.right and ("Hardly any wish" in loose.text or "Arms and trunk" in loose.text)
+    record = leaned(1.5, 0.01)
+    in_the_air = _judge_record(replace(record, measured=0.0 * record.measured), 1.5)
+    assert not in_the_air.right and "no corner touches" in in_the_air.text
+
+
 # helpers --------------------------------------------------------------------------------------------------------------------
 
 
@@ -148,6 +158,15 @@ def test_talos_stands_and_the_pressure_of_a_record_is_the_centre_of_pressure() -
     expected = centre_of_pressure(record.final, SOLES, record.measured[-1])
     assert np.allclose(pressure(record)[-1], expected[:2], atol=1e-5)
     assert np.isnan(pressure(replace(record, measured=0.0 * record.measured))).all()
+
+
+def test_how_a_record_ended_in_words() -> None:
+    record = stood()
+    assert how_it_ended(record) == "stands"
+    ways = {"falls forwards": [0.2, 0.1, 0], "falls backwards": [-0.2, 0.1, 0], "falls aside": [0.1, -0.2, 0]}
+    for words, way in ways.items():
+        com = np.vstack([record.com[:-1], record.com[0] + way])
+        assert how_it_ended(replace(record, outcome="fell", com=com)) == words
 
 
 def test_a_filed_corner_changes_the_corners_and_not_the_wrench() -> None:

@@ -50,6 +50,16 @@ def held(
     return fb.rollout(sim, controller, duration, pushes, PERIOD)
 
 
+def how_it_ended(record: Rollout) -> str:
+    """Whether a record's robot stands, or to which side it falls: where its centre of mass went, in words."""
+    x, y, _ = record.com[-1] - record.com[0]
+    if record.outcome == "completed":
+        return "stands"
+    if abs(y) > abs(x):
+        return "falls aside"
+    return "falls forwards" if x > 0.0 else "falls backwards"
+
+
 def pressure(record: Rollout) -> Array:
     """Where the ground pushed: the centre of pressure of all points together at each row, shape (n, 2), m, world.
 
