@@ -165,8 +165,9 @@ def test_how_a_record_ended_in_words() -> None:
     assert how_it_ended(record) == "stands"
     ways = {"falls forwards": [0.2, 0.1, 0], "falls backwards": [-0.2, 0.1, 0], "falls aside": [0.1, -0.2, 0]}
     for words, way in ways.items():
-        com = np.vstack([record.com[:-1], record.com[0] + way])
-        assert how_it_ended(replace(record, outcome="fell", com=com)) == words
+        q = np.array(record.q)
+        q[-1, :3] += way
+        assert how_it_ended(replace(record, outcome="fell", q=q)) == words
 
 
 def test_a_filed_corner_changes_the_corners_and_not_the_wrench() -> None:

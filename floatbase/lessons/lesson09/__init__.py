@@ -25,7 +25,7 @@ from floatbase.lessons.lesson09.pictures import (
 )
 
 __all__ = [
-    "EXERCISES", "ONE_SOLE", "ROSE_WATCH", "SOLES", "ankle_sensor", "corner_forces", "held", "how_it_ended", "kinds_of", "leaned", "leaning",
-    "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles", "soles_from_above",
-    "standing_rose_controller", "talos",
+    "EXERCISES", "ONE_SOLE", "ROSE_WATCH", "SOLES", "ankle_sensor", "corner_forces", "held", "how_it_ended", "kinds_of", "leaned",
+    "leaning", "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles",
+    "soles_from_above", "standing_rose_controller", "talos",
 ]  # fmt: skip
