@@ -26,6 +26,7 @@ from floatbase.lessons.lesson09 import (
     kinds_of,
     leaned,
     leaning,
+    on_one_sole,
     play_resultants,
     plot_lean,
     plot_walk,
@@ -254,6 +255,11 @@ def test_a_plan_without_corners_is_played_with_its_resultants(view: fb.Viewer) -
 def test_a_walk_and_a_lean_are_plotted_in_greys() -> None:
     walk = Walk(TALOS, SOLES, Gait.walk(TALOS, start=0.2), velocity=(0.2, 0.0))
     record = fb.rollout(fb.Simulation(TALOS), walk, 0.4, control_period=4e-3)
+    alone = on_one_sole(record)
+    assert alone and on_one_sole(stood()) == {}
+    for i, corners in alone.items():
+        (foot,) = record.contacts_at(i).names
+        assert np.allclose(corners.mean(axis=0), record.state(i).point(foot)[:2], atol=1e-6)
     for axis, patches in ((plot_walk(record, walk.history), 1), (plot_lean(leaned(1.5, 0.01)), 0)):
         colours = {to_hex(line.get_color()).upper() for line in axis.get_lines()}
         assert colours == {hexadecimal(GREYS[0]), hexadecimal(GREYS[1])} and hexadecimal(MEASURED) not in colours

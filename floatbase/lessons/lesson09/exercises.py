@@ -125,7 +125,8 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
     where = "short" if short >= 0.0 else "too far"
     told = f"{about(abs(short), 'mm', floor=0.05)} {where} at the end; "
-    told += f"the centre of pressure stays {about(ahead, 'mm', floor=0.5)} from the toes and {about(behind, 'mm', floor=0.5)} from the heels"
+    told += f"the centre of pressure stays {about(ahead, 'mm', floor=0.5)} from the toes "
+    told += f"and {about(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
         return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.")
     if ahead < EDGE and abs(short) > NEAR:

@@ -71,6 +71,15 @@ def pressure(record: Rollout) -> Array:
     return read_only(np.einsum("ij,ijk->ik", normal, record.foot_positions[:, :, :2]) / total[:, None])
 
 
+def on_one_sole(record: Rollout, every: int = 5) -> dict[int, Array]:
+    """Rows of a record in which one foot stands alone, and its corners there from above, shape (n, 2), m, world.
+
+    every: of so many rows one is looked at.
+    """
+    stances = {i: record.contacts_at(i) for i in range(0, len(record), every)}
+    return {i: stance.positions(record.state(i))[:, :2] for i, stance in stances.items() if len(stance) == 1}
+
+
 def corner_forces(state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4) -> Array:
     """The forces at the corners of one sole, inside their pyramids, whose wrench is nearest to the one given, shape (k,), N.
 
