@@ -27,6 +27,6 @@ from floatbase.lessons.lesson09.pictures import (
 
 __all__ = [
     "EXERCISES", "ONE_SOLE", "ROSE_WATCH", "SOLES", "ankle_sensor", "corner_forces", "held", "how_it_ended", "kinds_of",
-    "leaned", "leaning", "on_one_sole", "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles",
-    "soles_from_above", "standing_rose_controller", "talos",
+    "leaned", "leaning", "on_one_sole", "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller",
+    "show_sole", "show_soles", "soles_from_above", "standing_rose_controller", "talos",
 ]  # fmt: skip
