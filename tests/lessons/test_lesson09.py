@@ -22,9 +22,11 @@ from floatbase.lessons.lesson09 import (
     ankle_sensor,
     corner_forces,
     held,
+    how_it_ended,
     kinds_of,
     leaned,
     leaning,
+    on_one_sole,
     play_resultants,
     plot_lean,
     plot_walk,
@@ -139,6 +141,17 @@ def test_09_4_knows_what_is_wrong() -> None:
     assert missed("09.4", wrong) == []
 
 
+def test_09_4_takes_no_lean_that_lets_arms_and_trunk_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = all_exercises()["09.4"].judge
+    loose = judge([1.5, 0.0])
+    assert not loose.right and ("Hardly any wish" in loose.text or "Arms and trunk" in loose.text)
+    record = leaned(1.5, 0.01)
+    jump = replace(record, measured=0.0 * record.measured)
+    monkeypatch.setattr("floatbase.lessons.lesson09.exercises.leaned", lambda seconds, posture: jump)
+    in_the_air = judge([1.5, 0.01])
+    assert not in_the_air.right and "no corner touches" in in_the_air.text
+
+
 # helpers --------------------------------------------------------------------------------------------------------------------
 
 
@@ -148,6 +161,16 @@ def test_talos_stands_and_the_pressure_of_a_record_is_the_centre_of_pressure() -
     expected = centre_of_pressure(record.final, SOLES, record.measured[-1])
     assert np.allclose(pressure(record)[-1], expected[:2], atol=1e-5)
     assert np.isnan(pressure(replace(record, measured=0.0 * record.measured))).all()
+
+
+def test_how_a_record_ended_in_words() -> None:
+    record = stood()
+    assert how_it_ended(record) == "stands"
+    ways = {"falls forwards": [0.2, 0.1, 0], "falls backwards": [-0.2, 0.1, 0], "falls aside": [0.1, -0.2, 0]}
+    for words, way in ways.items():
+        q = np.array(record.q)
+        q[-1, :3] += way
+        assert how_it_ended(replace(record, outcome="fell", q=q)) == words
 
 
 def test_a_filed_corner_changes_the_corners_and_not_the_wrench() -> None:
@@ -234,6 +257,11 @@ def test_a_plan_without_corners_is_played_with_its_resultants(view: fb.Viewer) -
 def test_a_walk_and_a_lean_are_plotted_in_greys() -> None:
     walk = Walk(TALOS, SOLES, Gait.walk(TALOS, start=0.2), velocity=(0.2, 0.0))
     record = fb.rollout(fb.Simulation(TALOS), walk, 0.4, control_period=4e-3)
+    alone = on_one_sole(record)
+    assert alone and on_one_sole(stood()) == {}
+    for i, corners in alone.items():
+        (foot,) = record.contacts_at(i).names
+        assert np.allclose(corners.mean(axis=0), record.state(i).point(foot)[:2], atol=1e-6)
     for axis, patches in ((plot_walk(record, walk.history), 1), (plot_lean(leaned(1.5, 0.01)), 0)):
         colours = {to_hex(line.get_color()).upper() for line in axis.get_lines()}
         assert colours == {hexadecimal(GREYS[0]), hexadecimal(GREYS[1])} and hexadecimal(MEASURED) not in colours

@@ -5,7 +5,9 @@ from floatbase.lessons.lesson09.helpers import (
     ROSE_WATCH,
     corner_forces,
     held,
+    how_it_ended,
     leaning,
+    on_one_sole,
     pressure,
     rose_controller,
     standing_rose_controller,
@@ -24,7 +26,7 @@ from floatbase.lessons.lesson09.pictures import (
 )
 
 __all__ = [
-    "EXERCISES", "ONE_SOLE", "ROSE_WATCH", "SOLES", "ankle_sensor", "corner_forces", "held", "kinds_of", "leaned", "leaning",
-    "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller", "show_sole", "show_soles", "soles_from_above",
-    "standing_rose_controller", "talos",
+    "EXERCISES", "ONE_SOLE", "ROSE_WATCH", "SOLES", "ankle_sensor", "corner_forces", "held", "how_it_ended", "kinds_of",
+    "leaned", "leaning", "on_one_sole", "play_resultants", "plot_lean", "plot_walk", "pressure", "rose_controller",
+    "show_sole", "show_soles", "soles_from_above", "standing_rose_controller", "talos",
 ]  # fmt: skip

@@ -24,6 +24,7 @@ CORNER_FORCES = ((30.0, 5.0, 210.0), (24.0, -6.0, 120.0), (14.0, 2.0, 60.0), (12
 LENGTH, WIDTH, LOAD, SOLE_MU = 0.24, 0.10, 400.0, 0.6  # m, m, N and μ of the sole of exercise 09.3
 ROUND = 360  # facets that stand for a round cone: they miss 4e-5 of it
 LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: what exercise 09.4 asks for
+_LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it little holds arms and trunk
 
 
 # 09.1 ---------------------------------------------------------------------------------------------------------------------
@@ -108,7 +109,8 @@ def _judge_lean(answer: Any) -> Verdict:
     except InputError as error:
         return Verdict(False, str(error))
     if record.outcome != "completed":
-        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.")
+        why = " Hardly any wish says what arms and trunk do." if posture < _LOOSE else ""
+        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.{why}")
     return _judge_record(record, seconds)
 
 
@@ -117,18 +119,24 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     settled = record.time > 0.1  # the robot is put down at first
     toes, heels = record.foot_positions[..., 0].max(axis=1), record.foot_positions[..., 0].min(axis=1)
     pushed = pressure(record)[:, 0]
+    if np.isnan(pushed[settled]).any():
+        return Verdict(False, "For a moment no corner touches the ground. Arms and trunk are thrown about: what holds them?")
     ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
-    told = f"{about(short, 'mm', floor=0.05)} short at the end; the centre of pressure stays {about(ahead, 'mm', floor=0.5)} "
-    told += f"from the toes and {about(behind, 'mm', floor=0.5)} from the heels"
+    where = "short" if short >= 0.0 else "too far"
+    told = f"{about(abs(short), 'mm', floor=0.05)} {where} at the end; "
+    told += f"the centre of pressure stays {about(ahead, 'mm', floor=0.5)} from the toes "
+    told += f"and {about(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
         return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.")
     if ahead < EDGE and abs(short) > NEAR:
         return Verdict(False, f"Too near to the toes, and it does not get there either: {told}.")
     if ahead < EDGE:
         return Verdict(False, f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?")
-    if abs(short) > NEAR:
+    if short > NEAR:
         return Verdict(False, f"It does not get there: {told}. Another wish holds it back.")
+    if short < -NEAR:
+        return Verdict(False, f"It goes beyond: {told}. Nothing brakes the rest of the body.")
     if seconds > QUICK:
         slow = about(seconds, "s", digits=3)
         return Verdict(False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.")
@@ -162,7 +170,7 @@ EXERCISES = (
                 ),
             },
         ),
-        explanation="Moments about the point below the sensor: τ - (0, 0, -h) × f has -h f_x about y and h f_y about x.",
+        explanation="Moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x - h f_y and τ_y + h f_x.",
     ),
     Exercise(
         name="09.2",

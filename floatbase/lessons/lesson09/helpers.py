@@ -50,6 +50,16 @@ def held(
     return fb.rollout(sim, controller, duration, pushes, PERIOD)
 
 
+def how_it_ended(record: Rollout) -> str:
+    """Whether a record's robot stands, or to which side it falls: where its centre of mass went, in words."""
+    x, y, _ = record.com[-1] - record.com[0]
+    if record.outcome == "completed":
+        return "stands"
+    if abs(y) > abs(x):
+        return "falls aside"
+    return "falls forwards" if x > 0.0 else "falls backwards"
+
+
 def pressure(record: Rollout) -> Array:
     """Where the ground pushed: the centre of pressure of all points together at each row, shape (n, 2), m, world.
 
@@ -59,6 +69,15 @@ def pressure(record: Rollout) -> Array:
     total = np.sum(normal, axis=1)
     total = np.where(total > 0.0, total, np.nan)
     return read_only(np.einsum("ij,ijk->ik", normal, record.foot_positions[:, :, :2]) / total[:, None])
+
+
+def on_one_sole(record: Rollout, every: int = 5) -> dict[int, Array]:
+    """Rows of a record in which one foot stands alone, and its corners there from above, shape (n, 2), m, world.
+
+    every: of so many rows one is looked at.
+    """
+    stances = {i: record.contacts_at(i) for i in range(0, len(record), every)}
+    return {i: stance.positions(record.state(i))[:, :2] for i, stance in stances.items() if len(stance) == 1}
 
 
 def corner_forces(state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4) -> Array:

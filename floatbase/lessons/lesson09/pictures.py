@@ -157,7 +157,8 @@ def plot_walk(record: Rollout, steps: Iterable[Step]) -> Axes:
         state = record.state(min(int(np.searchsorted(record.time, step.time)), len(record) - 1))
         for name in step.stance:
             corners = record.contacts.only(name).positions(state)[:, :2]
-            axis.add_patch(Polygon(corners, closed=True, color=hexadecimal(GREYS[2]), alpha=0.3, linewidth=0))
+            label = "_" if axis.patches else "soles"
+            axis.add_patch(Polygon(corners, closed=True, color=hexadecimal(GREYS[2]), alpha=0.3, linewidth=0, label=label))
     pushed, com = pressure(record), record.com
     axis.plot(pushed[:, 0], pushed[:, 1], color=hexadecimal(GREYS[1]), linewidth=1.5, label="centre of pressure")
     axis.plot(com[:, 0], com[:, 1], "--", color=hexadecimal(GREYS[0]), linewidth=2.5, label="x_c")
