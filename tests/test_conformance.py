@@ -168,6 +168,7 @@ EXAMPLES: dict[str, Any] = {
     "show": lambda record: None, "sim": SIM, "Cylinders.size": np.ones(12), "solver": "daqp", "space": SPACE, "speed": 1.0,
     "places": np.zeros((2, 3)), "Viewer.step.step": WALK.history[0], "steps": list(WALK.history), "walk": WALK,
     "spread": 0.2, "WrenchSet.reach.start": 150.0 * np.eye(6)[2], "active_set.start": np.zeros(QP.n), "start": 0.1,
+    "most": 5,
     "state": STATE, "status": "inside", "step": 0.1, "stiffness": 100.0, "supply_pressure": 160e5, "support": True, "t": 0.5,
     "turn": 0.3, "solution": VALUES["Solution"],
     "tank_pressure": 2e5, "target": ZERO, "tasks": CONTROLLER.tasks, "cost_on_space.tau": fb.Quadratic.zero(12), "tau": ZERO,

@@ -1,0 +1,112 @@
+"""Quadratic programs in the plane, drawn: level curves, rows, what they leave, and the way of a solver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from floatbase._arrays import Array, checked, of_kind, texts
+from floatbase.errors import InputError, unknown_name
+from floatbase.qp import QP, Iteration
+from floatbase.viewer.colours import GREYS
+
+_LEVELS = 12  # curves of equal objective
+_FINE = 60  # points along each side that the curves are drawn through
+
+
+def plot(
+    qp: QP,
+    box: tuple[float, float, float, float] = (-3.0, 3.0, -2.0, 3.0),
+    working: Sequence[str] = (),
+    point: object = None,
+    axis: Axes | None = None,
+) -> Axes:
+    """App. C: a QP of two variables in the plane: its level curves, its rows with names, and in grey what they leave.
+
+    qp: of two variables, without equalities.
+    box: what is seen, from and to along the first variable and the second.
+    working: names of the rows that are held with equality, drawn thick.
+    point: (2,), a dot, or None.
+    axis: to plot on; None for a new figure.
+
+    Raises `InputError` for another number of variables or with equalities, `UnknownNameError` for a row that does not exist.
+    """
+    if of_kind("qp", qp, QP).n != 2 or len(qp.A):
+        raise InputError(f"{qp!r} does not lie in the plane: 2 variables and no equalities can be drawn.")
+    box = tuple(checked("box", box, (4,)))
+    for name in texts("working", working):
+        if name not in qp.inequality_names:
+            raise unknown_name("inequality row", name, qp.inequality_names)
+    axis = plt.figure().gca() if axis is None else of_kind("axis", axis, Axes)
+    axis.fill(*allowed(qp, box).T, color=GREYS[2], alpha=0.35, linewidth=0.0)
+    _plot_levels(qp, box, axis)
+    for i, name in enumerate(qp.inequality_names):
+        _plot_row(qp, i, name in working, box, axis)
+    if point is not None:
+        axis.plot(*checked("point", point, (2,)), "o", color=GREYS[0], markeredgecolor="white", markersize=10, zorder=5)
+    axis.set(xlim=box[:2], ylim=box[2:], aspect="equal")
+    return axis
+
+
+def plot_way(iterations: Sequence[Iteration], axis: Axes, dashed: bool = False) -> Axes:
+    """The points that a solver came through, in a picture by `plot`; dashed: light and dashed, for phase 1."""
+    points = np.array([step.x for step in iterations] + [step.arrival for step in iterations[-1:]])
+    colour, style = (GREYS[1], "--") if dashed else (GREYS[0], "-")
+    if len(points):
+        axis.plot(*points.T, style, color=colour, marker="o", markersize=5, linewidth=2, zorder=4)
+    return axis
+
+
+def allowed(qp: QP, box: tuple[float, float, float, float]) -> Array:
+    """The corners of what the rows of a QP in the plane leave of a box, in order, shape (k, 2); no corners where nothing is left."""
+    x0, x1, y0, y1 = box
+    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    for normal, bound in zip(qp.G, qp.h, strict=True):
+        corners = _cut(corners, normal, bound)
+    return corners
+
+
+def _cut(corners: Array, normal: Array, bound: float) -> Array:
+    """What normal · x ≤ bound leaves of a convex polygon."""
+    kept: list[Array] = []
+    over = corners @ normal - bound
+    for i, (here, now) in enumerate(zip(corners, over, strict=True)):
+        before, then = corners[i - 1], over[i - 1]
+        if (now <= 0.0) != (then <= 0.0):
+            kept.append(before + (here - before) * then / (then - now))
+        if now <= 0.0:
+            kept.append(here)
+    return np.array(kept).reshape(-1, 2)
+
+
+def _plot_levels(qp: QP, box: tuple[float, ...], axis: Axes) -> None:
+    """Curves whose distances from the least objective grow like squares, as a bowl's do at equal distances."""
+    x, y = np.meshgrid(np.linspace(*box[:2], _FINE), np.linspace(*box[2:], _FINE))
+    points = np.stack([x.ravel(), y.ravel()])
+    height = (0.5 * np.sum(points * (qp.H @ points), axis=0) + qp.g @ points).reshape(x.shape)
+    low, high = height.min(), height.max()
+    levels = low + (high - low) * (np.arange(1, _LEVELS + 1) / _LEVELS) ** 2
+    axis.contour(x, y, height, levels=levels, colors=[GREYS[2]], linewidths=0.8)
+
+
+def _plot_row(qp: QP, i: int, thick: bool, box: tuple[float, ...], axis: Axes) -> None:
+    """The line where a row holds with equality, with its name at one end."""
+    G, h = qp.G[i], qp.h[i]
+    length = np.linalg.norm(G)
+    if not length:
+        return
+    along, foot = np.array([-G[1], G[0]]) / length, G * h / length**2
+    reach = 2.0 * float(np.max(np.abs(box)))
+    ends = np.array([foot - reach * along, foot + reach * along])
+    axis.plot(*ends.T, color=GREYS[0 if thick else 1], linewidth=4.0 if thick else 1.2)
+    seen = foot + np.linspace(-reach, reach, 400)[:, None] * along
+    inside = (seen[:, 0] > box[0]) & (seen[:, 0] < box[1]) & (seen[:, 1] > box[2]) & (seen[:, 1] < box[3])
+    if np.any(inside):
+        x, y = seen[inside][-1] if seen[inside][-1][0] > seen[inside][0][0] else seen[inside][0]
+        axis.annotate(
+            str(qp.inequality_names[i]), (x, y), xytext=(-4, 4), textcoords="offset points", ha="right", va="bottom",
+            color=GREYS[0], weight="bold" if thick else "normal",
+        )  # fmt: skip
