@@ -15,7 +15,7 @@ _MADE = re.compile(r"\b(?!push_)\w+_panel\(")
 
 
 def assert_every_slider_answers(panel: SliderPanel) -> None:
-    """Moved to its ends and its middle, each slider changes the picture or the note; one of them changes the picture, if any."""
+    """Moved to its ends and its middle, each slider changes the picture or the note; one of them the picture, if any."""
     moves = []
     for name, slider in panel.sliders.items():
         first, seen = slider.value, []

@@ -29,13 +29,13 @@ from floatbase.control import AnalyticController
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import ConstantTorques
 from floatbase.simulation import Live
-from floatbase.viewer import plots, recording
+from floatbase.viewer import plots, programs, recording
 
 ROOMS = (
     "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp", "robots", "simulation",
     "viewer",
 )  # fmt: skip
-MODULES = (plots, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
+MODULES = (plots, programs, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
 OTHER, TALOS = judges.load("solo12"), judges.load("talos")
 QP = CONTROLLER.qp(STATE)
 SPACE = fb.feasible_space(EOM)

@@ -61,7 +61,7 @@ def plot_way(iterations: Sequence[Iteration], axis: Axes, dashed: bool = False) 
 
 
 def allowed(qp: QP, box: tuple[float, float, float, float]) -> Array:
-    """The corners of what the rows of a QP in the plane leave of a box, in order, shape (k, 2); no corners where nothing is left."""
+    """Corners of what the rows of a QP in the plane leave of a box, in order, shape (k, 2); (0, 2) where they leave nothing."""
     x0, x1, y0, y1 = box
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     for normal, bound in zip(qp.G, qp.h, strict=True):

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
 from floatbase.lessons.exercises import Exercise, Numeric, Verdict
 from floatbase.lessons.lessonC.helpers import braking
 from floatbase.qp import QP, active_set
@@ -66,7 +65,7 @@ _WAYS = (
     ),
     _Way(
         "Two rows are in the way: the step must end at the first that it meets.",
-        (4, 0), [[1, 0], [2, 0], [1, 0]], [3, 2, 2], [], (0.25, 1),
+        (4, 0), [[1, 0], [2, 0], [1, 0]], [3, 2, 2.5], [], (0.25, 1),
     ),
     _Way(
         "Here two rows are in the way at different speeds: it is not the slack alone that counts, but how soon it is used up.",
@@ -83,6 +82,10 @@ _WAYS = (
     _Way(
         "The row lies beyond the end of the step: length 1, and nothing blocks.",
         (1, 0), [[1, 0]], [1.5], [], (1.0, None),
+    ),
+    _Way(
+        "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of equal rows the first.",
+        (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
     ),
 )  # fmt: skip
 
@@ -202,14 +205,11 @@ def rounds_from(guess: Sequence[str]) -> int:
 
 STEP_STUB = '''def longest_step(x, p, G, h, W):
     """How far from x along p, at most 1, all rows hold, and the row that blocks."""
-    slack = np.round(h - G @ x, 9)  # the room that is left; 9 digits hide rounding
-    speed = G @ p  # how fast the step uses it up
-    return 1.0, None  # replace: look for the first row that blocks'''
+    return 1.0, None  # replace: from slack and speed of each row'''
 
 STEP = '''def longest_step(x, p, G, h, W):
     """How far from x along p, at most 1, all rows hold, and the row that blocks."""
-    slack = np.round(h - G @ x, 9)  # the room that is left; 9 digits hide rounding
-    speed = G @ p  # how fast the step uses it up
+    slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
     for i in range(len(h)):
         if i not in W and speed[i] > 1e-9 and slack[i] < length * speed[i]:
@@ -239,7 +239,7 @@ EXERCISES = (
             praise="Three equations: two say that the row balances the slope, one that the marble lies on it.",
             mistakes={
                 "The sign: with H x + g + Gᵀ μ = 0 the price of a table that pushes is positive.": lambda: -_price(),
-                "That is the length of the slope. A price belongs to the row as it is written, and this row has length √1.25.": (
+                "That is the slope's length. A price belongs to the row as it is written; this one has length √1.25.": (
                     lambda: _price() * np.sqrt(1.25)
                 ),
                 "That is the price of a level table. Here along and up pay together.": lambda: 8.0,
@@ -273,7 +273,7 @@ EXERCISES = (
     ),
     Exercise(
         name="C.4",
-        statement="The names of the rows that are active in the QP of go2, 50 ms into a push of 120 N forwards and to the left.",
+        statement="The names of the rows that are active in go2's QP, 50 ms into a push of 120 N forwards and to the left.",
         stub='guess = ["RR_foot normal force"]  # more names, or others',
         solution="guess = [\n"
         '    "FR_foot facet 2", "FR_foot facet 3", "RL_foot facet 2",\n'
