@@ -1,4 +1,4 @@
-"""Quadratic programs in the plane, drawn: level curves, rows, what they leave, and the way of a solver."""
+"""Quadratic programs in the plane, drawn: level curves, rows, and what they leave."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 
 from floatbase._arrays import Array, checked, of_kind, texts
 from floatbase.errors import InputError, unknown_name
-from floatbase.qp import QP, Iteration
+from floatbase.qp import QP
 from floatbase.viewer.colours import GREYS
 
 _LEVELS = 12  # curves of equal objective
-_FINE = 60  # points along each side that the curves are drawn through
+_FINE = 90  # points of each curve, or along each side of what it is drawn through
 
 
 def plot(
@@ -51,15 +52,6 @@ def plot(
     return axis
 
 
-def plot_way(iterations: Sequence[Iteration], axis: Axes, dashed: bool = False) -> Axes:
-    """The points that a solver came through, in a picture by `plot`; dashed: light and dashed, for phase 1."""
-    points = np.array([step.x for step in iterations] + [step.arrival for step in iterations[-1:]])
-    colour, style = (GREYS[1], "--") if dashed else (GREYS[0], "-")
-    if len(points):
-        axis.plot(*points.T, style, color=colour, marker="o", markersize=5, linewidth=2, zorder=4)
-    return axis
-
-
 def allowed(qp: QP, box: tuple[float, float, float, float]) -> Array:
     """Corners of what the rows of a QP in the plane leave of a box, in order, shape (k, 2); (0, 2) where they leave nothing."""
     x0, x1, y0, y1 = box
@@ -83,13 +75,29 @@ def _cut(corners: Array, normal: Array, bound: float) -> Array:
 
 
 def _plot_levels(qp: QP, box: tuple[float, ...], axis: Axes) -> None:
-    """Curves whose distances from the least objective grow like squares, as a bowl's do at equal distances."""
+    """Curves of equal objective, at objectives that grow like squares: at equal distances where the problem is a bowl."""
+    try:
+        root = np.linalg.inv(np.linalg.cholesky(qp.H)).T  # a circle of radius r becomes the ellipse r²/2 above the least
+    except np.linalg.LinAlgError:  # a valley or a plane
+        _plot_contours(qp, box, axis)
+        return
+    centre = np.linalg.solve(qp.H, -qp.g)
+    corners = np.array([[x, y] for x in box[:2] for y in box[2:]])
+    most = float(np.max(np.linalg.norm((corners - centre) @ np.linalg.inv(root).T, axis=1)))
+    angles = np.linspace(0.0, 2.0 * np.pi, _FINE)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)]) @ root.T
+    radii = most * np.arange(1, _LEVELS + 1) / _LEVELS
+    axis.add_collection(LineCollection([centre + r * circle for r in radii], colors=[GREYS[2]], linewidths=0.8))
+
+
+def _plot_contours(qp: QP, box: tuple[float, ...], axis: Axes) -> None:
     x, y = np.meshgrid(np.linspace(*box[:2], _FINE), np.linspace(*box[2:], _FINE))
     points = np.stack([x.ravel(), y.ravel()])
     height = (0.5 * np.sum(points * (qp.H @ points), axis=0) + qp.g @ points).reshape(x.shape)
     low, high = height.min(), height.max()
-    levels = low + (high - low) * (np.arange(1, _LEVELS + 1) / _LEVELS) ** 2
-    axis.contour(x, y, height, levels=levels, colors=[GREYS[2]], linewidths=0.8)
+    if high > low:
+        levels = low + (high - low) * (np.arange(1, _LEVELS + 1) / _LEVELS) ** 2
+        axis.contour(x, y, height, levels=levels, colors=[GREYS[2]], linewidths=0.8)
 
 
 def _plot_row(qp: QP, i: int, thick: bool, box: tuple[float, ...], axis: Axes) -> None:

@@ -35,7 +35,7 @@ def show_table(lowest: float) -> str:
     qp = table_top((0.5, lowest), (1.0, 2.0))
     solution = fb.solve(qp)
     price = float(solution.inequality_multipliers[0])
-    axis = _flat_axis(qp, (-1.5, 2.5, -2.0, 2.0), solution.active, solution.x)
+    axis = _flat_axis(qp, (-2.5, 3.0, -2.2, 2.2), solution.active, solution.x)
     axis.plot(0.5, lowest, "x", color=GREYS[1], markersize=9)
     rests = "rests on the table" if solution.x[1] < _NEAR else "does not touch the table"
     return _image(axis) + f"<div>the marble {rests}; price of the row: <b>{about(price)}</b></div>"
@@ -166,7 +166,8 @@ def _flat_axis(qp: QP, box: tuple[float, float, float, float], working: Sequence
     """A picture of a problem on a small figure of its own, which pyplot does not know and need not close."""
     figure = Figure(figsize=(4.6, 3.8), dpi=80, layout="none")
     FigureCanvasAgg(figure)
-    return programs.plot(qp, box, working, x, figure.add_axes((0.09, 0.08, 0.89, 0.9)))
+    axis = figure.add_axes((0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2))  # few: they take most of the time
+    return programs.plot(qp, box, working, x, axis)
 
 
 def _image(axis: Axes) -> str:
