@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -210,7 +211,7 @@ def show_progress() -> None:
 
 def _same(answer: Any, placeholder: Any) -> bool:
     """Whether an answer is the placeholder still, up to the rounding of another machine; a function by its code."""
-    if callable(placeholder):
+    if isinstance(placeholder, FunctionType):
         return _code(answer) == _code(placeholder)
     if isinstance(placeholder, list) and all(isinstance(part, str) for part in placeholder):
         return isinstance(answer, list) and list(map(str, answer)) == placeholder

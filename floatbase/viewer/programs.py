@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
@@ -14,15 +15,16 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.qp import QP
 from floatbase.viewer.colours import GREYS
 
+Box = tuple[float, float, float, float]
 _LEVELS = 12  # curves of equal objective
 _FINE = 90  # points of each curve, or along each side of what it is drawn through
 
 
 def plot(
     qp: QP,
-    box: tuple[float, float, float, float] = (-3.0, 3.0, -2.0, 3.0),
+    box: Box = (-3.0, 3.0, -2.0, 3.0),
     working: Sequence[str] = (),
-    point: object = None,
+    point: npt.ArrayLike | None = None,
     axis: Axes | None = None,
 ) -> Axes:
     """App. C: a QP of two variables in the plane: its level curves, its rows with names, and in grey what they leave.
@@ -35,14 +37,12 @@ def plot(
 
     Raises `InputError` for another number of variables or with equalities, `UnknownNameError` for a row that does not exist.
     """
-    if of_kind("qp", qp, QP).n != 2 or len(qp.A):
-        raise InputError(f"{qp!r} does not lie in the plane: 2 variables and no equalities can be drawn.")
-    box = tuple(checked("box", box, (4,)))
+    corners = allowed(qp, box)
     for name in texts("working", working):
         if name not in qp.inequality_names:
             raise unknown_name("inequality row", name, qp.inequality_names)
     axis = plt.figure().gca() if axis is None else of_kind("axis", axis, Axes)
-    axis.fill(*allowed(qp, box).T, color=GREYS[2], alpha=0.35, linewidth=0.0)
+    axis.fill(*corners.T, color=GREYS[2], alpha=0.35, linewidth=0.0)
     _plot_levels(qp, box, axis)
     for i, name in enumerate(qp.inequality_names):
         _plot_row(qp, i, name in working, box, axis)
@@ -52,9 +52,16 @@ def plot(
     return axis
 
 
-def allowed(qp: QP, box: tuple[float, float, float, float]) -> Array:
-    """Corners of what the rows of a QP in the plane leave of a box, in order, shape (k, 2); (0, 2) where they leave nothing."""
-    x0, x1, y0, y1 = box
+def allowed(qp: QP, box: Box) -> Array:
+    """Corners of what the rows of a QP in the plane leave of a box, in order, shape (k, 2); (0, 2) where they leave nothing.
+
+    qp, box, errors: as for `plot`.
+    """
+    if of_kind("qp", qp, QP).n != 2 or len(qp.A):
+        raise InputError(f"{qp!r} does not lie in the plane: 2 variables and no equalities can be drawn.")
+    x0, x1, y0, y1 = checked("box", box, (4,))
+    if not (x0 < x1 and y0 < y1):
+        raise InputError(f"box is {tuple(box)}; it must be from and to along each variable, in ascending order.")
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     for normal, bound in zip(qp.G, qp.h, strict=True):
         corners = _cut(corners, normal, bound)
@@ -74,7 +81,7 @@ def _cut(corners: Array, normal: Array, bound: float) -> Array:
     return np.array(kept).reshape(-1, 2)
 
 
-def _plot_levels(qp: QP, box: tuple[float, ...], axis: Axes) -> None:
+def _plot_levels(qp: QP, box: Box, axis: Axes) -> None:
     """Curves of equal objective, at objectives that grow like squares: at equal distances where the problem is a bowl."""
     try:
         root = np.linalg.inv(np.linalg.cholesky(qp.H)).T  # a circle of radius r becomes the ellipse r²/2 above the least
@@ -90,8 +97,8 @@ def _plot_levels(qp: QP, box: tuple[float, ...], axis: Axes) -> None:
     axis.add_collection(LineCollection([centre + r * circle for r in radii], colors=[GREYS[2]], linewidths=0.8))
 
 
-def _plot_contours(qp: QP, box: tuple[float, ...], axis: Axes) -> None:
-    x, y = np.meshgrid(np.linspace(*box[:2], _FINE), np.linspace(*box[2:], _FINE))
+def _plot_contours(qp: QP, box: Box, axis: Axes) -> None:
+    x, y = np.meshgrid(np.linspace(box[0], box[1], _FINE), np.linspace(box[2], box[3], _FINE))
     points = np.stack([x.ravel(), y.ravel()])
     height = (0.5 * np.sum(points * (qp.H @ points), axis=0) + qp.g @ points).reshape(x.shape)
     low, high = height.min(), height.max()
@@ -100,7 +107,7 @@ def _plot_contours(qp: QP, box: tuple[float, ...], axis: Axes) -> None:
         axis.contour(x, y, height, levels=levels, colors=[GREYS[2]], linewidths=0.8)
 
 
-def _plot_row(qp: QP, i: int, thick: bool, box: tuple[float, ...], axis: Axes) -> None:
+def _plot_row(qp: QP, i: int, thick: bool, box: Box, axis: Axes) -> None:
     """The line where a row holds with equality, with its name at one end."""
     G, h = qp.G[i], qp.h[i]
     length = np.linalg.norm(G)

@@ -233,7 +233,7 @@ def test_any_solver_may_drive_the_robot_and_the_same_answer_gives_the_same_torqu
         found = EveryTick(controller, solver)(state.q, state.v, 0.0)
         expected = controller(state.q, state.v)
         assert np.allclose(found.tau, expected.tau, atol=1e-6)
-        assert np.allclose(np.ravel(found.forces), np.ravel(expected.forces), atol=1e-6)
+        assert found.forces is not None and np.allclose(np.ravel(found.forces), np.ravel(expected.forces), atol=1e-6)
     with pytest.raises(fb.FloatbaseError, match="x has shape"):
         EveryTick(controller, lambda qp: np.zeros(3))(state.q, state.v, 0.0)
 
@@ -264,7 +264,8 @@ def test_pictures_show_what_they_are_given() -> None:
     edges = six_edges()
     ways = [(np.zeros(2), []), (np.array([1.0, 0.0]), [0])]
     assert "on: no row" in show_way(edges, ways, 0) and "on: edge 0" in show_way(edges, ways, 1)
-    assert plot_problem(edges, (1.5, 0.0)).lines[-1].get_xydata().tolist() == [[1.5, 0.0]]
+    problem: Any = plot_problem(edges, (1.5, 0.0))
+    assert problem.lines[-1].get_xydata().tolist() == [[1.5, 0.0]]
     rounds: Any = plot_rounds({"yours": [3.0, 2.0, 1.0]}, "objective")
     assert rounds.axes[0].lines[0].get_ydata().tolist() == [3.0, 2.0, 1.0]
     time: Any = plot_over_time({"one": ([0.0, 1.0], [5.0, 6.0])}, "mm")

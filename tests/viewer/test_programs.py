@@ -16,6 +16,11 @@ BOX = (-3.0, 3.0, -2.0, 3.0)
 NONE = np.zeros((0, 2)), np.zeros(0)
 
 
+def qp_of(H: Any, g: Any, G: Any, h: Any, names: Any = ()) -> QP:
+    """A QP of two variables without equalities."""
+    return QP(np.asarray(H), np.asarray(g), *NONE, np.reshape(G, (-1, 2)), np.asarray(h), inequality_names=names)
+
+
 def random_qp(seed: int) -> QP:
     rng = np.random.default_rng(seed)
     rows = int(rng.integers(1, 7))
@@ -36,11 +41,11 @@ def test_the_grey_region_is_what_the_rows_leave_of_the_box(seed: int) -> None:
 
 
 def test_rows_that_leave_nothing_leave_no_corner() -> None:
-    assert len(programs.allowed(QP(np.eye(2), [0, 0], *NONE, [[1, 0], [-1, 0]], [-1, -1]), BOX)) == 0
+    assert len(programs.allowed(qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1]), BOX)) == 0
 
 
 def test_rows_lie_where_they_hold_with_equality_and_those_that_are_on_are_thick() -> None:
-    qp = QP(np.eye(2), [0, 0], *NONE, [[1.0, 2.0], [0.0, -1.0]], [1.0, 0.5], inequality_names=("slant", "table"))
+    qp = qp_of(np.eye(2), [0, 0], [[1.0, 2.0], [0.0, -1.0]], [1.0, 0.5], ("slant", "table"))
     axis = programs.plot(qp, BOX, working=["table"], point=(0.5, -0.5))
     lines: Any = axis.lines
     slant, table, dot = lines
@@ -55,8 +60,8 @@ def test_rows_lie_where_they_hold_with_equality_and_those_that_are_on_are_thick(
 
 def test_level_curves_are_curves_of_one_objective() -> None:
     H = np.array([[2.0, 0.5], [0.5, 1.0]])
-    for qp in (QP(H, [1.0, -0.5], *NONE, *NONE), table_top(), QP(np.diag([1.0, 0.0]), [0.0, 0.0], *NONE, *NONE)):
-        axis = programs.plot(qp, BOX)
+    for qp in (qp_of(H, [1.0, -0.5], [], []), table_top(), qp_of(np.diag([1.0, 0.0]), [0.0, 0.0], [], [])):
+        axis: Any = programs.plot(qp, BOX)
         curves = [path for path in axis.collections[0].get_paths() if len(path.vertices)]
         spread = [np.ptp([qp.objective(point) for point in path.vertices]) for path in curves]
         assert len(curves) >= 5
@@ -67,8 +72,10 @@ def test_level_curves_are_curves_of_one_objective() -> None:
 
 def test_problems_that_do_not_lie_in_the_plane_are_refused() -> None:
     with pytest.raises(InputError, match="does not lie in the plane"):
-        programs.plot(QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), [], np.zeros((0, 3)), []))
+        programs.plot(QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0)))
     with pytest.raises(InputError, match="does not lie in the plane"):
-        programs.plot(QP(np.eye(2), [0, 0], [[1, 0]], [0], *NONE))
+        programs.plot(QP(np.eye(2), np.zeros(2), np.eye(1, 2), np.zeros(1), *NONE))
     with pytest.raises(UnknownNameError, match="near names: table"):
         programs.plot(table_top(), working=["tabel"])
+    with pytest.raises(InputError, match="in ascending order"):
+        programs.plot(table_top(), (1.0, -1.0, 0.0, 2.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -113,7 +114,7 @@ def _judge_step(answer: Any) -> Verdict:
                 return f"{elsewhere}{way.hint}"
         return ""
 
-    return _tried(answer, [lambda way=way: one(way) for way in _WAYS], "As far as all rows hold, and no further.")
+    return _tried(answer, [partial(one, way) for way in _WAYS], "As far as all rows hold, and no further.")
 
 
 def _tried(answer: Any, cases: Sequence[Callable[[], str]], praise: str) -> Verdict:
@@ -154,7 +155,7 @@ def _judge_drop(answer: Any) -> Verdict:
             return "Give the row's number in G, which stands in W, not its place in W."
         return "" if given == right else hint
 
-    cases = [lambda case=case: one(*case) for case in _DROPS]
+    cases = [partial(one, *case) for case in _DROPS]
     return _tried(answer, cases, "A row may push, never pull: that is the whole test of an optimum.")
 
 

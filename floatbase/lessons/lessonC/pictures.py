@@ -164,7 +164,7 @@ def _six() -> tuple[float, float, float, float]:
 
 def _flat_axis(qp: QP, box: tuple[float, float, float, float], working: Sequence[str], x: Array | None) -> Axes:
     """A picture of a problem on a small figure of its own, which pyplot does not know and need not close."""
-    figure = Figure(figsize=(4.6, 3.8), dpi=80, layout="none")
+    figure = Figure(figsize=(4.6, 3.8), dpi=80)
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2))  # few: they take most of the time
     return programs.plot(qp, box, working, x, axis)
