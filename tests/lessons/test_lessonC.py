@@ -22,7 +22,6 @@ from floatbase.lessons.lessonC import (
     braking,
     corner_table,
     longest_step,
-    plot_over_time,
     plot_problem,
     plot_rounds,
     pushed,
@@ -141,7 +140,7 @@ def test_c_4_is_judged_by_one_system_of_equations() -> None:
         (None, "no answer yet"),
     ]
     assert missed("C.4", wrong) == []
-    assert rounds_from(active) == 1 < rounds_from([])
+    assert rounds_from(active) == 1 and abs(rounds_from([]) - 9) <= 3
 
 
 def test_functions_and_names_that_stand_in_a_stub_count_no_try(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
@@ -268,6 +267,4 @@ def test_pictures_show_what_they_are_given() -> None:
     assert problem.lines[-1].get_xydata().tolist() == [[1.5, 0.0]]
     rounds: Any = plot_rounds({"yours": [3.0, 2.0, 1.0]}, "objective")
     assert rounds.axes[0].lines[0].get_ydata().tolist() == [3.0, 2.0, 1.0]
-    time: Any = plot_over_time({"one": ([0.0, 1.0], [5.0, 6.0])}, "mm")
-    assert time.axes[0].lines[0].get_xydata().tolist() == [[0.0, 5.0], [1.0, 6.0]]
     plt.close("all")

@@ -15,10 +15,10 @@ from floatbase.lessons.lessonC.helpers import (
     six_edges,
     standing,
 )
-from floatbase.lessons.lessonC.pictures import Game, plot_over_time, plot_problem, plot_rounds, show_table, show_way
+from floatbase.lessons.lessonC.pictures import Game, plot_problem, plot_rounds, show_table, show_way
 
 __all__ = [
     "EXERCISES", "EveryTick", "Game", "Stopped", "beale", "between_walls", "braking", "corner_table", "longest_step",
-    "plot_over_time", "plot_problem", "plot_rounds", "pushed", "right_or", "rounds_from", "row_to_drop", "show_table",
+    "plot_problem", "plot_rounds", "pushed", "right_or", "rounds_from", "row_to_drop", "show_table",
     "show_way", "six_edges", "standing",
 ]  # fmt: skip

@@ -146,18 +146,6 @@ def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
     return figure
 
 
-def plot_over_time(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]], label: str) -> Figure:
-    """Numbers over time. curves: name -> (times in s, numbers). label: of the numbers."""
-    figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
-    for (name, (time, numbers)), colour, style in zip(curves.items(), GREYS, _STYLES, strict=False):
-        ax.plot(np.asarray(time), np.asarray(numbers), style, color=hexadecimal(colour), label=name, linewidth=2)
-    ax.set(xlabel="time [s]", ylabel=label)
-    ax.grid(alpha=0.3)
-    ax.legend()
-    plt.close(figure)
-    return figure
-
-
 def _six() -> tuple[float, float, float, float]:
     return (-3.0, 3.0, -2.5, 4.3)
 
