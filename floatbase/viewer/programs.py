@@ -17,6 +17,8 @@ from floatbase.viewer.colours import GREYS
 
 Box = tuple[float, float, float, float]
 _LEVELS = 12  # curves of equal objective
+_ON = 1e-9  # a point of a row's line counts as allowed by that row: rounding
+_APART = np.array([24.0, 13.0])  # points from a row's line to the middle of its name, which is wider than high
 _FINE = 90  # points of each curve, or along each side of what it is drawn through
 
 
@@ -108,20 +110,25 @@ def _plot_contours(qp: QP, box: Box, axis: Axes) -> None:
 
 
 def _plot_row(qp: QP, i: int, thick: bool, box: Box, axis: Axes) -> None:
-    """The line where a row holds with equality, with its name at one end."""
+    """The line where a row holds with equality; its name stands on the forbidden side, beside the border of what is allowed."""
     G, h = qp.G[i], qp.h[i]
     length = np.linalg.norm(G)
     if not length:
         return
     along, foot = np.array([-G[1], G[0]]) / length, G * h / length**2
-    reach = 2.0 * float(np.max(np.abs(box)))
-    ends = np.array([foot - reach * along, foot + reach * along])
-    axis.plot(*ends.T, color=GREYS[0 if thick else 1], linewidth=4.0 if thick else 1.2)
-    seen = foot + np.linspace(-reach, reach, 400)[:, None] * along
-    inside = (seen[:, 0] > box[0]) & (seen[:, 0] < box[1]) & (seen[:, 1] > box[2]) & (seen[:, 1] < box[3])
-    if np.any(inside):
-        x, y = seen[inside][-1] if seen[inside][-1][0] > seen[inside][0][0] else seen[inside][0]
+    reach = np.linalg.norm(foot) + float(np.hypot(*np.abs(np.reshape(box, (2, 2))).max(axis=1)))
+    axis.plot(
+        *np.transpose([foot - reach * along, foot + reach * along]),
+        color=GREYS[0 if thick else 1],
+        linewidth=4.0 if thick else 1.2,
+    )
+    line = foot + np.linspace(-reach, reach, 800)[:, None] * along
+    seen = line[(line[:, 0] > box[0]) & (line[:, 0] < box[1]) & (line[:, 1] > box[2]) & (line[:, 1] < box[3])]
+    bounds = seen[np.all(seen @ qp.G.T <= qp.h + _ON * (1.0 + abs(h)), axis=1)]
+    if len(seen):
+        at = bounds[len(bounds) // 2] if len(bounds) else seen[len(seen) // 8]
         axis.annotate(
-            str(qp.inequality_names[i]), (x, y), xytext=(-4, 4), textcoords="offset points", ha="right", va="bottom",
-            color=GREYS[0], weight="bold" if thick else "normal",
+            str(qp.inequality_names[i]), at, xytext=G / length * _APART, textcoords="offset points", ha="center", va="center",
+            color=GREYS[0], weight="bold" if thick else "normal", annotation_clip=True,
+            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8},
         )  # fmt: skip

@@ -12,7 +12,7 @@ import pytest
 from hints import missed, right
 
 import floatbase as fb
-from floatbase.lessons import all_exercises, check, progress
+from floatbase.lessons import about, all_exercises, check, progress
 from floatbase.lessons.lessonC import (
     EveryTick,
     Game,
@@ -263,6 +263,9 @@ def test_pictures_show_what_they_are_given() -> None:
     edges = six_edges()
     ways = [(np.zeros(2), []), (np.array([1.0, 0.0]), [0])]
     assert "on: no row" in show_way(edges, ways, 0) and "on: edge 0" in show_way(edges, ways, 1)
+    between = show_way(edges, ways, 0.5)
+    assert "on: no row" in between and between != show_way(edges, ways, 0)
+    assert about(edges.objective(np.array([0.5, 0.0])), digits=3) in between
     problem: Any = plot_problem(edges, (1.5, 0.0))
     assert problem.lines[-1].get_xydata().tolist() == [[1.5, 0.0]]
     rounds: Any = plot_rounds({"yours": [3.0, 2.0, 1.0]}, "objective")

@@ -21,7 +21,7 @@ from floatbase.lessons.rounding import about
 from floatbase.qp import QP, table_top
 from floatbase.viewer import GREYS, hexadecimal, programs
 
-_BESIDE = (-3.4, 3.4, -2.2, 3.2)  # what is seen of the table and its walls
+_BESIDE = (-4.2, 3.4, -2.3, 3.2)  # what is seen of the table and its walls
 _NEAR = 1e-9  # a row broken by less, or a price less negative, is right but for rounding
 PUZZLES = ((0.5, -1.0), (2.5, 2.0), (-4.0, 1.5), (-1.5, -1.5), (-4.0, -1.0))  # lowest points of the bowls to be played
 _STYLES = ("-", "--", ":")
@@ -122,15 +122,20 @@ def plot_problem(qp: QP, start: npt.ArrayLike) -> Axes:
     return programs.plot(qp, _six(), point=start)
 
 
-def show_way(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: int) -> str:
+def show_way(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
     """The way of a solver in the plane after so many rounds, as HTML; in words the rows that are on, and the objective.
 
-    ways: after each round, beginning with none, the point, shape (2,), and the rows that are on.
+    ways: after each round, beginning with none, the point, shape (2,), and the rows that are on. rounds: between whole numbers
+    the point is under way.
     """
-    x, W = ways[rounds]
+    whole = min(int(rounds), len(ways) - 1)
+    x, W = ways[whole]
+    if rounds > whole:
+        x = x + (rounds - whole) * (ways[whole + 1][0] - x)
     names = [str(qp.inequality_names[i]) for i in W]
     axis = _flat_axis(qp, _six(), names, x)
-    axis.plot(*np.array([point for point, _ in ways[: rounds + 1]]).T, "o-", color=GREYS[0], markersize=4, linewidth=1.5)
+    passed = [point for point, _ in ways[: whole + 1]]
+    axis.plot(*np.transpose([*passed, x]), "o-", color=GREYS[0], markersize=4, linewidth=1.5)
     return _image(axis) + f"<div>on: {', '.join(names) or 'no row'}; objective {about(qp.objective(x), digits=3)}</div>"
 
 
@@ -147,7 +152,7 @@ def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
 
 
 def _six() -> tuple[float, float, float, float]:
-    return (-3.0, 3.0, -2.5, 4.3)
+    return (-3.2, 3.2, -2.9, 4.3)
 
 
 def _flat_axis(qp: QP, box: tuple[float, float, float, float], working: Sequence[str], x: Array | None) -> Axes:
