@@ -7,8 +7,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-from nbformat.v4 import new_code_cell
-
 from floatbase.lessons import SliderPanel
 
 _MADE = re.compile(r"\b(?!push_)\w+_panel\(")
@@ -28,13 +26,11 @@ def assert_every_slider_answers(panel: SliderPanel) -> None:
     assert any(moves) or panel.view is None, f"none of the sliders {list(panel.sliders)} changes the picture"
 
 
-def with_every_slider_moved(notebook: Any) -> Any:
-    """The notebook with a last cell that asks this of all its panels and raises where one does not. Changes it in place."""
+def moved_sliders(notebook: Any) -> str:
+    """The source of a cell that asks this of all panels of a notebook, after it ran, and raises where one does not."""
     code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
     count = sum(len(_MADE.findall(source)) for source in code)
-    lines = (f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})", "import panels", f"panels.judge_all({count})")
-    notebook.cells.append(new_code_cell("\n".join(lines)))
-    return notebook
+    return f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\nimport panels\npanels.judge_all({count})"
 
 
 def judge_all(count: int) -> None:

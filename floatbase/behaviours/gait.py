@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import floor, inf
 from types import MappingProxyType
 
@@ -118,6 +118,14 @@ class Gait(Value):
             t = end
         return found
 
+    def after(self, t: float) -> Gait:
+        """The same lift-offs, but for those before time t, s: what would be in the air then stands until it lifts next."""
+        if number("t", t, "s") <= self.start:
+            return self
+        nearly_one = 1.0 - SAME_TIME / self.period
+        waits = {foot: (self._first(foot) - t) / self.period % 1.0 for foot in self.offsets}
+        return replace(self, offsets={foot: 0.0 if part >= nearly_one else part for foot, part in waits.items()}, start=t)
+
     def _lifts_at(self, time: float) -> bool:
         return self.stop is None or time < self.stop - SAME_TIME
 
@@ -135,6 +143,19 @@ class Gait(Value):
             times += [now[1]] if now else []
             times += [coming[0]] if coming else []
         return min(times)
+
+
+def check_that_one_stands(gait: Gait) -> None:
+    """Raise `InputError` for a gait of all feet that lifts them all at once: fewest stand when one has just lifted."""
+    if not any(gait.next_swing(foot, gait.start) for foot in gait.feet):
+        return
+    endless = replace(gait, stop=None)
+    for offset in gait.offsets.values():
+        if not endless.stance(gait.start + (1.0 + offset) * gait.period):
+            raise InputError(
+                f"this gait has all feet in the air at {offset:g} of its period; one must stand at any time: give feet other "
+                f"offsets, or a swing of less than {gait.swing:g} s."
+            )
 
 
 def _names(robot: Robot) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, sin
+from math import cos, inf, sin
 from typing import TypeAlias
 
 import numpy as np
@@ -36,14 +36,17 @@ class Reference:
 
     standing: the robot's posture.
     nominal: (3,) m, where each foot's frame is in it, from the middle of the feet on the ground.
-    time: s, of the last tick.
+    asked, gait: the gait that was asked for, and what is walked by: that without the lift-offs that were over; no gait is
+        asked for any more while feet come down for another.
+    began, time: s, of the first and of the last tick.
     place, yaw: (2,) m, world, and rad, where the body is to be then.
     velocity: (3,) of the path: forwards, to the left, m/s, and yaw, rad/s, on their way to the desired ones.
     feet: (3,) m, world, of each foot's frame, where it stands or stood.
     landed: s, when each foot landed last.
     swinging: the feet in the air.
     footholds: (3,) m, world, where those that are in the air, or lift next, are to land.
-    stance, phase: the feet that stand, and from when until when, s.
+    stance, phase: the feet that stand, and from when until when, s; inf where no end was in sight.
+    renew: s, when to plan anew though the stance stays.
     aside: (2,) m, by which the last step was moved.
     ground: (2,) m, world, to the height of the ground there, (1,) m; 0 is that below the posture.
     plan: of the centre of mass.
@@ -51,6 +54,9 @@ class Reference:
 
     standing: State
     nominal: dict[str, Array]
+    asked: Gait | None
+    gait: Gait
+    began: float
     time: float
     place: Array
     yaw: float
@@ -61,6 +67,7 @@ class Reference:
     footholds: dict[str, Array] = field(default_factory=dict)
     stance: tuple[str, ...] = ()
     phase: tuple[float, float] = (0.0, 0.0)
+    renew: float = inf
     aside: Array = field(default_factory=lambda: np.zeros(2))
     ground: Affine = field(default_factory=lambda: Affine.linear(np.zeros((1, 2))))
     plan: LIPM | None = None
@@ -115,14 +122,14 @@ class Reference:
         part, rate, acceleration = Swing(np.zeros(3), (last - first) * up, each.path.lift, each.path.land, 0.0)(t)
         return about_z(first + part[2]) @ flat, rate, acceleration
 
-    def load(self, foot: str, t: float, gait: Gait, ramp: float, most: float) -> float:
+    def load(self, foot: str, t: float, ramp: float, most: float) -> float:
         """Bound of a normal force, N, at t in s: it falls from `most` to 0 in `ramp` s before the foot lifts, and rises after.
 
         All feet stand; the time that they do is long enough for both, or each takes half of it.
         """
         begin, end = self.phase
         ramp = min(ramp, (end - begin) / 2.0)
-        lifts = gait.swing_of(foot, end + SAME_TIME) is not None
+        lifts = foot in self.gait.feet and end < inf and self.gait.swing_of(foot, end + SAME_TIME) is not None
         landed = self.landed.get(foot, -np.inf) >= begin - SAME_TIME
         part = min((end - t) / ramp if lifts else np.inf, (t - begin) / ramp if landed else np.inf)
         return most * max(part, 0.0) if part < 1.0 else FREE

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import number, of_kind, positive
+from floatbase._arrays import Array, number, of_kind, positive
 from floatbase.behaviours.footholds import capture_point, support_margin
-from floatbase.behaviours.gait import SAME_TIME, Gait
+from floatbase.behaviours.gait import Gait, check_that_one_stands
 from floatbase.behaviours.walk import Walk
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State
 
 _SLOW = 0.1  # m/s of the centre of mass, below which it stops stepping
+_CLEARLY = 0.05  # m by which other feet must be nearer to the capture point for the gait to begin with those that then lift
 
 
 class Stand(Walk):
     """Stands where it is; with `steps` it walks in place once the capture point comes near the edge of the feet, until slow.
+
+    It begins where in its period the feet that stay can stop the capture point: those that it runs away from lift first.
 
     robot, contacts, options: as for `Walk`.
     steps: the gait to step by, such as `Gait.trot(robot)`, whose start and stop do not count; None to stand only.
@@ -32,6 +36,8 @@ class Stand(Walk):
         self._never = replace(of_kind("steps", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0)
         self.steps, self.margin = steps, positive("margin", margin, "m", allow_zero=True)
         super().__init__(robot, contacts, self._never, **options)
+        if steps is not None and len(steps.feet) == len(contacts):
+            check_that_one_stands(replace(steps, stop=None))
 
     @property
     def stepping(self) -> bool:
@@ -41,22 +47,37 @@ class Stand(Walk):
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
         t = number("t", t, "s")
-        if self._reference is not None and t < self._reference.time - SAME_TIME:
-            self._reference, self.gait = None, self._never
-        if self.steps is not None and self._reference is not None:
+        if self.steps is not None and self._goes_on(t):
             self._decide(State(self.robot, q, v), t, self.steps)
         return super().__call__(q, v, t)
+
+    def _begin(self, state: State, t: float) -> None:
+        self.gait = self._never
+        super()._begin(state, t)
 
     def _decide(self, state: State, t: float, steps: Gait) -> None:
         """Begin to step, or end it."""
         now = self._now
         if not self.stepping:
-            feet = self._all.positions(state)[:, :2]
-            if support_margin(capture_point(state.com, state.com_velocity, self.omega), feet) < self.margin:
-                self.gait = replace(steps, start=t, stop=None)
+            dcm = capture_point(state.com, state.com_velocity, self.omega)
+            if support_margin(dcm, self._all.positions(state)[:, :2]) < self.margin:
+                self.gait = replace(self._begun(steps, state, dcm), start=t, stop=None)
         elif self.gait.stop is None:
             slow = np.linalg.norm(state.com_velocity[:2]) < _SLOW
             if slow and t > self.gait.start + self.gait.period:
                 self.gait = replace(self.gait, stop=t)
         elif not now.swinging:
             self.gait = self._never
+
+    def _begun(self, steps: Gait, state: State, dcm: Array) -> Gait:
+        """The gait, begun where in its period the feet that stay are clearly nearer to the capture point, (2,) m."""
+
+        def margin(first: float) -> float:
+            stay = [name for name in self._all.names if steps.offsets.get(name) != first]
+            return support_margin(dcm, self._all.only(*stay).positions(state)[:, :2]) if stay else -inf
+
+        own, *others = sorted(set(steps.offsets.values()))
+        first = max(others, key=margin, default=own)
+        if margin(first) < margin(own) + _CLEARLY:
+            return steps
+        return replace(steps, offsets={foot: (offset - first) % 1.0 for foot, offset in steps.offsets.items()})

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import copysign, hypot, sqrt
+from math import copysign, hypot, inf, sqrt
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,19 +14,22 @@ import numpy.typing as npt
 
 from floatbase._arrays import Array, Value, checked, function, number, of_kind, positive
 from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
-from floatbase.behaviours.gait import SAME_TIME, Gait
+from floatbase.behaviours.gait import SAME_TIME, Gait, check_that_one_stands
 from floatbase.behaviours.lipm import LIPM, Piece
 from floatbase.behaviours.reference import Motion, Reference, Swinging, turned, yaw_of
 from floatbase.behaviours.swing import Swing
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
-from floatbase.errors import InfeasibleError
+from floatbase.errors import InfeasibleError, InputError
 from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
 from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 Phase: TypeAlias = tuple[float, float, tuple[str, ...]]
 _PHASES = 4  # stances that a plan looks ahead: two steps; eight are no better
+_LONGEST = 5.0  # s of standing that a plan looks ahead
+_AWAY = 0.2  # s without a tick, after which another controller may have moved the robot
+_SETTLED = 0.05  # s after which the height of a foot shows that of the ground: feet that aim where others just touched climb
 _SHIFT = 0.8  # s before the first lift-off and after the last landing in which the ZMP moves
 _DEAD_ZONE = 0.02  # m of DCM error that a stance with area bears without moving a step: it would grow by up to e^{ω 1.2 s}
 _GIVES_WAY = 0.05  # m by which steps have moved, from which on the path moves along, or the robot runs back to it and falls
@@ -61,7 +64,7 @@ class Gains(Value):
 
 @dataclass(frozen=True)
 class Step:
-    """What a `Walk` did at one change of stance.
+    """What a `Walk` planned at one change of stance, or where it stood on and the plan came to its end.
 
     time: s.
     stance: the feet that stand from then on.
@@ -85,17 +88,18 @@ class Walk:
     At each change of stance it takes the feet where they are, plans the next footholds (`neutral_point`) and a linear inverted
     pendulum above them (`LIPM`), from where the centre of mass is. At each tick it moves the ends of the swings by
     `step_adjustment`, as far as the legs reach. One `WholeBodyController` for each stance does the rest; where no forces hold
-    the feet, they give way. When the clock goes back, it begins anew from the measured state.
+    the feet, they give way. When the clock goes back, or 0.2 s ahead at once, it begins anew from the measured state.
 
     robot: the robot; its feet are point feet or flat feet.
     contacts: all its contacts; `Contacts.feet(robot)` fits.
     gait: when each foot is in the air; may be set while it walks: no foot lifts by the former one any more, and the new one
-        takes over when all stand.
+        takes over when all stand. Lift-offs that were over before are left out. At least one foot must stand at any time.
     velocity: (2,) m/s, forwards and to the left, of the body; may be set while it walks, and is approached by 1 m/s².
     yaw_rate: rad/s, to the left; as velocity.
     clearance: m, how high feet are lifted.
     reach: m, how far a foot may land from where it would stand below the body; 0.2 by default, 0.3 for flat feet.
-    ramp: s, in which a foot is unloaded before it lifts, and loaded after it landed, as far as all feet stand then.
+    ramp: s, in which a foot is unloaded before it lifts, and loaded after it landed, as far as all feet stand then; a
+        max_normal_force among the options takes its place.
     foothold: (foot, land in s, walk) -> (2,) m, world: where a foot should land, before adjustments; `neutral_point` below the
         body by default.
     gains: of its tasks; `Gains.of(contacts)` by default.
@@ -129,8 +133,9 @@ class Walk:
         self.ramp = positive("ramp", ramp, "s", allow_zero=True)
         self.foothold = below_the_body if foothold is None else function("foothold", foothold, "foothold(foot, land, walk)")
         self.gains = Gains.of(contacts) if gains is None else of_kind("gains", gains, Gains)
-        WholeBodyController(robot, contacts, (), **options)  # what does not fit is told now, and not in the loop
+        self._limits = WholeBodyController(robot, contacts, (), **options).limits  # what does not fit is told now
         self._options, self._standing = options, robot.standing()
+        self._alone = {contact.name: Contacts([contact]) for contact in contacts}
         origins = {contact.name: self._standing.point(contact.name) for contact in contacts}
         middle = np.mean([self._centre(name, origin, 0.0) for name, origin in origins.items()], axis=0)
         self._nominal = {name: origin - [*middle, 0.0] for name, origin in origins.items()}
@@ -141,17 +146,15 @@ class Walk:
     @property
     def gait(self) -> Gait:
         """When each foot is in the air, as it was set last."""
-        return self._coming or self._gait
+        return self._gait
 
     @gait.setter
     def gait(self, gait: Gait) -> None:
         for foot in of_kind("gait", gait, Gait, "Gait.trot(robot)").feet:
             self._all[foot]  # an `UnknownNameError` tells what there is
-        now = self._reference
-        if now is None or not now.swinging:
-            self._gait, self._coming = gait, None
-        else:  # feet in the air come down as they were to
-            self._gait, self._coming = replace(self._gait, stop=now.time), gait
+        if len(gait.feet) == len(self._all):
+            check_that_one_stands(gait)
+        self._gait = gait
 
     @property
     def velocity(self) -> Array:
@@ -216,14 +219,13 @@ class Walk:
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
         state, t = State(self.robot, q, checked("v", v, (self.robot.nv,))), number("t", t, "s")
-        if self._reference is None or t < self._reference.time - SAME_TIME:
+        if not self._goes_on(t):
             self._begin(state, t)
         now = self._now
-        if self._coming and not now.swinging:
-            self._gait, self._coming = self._coming, None
+        self._take_gait(t)
         (now.place, now.yaw, now.velocity), now.time = self._path(t), t
         stance = self._stance_at(t)
-        if stance != now.stance:
+        if stance != now.stance or t >= now.renew:
             self._change(state, stance)
         self._aim(state)
         try:
@@ -233,8 +235,14 @@ class Walk:
 
     @property
     def _now(self) -> Reference:
-        assert self._reference is not None  # from the first tick on
+        if self._reference is None:
+            raise InputError("a Walk has no path before its first tick: call it as walk(q, v, t), or run a rollout.")
         return self._reference
+
+    def _goes_on(self, t: float) -> bool:
+        """Whether time t, s, follows the last tick; else it begins anew."""
+        now = self._reference
+        return now is not None and t > now.began and now.time - SAME_TIME <= t <= now.time + _AWAY
 
     def _forget(self) -> None:
         self._controllers: dict[tuple[tuple[str, ...], bool], WholeBodyController] = {}
@@ -243,12 +251,23 @@ class Walk:
 
     def _path(self, t: float) -> tuple[Array, float, Array]:
         """Place, yaw and velocity of the path at t; it stands before the first foot lifts, and once none does any more."""
-        now, begin = self._now, max(self._now.time, self._gait.start)
-        walks = now.swinging or any(self._gait.next_swing(foot, begin) for foot in self._gait.feet)
+        now, begin = self._now, max(self._now.time, self._now.gait.start)
+        walks = now.swinging or any(now.gait.next_swing(foot, begin) for foot in now.gait.feet)
         return now.moved(np.array([*self.velocity, self.yaw_rate]) if walks else np.zeros(3), begin, t)
 
+    def _take_gait(self, t: float) -> None:
+        """Where another gait is asked for, walk by that once all feet stand; those in the air come down as they were to."""
+        now = self._now
+        if now.asked is not None and vars(self._gait) == vars(now.asked):
+            return
+        if not now.swinging:
+            now.asked, now.gait, now.renew = self._gait, self._gait.after(t), t
+        elif now.gait.stop is None or now.gait.stop > t:
+            now.asked, now.gait = None, replace(now.gait, stop=t)
+
     def _stance_at(self, t: float) -> tuple[str, ...]:
-        swinging = {foot for foot in self._gait.feet if self._gait.swing_of(foot, t)}
+        gait = self._now.gait
+        swinging = {foot for foot in gait.feet if gait.swing_of(foot, t)}
         return tuple(name for name in self._all.names if name not in swinging)
 
     def _begin(self, state: State, t: float) -> None:
@@ -256,21 +275,26 @@ class Walk:
         yaw = yaw_of(state.frame_pose("base").rotation)
         feet = {name: state.point(name) for name in self._all.names}
         places = [feet[name][:2] - turned(nominal[:2], yaw) for name, nominal in self._nominal.items()]
-        self._reference = Reference(self._standing, self._nominal, t, np.mean(places, axis=0), yaw, feet)
+        gait, place = self._gait, np.mean(places, axis=0)
+        self._reference = Reference(self._standing, self._nominal, gait, gait.after(t), t, t, place, yaw, feet)
         self.history.clear()
 
     def _change(self, state: State, stance: tuple[str, ...]) -> None:
-        """Another stance begins: take the feet where they are, and plan anew."""
+        """Another stance begins, or its plan ends: take the feet where they are, and plan anew."""
         now = self._now
         for foot in now.stance or stance:
-            now.feet[foot] = state.point(foot)
+            if now.time > now.landed.get(foot, -inf) + _SETTLED:
+                now.feet[foot] = state.point(foot)
         self._land(state, [foot for foot in stance if foot in now.swinging])
-        phases = self._gait.phases(now.time, _PHASES)
-        now.stance, now.phase, now.footholds = stance, phases[0][:2], {}
+        phases = now.gait.phases(now.time, _PHASES, _LONGEST)
+        begin, until = now.phase[0] if stance == now.stance else now.time, phases[0][1]
+        now.phase, now.renew, now.stance, now.footholds = (begin, until), inf, stance, {}
+        if len(phases) == 1:  # it stands, and no end is in sight
+            now.phase, now.renew = (begin, inf), until - _SHIFT
         now.find_ground()
         now.plan = LIPM(self._pieces(phases), state.com[:2], self.omega)
         for foot in self._all.names:
-            times = self._gait.swing_of(foot, now.time) if foot in self._gait.feet else None
+            times = now.gait.swing_of(foot, now.time) if foot in now.gait.feet else None
             if times and foot not in now.swinging:
                 end, yaw = now.footholds[foot], yaw_of(state.frame_pose(foot).rotation @ self._flat_rotation(foot).T)
                 path = Swing(state.point(foot), end, *times, self.clearance)
@@ -282,7 +306,6 @@ class Walk:
         now, moved = self._now, []
         for foot in feet:
             each = now.swinging.pop(foot)
-            # how high it stands shows when it has stood for a while: feet that aim where others just touched climb
             now.feet[foot] = np.array([*state.point(foot)[:2], each.path.end[2]])
             moved.append((now.feet[foot] - each.planned)[:2])
             now.landed[foot] = now.time
@@ -299,7 +322,7 @@ class Walk:
         zmp = now.plan.zmp(now.time) if now.plan else middles[0]
         pieces: list[Piece] = []
         for i, (begin, end, names) in enumerate(phases):
-            everybody, last = len(names) == len(self._gait.feet), i + 1 == len(phases)
+            everybody, last = len(names) == len(now.gait.feet), i + 1 == len(phases)
             goal = middles[i] if last or not everybody else middles[i + 1]
             if not everybody:
                 pieces.append((begin, end, goal, goal))
@@ -316,10 +339,10 @@ class Walk:
         """The middle of the feet that stand in each phase, (2,) m; finds the footholds of those that swing."""
         now, feet, middles = self._now, dict(self._now.feet), []
         for begin, end, names in phases:
-            stance = [name for name in self._all.names if name in names or name not in self._gait.feet]
+            stance = [name for name in self._all.names if name in names or name not in now.gait.feet]
             middles.append(np.mean([self._centre(name, feet[name], now.yaw) for name in stance], axis=0))
-            for foot in self._gait.feet:
-                times = self._gait.swing_of(foot, begin)
+            for foot in now.gait.feet:
+                times = now.gait.swing_of(foot, begin)
                 if times is not None:
                     place = checked(f"the foothold of {foot}", self.foothold(foot, times[1], self), (2,), "m")
                     now.footholds.setdefault(foot, now.on_ground(foot, place))
@@ -329,8 +352,10 @@ class Walk:
 
     def _centre(self, foot: str, at: Array, yaw: float) -> Array:
         """Where a foot carries best, (2,) m: the middle of a sole, below the centre of a ball. at: (3,) m, of its frame."""
-        offset = self._all[foot].positions(self._standing).mean(axis=0) - self._standing.point(foot)
-        return at[:2] + turned(offset[:2], yaw)
+        contact = self._all[foot]
+        below = getattr(contact, "radius", 0.0) * contact.normal  # a ball touches there however it is turned
+        offset = contact.positions(self._standing).mean(axis=0) - self._standing.point(foot) + below
+        return at[:2] + turned(offset[:2], yaw) - below[:2]
 
     def _aim(self, state: State) -> None:
         """Shift the ends of the swings by what the DCM misses of the plan, as far as the legs reach."""
@@ -395,11 +420,12 @@ class Walk:
         """Bounds of the normal force of each point while all feet stand, for ramps; None where a foot is in the air."""
         if self.ramp == 0.0 or len(stance) < len(self._all) or len(stance) < 2:
             return None
-        return {foot: partial(self._load, foot) for foot in self._gait.feet}
+        return {foot: partial(self._load, foot) for foot in self._all.names}
 
     def _load(self, foot: str, t: float) -> float:
         most = _LOAD * self.robot.weight / len(self._all) / len(self._all[foot].point_names)
-        return self._now.load(foot, t, self._gait, self.ramp, most)
+        least = float(self._limits.normal_forces(self._alone[foot], t)[0].max())
+        return max(least, self._now.load(foot, t, self.ramp, most))
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles begin anew: controllers are made again, and nothing is remembered."""

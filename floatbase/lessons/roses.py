@@ -2,7 +2,8 @@
 
 `python -m floatbase.lessons.publish roses 05` measures that of lesson 05 anew, which takes a minute or two, and writes it into
 roses.json beside this file, where the lessons read it. A lesson that has one offers `rose_controller()`, which makes its
-controller.
+controller. What lies in grey below is the rose of the lesson before; or, where the robot is another one, a second rose of the
+lesson's own: "09 standing" is that of `standing_rose_controller()` in the package of lesson 09.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -24,10 +26,11 @@ from floatbase.viewer import Picture, roses
 _FILE = Path(__file__).with_name("roses.json")
 _DIRECTIONS = 8
 _STEP, _DURATION = 5.0, 0.1  # N, s
+_WATCH = 1.5  # s after a push, in which who stands on the spot has fallen; a lesson with steps says `ROSE_WATCH`, more
 
 
 def measured_rose(lesson: str) -> PushRose:
-    """The rose of that lesson's controller, such as "05", as it was measured last.
+    """The rose of that lesson's controller, such as "05", or of a second one, "09 standing", as it was measured last.
 
     Raises `InputError` for a lesson without one.
     """
@@ -54,9 +57,13 @@ def draw_roses(lesson: str, scale: float | None = None) -> Picture:
 
 
 def rose_controller(lesson: str) -> Callable[[], Any]:
-    """The function that makes the controller of that lesson's rose. Raises `InputError` where there is none."""
+    """The function that makes the controller of that lesson's rose, such as "05" or "09 standing".
+
+    Raises `InputError` where there is none.
+    """
+    second = text("lesson", lesson).partition(" ")[2]
     try:
-        make: Callable[[], Any] = import_module(f"floatbase.lessons.lesson{text('lesson', lesson)}").rose_controller
+        make: Callable[[], Any] = getattr(_package(lesson), f"{second}_rose_controller" if second else "rose_controller")
     except (ModuleNotFoundError, AttributeError) as error:
         raise InputError(f"lesson {lesson!r} has no controller to push: lessons from 05 to 09 have.") from error
     return make
@@ -64,17 +71,27 @@ def rose_controller(lesson: str) -> Callable[[], Any]:
 
 def measure_rose(lesson: str) -> PushRose:
     """Measure the rose of that lesson and keep it."""
-    rose = push_rose(rose_controller(lesson), directions=_DIRECTIONS, step=_STEP, duration=_DURATION)
+    make, watch = rose_controller(lesson), getattr(_package(lesson), "ROSE_WATCH", _WATCH)
+    rose = push_rose(make, directions=_DIRECTIONS, step=_STEP, duration=_DURATION, watch=watch)
     kept = {**_kept(), lesson: rose.pushes.tolist()}
     lines = [f"{json.dumps(name)}: {json.dumps(kept[name])}" for name in sorted(kept)]
     _FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     return rose
 
 
+def _package(lesson: str) -> ModuleType:
+    """Where the controllers of that lesson, or of its second rose, are."""
+    return import_module(f"floatbase.lessons.lesson{lesson.partition(' ')[0]}")
+
+
 def _before(lesson: str) -> PushRose | None:
-    """The rose of the lesson before, if there is one."""
-    earlier = [name for name in _kept() if name < lesson]
-    return measured_rose(max(earlier)) if earlier else None
+    """The lesson's own second rose, else the rose of the lesson before, if there is one."""
+    if " " in lesson:
+        return None
+    kept = _kept()
+    own = [name for name in kept if name.startswith(f"{lesson} ")]
+    earlier = [name for name in kept if name < lesson and " " not in name]
+    return measured_rose(max(own or earlier)) if own or earlier else None
 
 
 def _kept() -> dict[str, list[float]]:

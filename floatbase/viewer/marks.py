@@ -20,6 +20,7 @@ from floatbase.viewer.lowering import Shape
 from floatbase.viewer.shapes import ARROW, Item, Picture, arrow, arrow_width, directed, flat_polygon, label, placed
 
 _AT_CONES = ("friction", "normal force", "largest normal force")  # kinds of the rows whose prices are shown
+_CHEAP = 1e-3  # part of the dearest row's price below which a label would only hide others
 OUTLINE = 0.6  # width of the outline of a push, over the radius of its shaft
 
 
@@ -90,7 +91,8 @@ def support_region(positions: npt.ArrayLike, lift: float, ground: Plane | Planes
 def prices(positions: npt.ArrayLike, contacts: Contacts, solution: Solution, height: float, size: float) -> Picture:
     """The multiplier of each active friction and normal-force row, two significant digits, at the middle of its facet.
 
-    A normal-force row has no facet: its label stands on the cone's axis, at the top.
+    A normal-force row has no facet: its label stands on the cone's axis, at the top. Prices below a thousandth of the dearest
+    one shown get no label.
     positions: (n, 3), m, world, of the n contact points.
     contacts: the contacts that the problem was made for.
     solution: of a `QP` with a block of forces; its rows say where their facets are.
@@ -104,7 +106,10 @@ def prices(positions: npt.ArrayLike, contacts: Contacts, solution: Solution, hei
     if forces.stop - forces.start != contacts.k or not {name.owner for name, _ in labels} <= set(contacts.point_names):
         raise InputError("the solution is not one of these contacts: give contacts and solution of the same command.")
     picture: Picture = {}
+    least = _CHEAP * max((found[name] for name, _ in labels), default=0.0)
     for name, row in labels:
+        if found[name] < least:
+            continue
         i = contacts.point_names.index(name.owner)
         normal, own = contacts.normals[i], row[3 * i : 3 * i + 3]
         across = own - normal * (normal @ own)  # the tangent that the facet faces, times the row's length

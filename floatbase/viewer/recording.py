@@ -11,6 +11,7 @@ import numpy.typing as npt
 import umsgpack
 
 from floatbase._arrays import Array, checked, flag, of_kind, positive, said, text, whole
+from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.viewer import wire
 from floatbase.viewer.shapes import Item, Picture, tidy
@@ -121,6 +122,14 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
         if push.acts_at(now) or 0.0 <= now - push.start < push.duration + seen - 1e-9:
             return push.frame, push.force
     return None
+
+
+def drawn_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
+    """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot be drawn."""
+    of_kind("contacts", contacts, Contacts)
+    drawn = [contact.k == 3 * len(contact.point_names) for contact in contacts]
+    names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
+    return contacts.only(*names), np.repeat(drawn, [contact.k for contact in contacts])
 
 
 def lifted_at(rollout: Rollout, row: int) -> frozenset[str]:

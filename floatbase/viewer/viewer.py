@@ -239,12 +239,13 @@ class Viewer:
         rows, planned_steps = recording.thinned(rollout.time, positive("rate", rate, "1/s")), walks.checked_steps(steps)
         states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
         times = rollout.time[rows].tolist()
+        contacts, columns = recording.drawn_contacts(rollout.contacts)
         pictures = [
             self.painter.picture(
                 state,
-                rollout.contacts,
-                rollout.measured[i],
-                rollout.planned[i] if planned and np.isfinite(rollout.planned[i]).all() else None,
+                contacts,
+                rollout.measured[i, columns],
+                rollout.planned[i, columns] if planned and np.isfinite(rollout.planned[i, columns]).all() else None,
                 com=com, cones=cones, support=support, ghost=ghost, push=recording.push_at(rollout, i),
                 lifted=recording.lifted_at(rollout, i),
                 extra=None if (step := walks.step_at(planned_steps, t)) is None else self.step(step, t, state),

@@ -169,3 +169,22 @@ def test_the_support_margin_is_the_distance_to_the_hull() -> None:
 
 def test_names_of_the_front_door_are_untouched() -> None:
     assert not {"Gait", "Walk"} & set(fb.__all__)  # they live in their room
+
+
+def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_over() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        period, start = rng.uniform(0.2, 2.0), rng.uniform(-1.0, 1.0)
+        gait = Gait({foot: rng.uniform(0.0, 0.99) for foot in "abcd"}, period, rng.uniform(0.05, 0.9) * period, start, stop=9.0)
+        late = start + rng.uniform(0.0, 5.0)
+        after = gait.after(late)
+        assert gait.after(start) is gait and not any(after.swing_of(foot, late - 1e-6) for foot in "abcd")
+        for t in rng.uniform(late, 12.0, 20):
+            for foot in "abcd":
+                times, found = gait.swing_of(foot, t), after.swing_of(foot, t)
+                if times is None or times[0] < late:
+                    assert found is None
+                else:
+                    assert found is not None and np.allclose(times, found, atol=1e-9)
+    gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
+    assert gait.after(30 * 0.1).swing_of("a", 3.0) == pytest.approx((3.0, 3.25))  # 30 · 0.1 is not 3: the rounding lifts it

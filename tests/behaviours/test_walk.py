@@ -155,6 +155,15 @@ def test_steps_save_a_robot_that_would_fall() -> None:
     assert any(len(step.stance) < 4 for step in stepping.history)
 
 
+@pytest.mark.parametrize("towards", [(1.0, 1.0), (-1.0, -1.0)])
+def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float, float]) -> None:
+    robot = judges.load("go2")
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot))  # whose first pair stands along this diagonal
+    push = fb.Push(np.array([*towards, 0.0]) * 300.0 / np.sqrt(2.0), start=0.2)
+    assert run(stand, 2.0, push).outcome == "completed"  # it fell at 230 N, which standing alone survives
+    assert next(step.stance for step in stand.history if len(step.stance) == 2) == ("FL_foot", "RR_foot")
+
+
 def test_it_stands_without_a_step_as_long_as_the_capture_point_is_inside() -> None:
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
@@ -188,6 +197,38 @@ def test_contacts_that_need_not_give_way_stand_as_held_ones_do() -> None:
     assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot") and len(other.tasks) == len(soft.tasks)
 
 
+def test_a_walk_gives_way_where_no_forces_hold_its_feet() -> None:
+    robot = judges.load("talos")
+    weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
+    moving = robot.standing().replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
+    walk = Walk(robot, judges.stance(robot), Gait.walk(robot), **weak)
+    with pytest.raises(fb.InfeasibleError):
+        fb.WholeBodyController(robot, judges.stance(robot), (), **weak)(moving.q, moving.v)
+    command = walk(moving.q, moving.v)
+    assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6) and command.forces.shape == (walk.contacts.k,)
+
+
+def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
+    robot, ways = judges.load("go2"), []
+    feet = [foot.frame for foot in robot.feet]
+    for yaw in (0.0, 2.0):
+        c, s = np.cos(yaw), np.sin(yaw)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        q = np.array(robot.standing().q)
+        q[:3], q[3:7] = turn @ q[:3] + [1.0, -2.0, 0.0], [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
+        sim = fb.Simulation(robot)
+        sim.reset(robot.standing().replace(q=q))
+        walk = walk_of("go2", Gait.trot, (0.2, 0.0), turn=yaw)  # of the facets of friction
+        record = fb.rollout(sim, walk, 3.0, [fb.Push(turn @ [0.0, 200.0, 0.0], start=1.6)], PERIOD)
+        assert record.outcome == "completed"
+        ways.append((record.com - record.com[0]) @ turn)
+        for step in walk.history:  # no foot lands on the other side of the body
+            i = int(np.searchsorted(record.time, step.time))
+            at = {foot: (record.state(i).point(foot) - record.com[i]) @ turn for foot in feet}
+            assert all(np.sign(at[foot][1]) == np.sign(robot.standing().point(foot)[1]) for foot in feet)
+    assert np.abs(ways[0] - ways[1]).max() < 0.02  # m, of 0.3: what rounds otherwise grows
+
+
 # the falls on the way, each a test ------------------------------------------------------------------------------------------
 
 
@@ -198,6 +239,7 @@ def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
         for step in walk.history for foot in step.stance if step.time > 1.5
     )  # fmt: skip
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
+    assert record.outcome == "completed"  # limited about the plan it falls
     assert reach < leg + walk.reach + 0.05  # from the body; from the plan they would be where the push has led it
 
 
@@ -253,6 +295,104 @@ def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches() -> 
             assert place[2] - radius < 2e-3
 
 
+# when it begins, ends, and begins anew ----------------------------------------------------------------------------------------
+
+
+def farthest_from_plan(record: Rollout, walk: Walk, begin: float) -> float:
+    """How far the centre of mass was from the plan from time `begin` on, at most, m."""
+    steps, times = list(walk.history), [step.time for step in walk.history]
+    rows = np.flatnonzero(record.time >= begin)
+    plans = np.searchsorted(times, record.time[rows] + 1e-9) - 1
+    return max(np.linalg.norm(steps[p].plan(record.time[i])[0] - record.com[i, :2]) for p, i in zip(plans, rows, strict=True))
+
+
+def test_the_load_shifts_before_a_first_step_that_is_far_away() -> None:
+    walk = walk_of("talos", lambda robot: Gait.walk(robot, start=5.5))  # beyond the 5 s that a plan looks ahead
+    sim = fb.Simulation(walk.robot)
+    assert fb.rollout(sim, walk, 4.0, control_period=PERIOD).outcome == "completed"
+    record = fb.rollout(sim, walk, 2.4, control_period=PERIOD)
+    assert record.outcome == "completed" and farthest_from_plan(record, walk, 5.4) < 0.02  # it was 7 cm
+
+
+def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_stands() -> None:
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=50.0))
+    sim = fb.Simulation(walk.robot)
+    fb.rollout(sim, walk, 0.5, control_period=PERIOD)
+    walk.gait = Gait.crawl(walk.robot, swing=0.5, pause=0.3, start=1.5)
+    record = fb.rollout(sim, walk, 2.0, control_period=PERIOD)
+    assert record.outcome == "completed" and farthest_from_plan(record, walk, 1.4) < 0.02 and tilt(record) < 0.3
+    assert record.measured[record.time > 1.49][0].reshape(-1, 3)[:, 2].min() < 0.1 * walk.robot.weight  # its foot is unloaded
+
+
+def test_a_gait_whose_start_is_over_lifts_no_foot_in_the_middle_of_its_swing() -> None:
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=-0.15))
+    record = run(walk, 1.0)
+    assert record.outcome == "completed" and len(walk.history[0].stance) == 4
+    assert [step.time for step in walk.history][1] == pytest.approx(0.1, abs=PERIOD)  # the next lift-off of the schedule
+    assert record.measured[:, 2::3].max() < walk.robot.weight
+
+
+def test_another_gait_takes_over_when_all_feet_stand() -> None:
+    walk = walk_of("go2", Gait.trot, (0.05, 0.0))
+    sim = fb.Simulation(walk.robot)
+    fb.rollout(sim, walk, 1.9, control_period=PERIOD)
+    assert len(walk.stance) == 2
+    walk.gait = crawl = Gait.crawl(walk.robot, start=0.0)
+    assert walk.gait is crawl
+    record = fb.rollout(sim, walk, 2.1, control_period=PERIOD)
+    assert record.outcome == "completed" and tilt(record) < 2.0
+    standing = [len(step.stance) for step in walk.history if step.time > 1.9]
+    assert standing[0] == 4 and set(standing) == {3, 4}
+
+
+def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked() -> None:
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.1), (0.2, 0.0))
+    sim = fb.Simulation(walk.robot)
+    for _ in range(10):
+        walk.gait = Gait.trot(walk.robot, start=0.1)
+        fb.rollout(sim, walk, 0.08, control_period=PERIOD)
+    assert [round(step.time, 2) for step in walk.history] == [0.0, 0.1, 0.35, 0.6]
+    trot = walk.gait
+    for gait in (Gait.crawl(walk.robot), trot):  # a control that is moved, and moved back
+        walk.gait = gait
+        fb.rollout(sim, walk, 0.002, control_period=PERIOD)
+    assert fb.rollout(sim, walk, 0.8, control_period=PERIOD).outcome == "completed"
+    assert len(walk.stance) == 2 and walk.gait is trot
+
+
+def test_it_begins_anew_where_another_controller_had_the_robot() -> None:
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.0), (0.3, 0.0))
+    standing = walk.robot.standing()
+    walk(standing.q, standing.v)  # somebody looked at a command before
+    q = np.array(standing.q)
+    q[:2] += 3.0
+    sim = fb.Simulation(walk.robot)
+    sim.reset(standing.replace(q=q))
+    assert fb.rollout(sim, walk, 1.0, control_period=PERIOD).outcome == "completed"
+    other = Stand(walk.robot, fb.Contacts.feet(walk.robot))
+    fb.rollout(sim, other, 3.0, control_period=PERIOD)
+    record = fb.rollout(sim, walk, 1.0, control_period=PERIOD)  # 3 s went by without it
+    assert record.outcome == "completed" and tilt(record) < 0.5 and walk.history[0].time == pytest.approx(4.0)
+
+
+def test_a_copy_of_a_robot_that_steps_stands() -> None:
+    robot = judges.load("go2")
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
+    run(stand, 0.6, fb.Push([0.0, 250.0, 0.0], start=0.3))
+    assert stand.stepping
+    for other in (copy.deepcopy(stand), pickle.loads(pickle.dumps(stand))):
+        run(other, 0.1)
+        assert not other.stepping
+
+
+def test_a_least_normal_force_bounds_the_ramps() -> None:
+    walk = walk_of("go2", lambda robot: Gait.crawl(robot, start=0.4), min_normal_force=5.0)
+    record = run(walk, 1.0)
+    assert record.outcome == "completed"
+    planned = record.force("RL_foot", "planned")[:, 2]
+    assert planned[planned > 0.0].min() == pytest.approx(5.0, abs=1e-3)
+
+
 # what it is -----------------------------------------------------------------------------------------------------------------
 
 
@@ -266,7 +406,7 @@ def test_a_foothold_of_ones_own_is_taken() -> None:
 
     walk = walk_of("go2", Gait.trot, foothold=wider)
     record = run(walk, 2.5)
-    assert record.outcome == "completed" and set(asked) == set(walk.contacts.names) | set(asked)
+    assert record.outcome == "completed" and set(asked) == {foot.frame for foot in walk.robot.feet}
     width = [np.ptp(positions[:, 1]) for positions in record.foot_positions[[0, -1]]]
     assert np.isclose(width[1] - width[0], 0.06, atol=0.02)
 
@@ -303,7 +443,13 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         Walk(robot, contacts, Gait.trot(robot), (0.1, 0.2, 0.3))
     with pytest.raises(InputError, match="facets"):
         Walk(robot, contacts, Gait.trot(robot), facets=2)
+    with pytest.raises(InputError, match="all feet in the air"):
+        Walk(robot, contacts, Gait(dict.fromkeys(contacts.names, 0.0), 1.0, 0.5))
+    with pytest.raises(InputError, match="all feet in the air"):
+        Stand(robot, contacts, Gait(dict.fromkeys(contacts.names, 0.0), 1.0, 0.5))
     walk = Walk(robot, contacts, Gait.trot(robot))
+    with pytest.raises(InputError, match="before its first tick"):
+        walk.below("FL_foot", 1.0)
     with pytest.raises(InputError, match="foothold"):
         Walk(robot, contacts, Gait.trot(robot), foothold=lambda foot: np.zeros(2))
     with pytest.raises(InputError, match="yaw_rate"):

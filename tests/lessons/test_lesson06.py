@@ -160,6 +160,19 @@ def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed
     assert pushed.outcome == "completed"
 
 
+def test_dearer_moments_are_missed_by_less() -> None:
+    state = rose_controller().state
+    aside = state.replace(v=np.eye(18)[1] * 1.5)  # 1.5 m/s to the left: more than the cones can stop at once
+    gaps = []
+    for weight in (1.0, 100.0):
+        controller = ConeController(state.robot, rose_controller().contacts, state, moment_weight=weight)
+        forces = controller(aside.q, aside.v).forces
+        assert forces is not None
+        gaps.append(abs(com_wrench(aside, controller.contacts).A @ forces - np.concatenate(controller.wish(aside))))
+    (force, moment), (force_then, moment_then) = ((each[:3].max(), each[3:].max()) for each in gaps)
+    assert moment_then < 0.5 * moment and force_then > force > 1.0
+
+
 def test_torques_of_the_controller_bring_about_the_forces_that_it_plans() -> None:
     controller = rose_controller()
     state = controller.robot.random_state(3, spread=0.05)

@@ -45,7 +45,8 @@ def test_07_1_knows_each_wrong_count() -> None:
     assert right("07.1", 45)
     hints = {
         24: "motors alone", 44: "lesson's own", 42: "normal forces are missing", 33: "each way", 21: "motors are missing",
-        39: "four facets", 52: "four feet", 72: "equalities", 50: "Neither right",
+        39: "Four facets, or nine motors", 30: "normal forces are missing, and", 52: "four feet", 72: "equalities",
+        50: "Neither right",
     }  # fmt: skip
     assert missed("07.1", [*hints.items(), (None, "no answer yet")]) == []
 

@@ -14,6 +14,7 @@ from floatbase import lessons
 from floatbase.errors import InputError
 from floatbase.lessons import draw_roses, measured_rose, plot_roses, rose_controller
 
+SECOND = "09 standing"  # a second rose of a lesson's own
 KEPT = json.loads((Path(lessons.__file__).parent / "roses.json").read_text(encoding="utf-8"))
 PART = 0.6  # of the kept push is survived and 1 / PART of it is not, on any processor: a fall amplifies rounding
 
@@ -29,14 +30,25 @@ def test_what_is_kept_is_what_the_physics_says(lesson: str) -> None:
     assert outcomes[0] == "completed" != outcomes[1]
 
 
-@pytest.mark.parametrize("lesson", sorted(KEPT))
-def test_the_former_lesson_is_grey(lesson: str) -> None:
+@pytest.mark.parametrize("lesson", [name for name in sorted(KEPT) if " " not in name])
+def test_the_former_lesson_is_grey_or_a_second_rose_of_the_same_robot(lesson: str) -> None:
     axis = plot_roses(lesson)
-    former = [name for name in sorted(KEPT) if name < lesson][-1:]
+    own = [name for name in KEPT if name.startswith(f"{lesson} ")]
+    former = own or [name for name in sorted(KEPT) if name < lesson and " " not in name][-1:]
+    robots = {measured_rose(name).state.robot.name for name in [lesson, *former]}
+    assert len(robots) == 1
     expected = [measured_rose(name).pushes for name in [lesson, *former]]
     assert np.array_equal([line.get_ydata()[:-1] for line in axis.get_lines()], expected)
     plt.close(axis.figure)
     assert {path.split("/")[0] for path in draw_roses(lesson)} == {"rose", *["before" for _ in former]}
+
+
+def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> None:
+    assert rose_controller(SECOND)().steps is None is not rose_controller(SECOND.split()[0])().steps
+    assert len(plot_roses(SECOND).get_lines()) == 1
+    plt.close("all")
+    with pytest.raises(InputError, match="no controller to push"):
+        rose_controller("09 flying")
 
 
 @pytest.mark.parametrize("scale", [0.002, 0.003])

@@ -14,7 +14,7 @@ import umsgpack
 from browsers import SCREENSHOTS
 from waiting import until
 
-from floatbase.dynamics import Contacts
+from floatbase.dynamics import Contacts, LinearConstraint
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Push, Rollout
@@ -59,6 +59,15 @@ def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray
 
 def numbers(packed: umsgpack.Ext | list[float]) -> np.ndarray:
     return np.frombuffer(packed.data, "<f4") if isinstance(packed, umsgpack.Ext) else np.array(packed)
+
+
+def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(viewer: Viewer, go2: Robot) -> None:
+    made = record(go2, 0.2)
+    held = LinearConstraint("held", 2, lambda state, t: (np.eye(2, go2.nv), np.zeros(2)))
+    forces = np.hstack([made.measured, np.full((len(made), 2), np.nan)])
+    viewer.play(dataclasses.replace(made, contacts=made.contacts + Contacts([held]), measured=forces, planned=forces))
+    drawn = {path for path in viewer.canvas.picture if path.startswith("measured/")}
+    assert drawn == {f"measured/{name}" for name in made.contacts.names}
 
 
 def test_a_record_is_thinned_to_thirty_pictures_a_second() -> None:

@@ -15,6 +15,7 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction import FrictionPolyhedron, wrench_set
 from floatbase.objectives import CoMTask, standing_tasks
+from floatbase.qp import Solution
 from floatbase.robots import Robot, State
 from floatbase.viewer import (
     BACKGROUNDS,
@@ -264,9 +265,18 @@ def test_prices_stand_at_the_middle_of_their_facets(
         assert float(picture[f"price/{name}"].shape.name) == pytest.approx(price, rel=0.05)
     viewer.show(standing, contacts, extra=picture)
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
-    assert [hexadecimal(viewer.painter.text), "price of a limit: its multiplier"] in legend
+    assert [hexadecimal(viewer.painter.text), "price of a limit: its multiplier", "patch"] in legend
     with pytest.raises(InputError, match="not one of these contacts"):
         viewer.prices(standing, contacts.only("FL_foot"), answer)
+
+
+def test_a_price_that_is_nearly_nothing_beside_another_gets_no_label(viewer: Viewer, standing: State) -> None:
+    contacts = Contacts.points(standing.robot)
+    qp = WholeBodyController(standing.robot, contacts, standing_tasks(standing)).qp(standing)
+    mu = np.zeros(len(qp.G))
+    mu[[0, 1, 2]] = 1e4, 9.0, 11.0  # of FL's facets
+    picture = viewer.prices(standing, contacts, Solution(qp, np.zeros(qp.n), mu, "made up"))
+    assert set(picture) == {"price/FL_foot facet 0", "price/FL_foot facet 2"}
 
 
 def test_figure_1_adds_up() -> None:

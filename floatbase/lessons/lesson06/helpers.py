@@ -34,10 +34,12 @@ class ConeController:
     robot: the robot to control.
     contacts: its contacts with the ground, each with a polyhedron of 4 facets inside its cone.
     state: where to stand.
+    moment_weight: 1/m², what (N·m)² cost in (22) beside N².
     """
 
-    def __init__(self, robot: fb.Robot, contacts: fb.Contacts, state: fb.State):
+    def __init__(self, robot: fb.Robot, contacts: fb.Contacts, state: fb.State, moment_weight: float = 1.0):
         self.robot, self.contacts, self.state = robot, contacts, of_kind("state", state, fb.State)
+        self.moment_weight = moment_weight
         cones = zip(contacts.normals, contacts.mus, strict=True)
         self._rows = block_diag(*(FrictionPolyhedron(n, mu, FACETS).rows for n, mu in cones))
         self._bias = BIAS * force_bias(contacts, NORMAL_BIAS, robot.weight / contacts.n_points)
@@ -45,7 +47,8 @@ class ConeController:
     def __call__(self, q: Array, v: Array, t: float = 0.0) -> Torques:
         """The torques for configuration q and velocity v, with the forces that they are to bring about."""
         eom = equations_of_motion(fb.State(self.robot, q, v), self.contacts, t)
-        cost = wrench_objective(eom.state, self.contacts, *self.wish(eom.state)) + self._bias
+        wish = self.wish(eom.state)
+        cost = wrench_objective(eom.state, self.contacts, *wish, moment_weight=self.moment_weight) + self._bias
         forces = least_inside(cost, self._rows)
         return Torques(torque_for_forces(eom).torque(forces), forces)
 

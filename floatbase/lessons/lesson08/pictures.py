@@ -1,0 +1,144 @@
+"""Lesson 08, Standing, shifting, stepping, walking: triangles from above, a falling pendulum, footholds, two robots to push."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import ipywidgets as widgets
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from IPython.display import HTML
+from matplotlib.figure import Figure
+
+import floatbase as fb
+from floatbase.lessons.lesson06 import region_picture
+from floatbase.lessons.panels import live
+from floatbase.simulation import Live, Rollout, advice
+from floatbase.viewer import GREYS, Picture, Viewer, hexadecimal, plots, shapes
+
+_UP = np.array([0.0, 0.0, 1.0])
+_SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
+_LIFTED = 0.003  # m above the ground: no flicker with its lines
+_MOST = 600.0  # N: the hardest push of the panel
+_HALF = widgets.Layout(width="50%")
+
+
+def triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
+    """From above, side by side: where the centre of mass may be with each of these feet lifted, and where it is."""
+    feet = contacts.positions(state)
+    drawn = ""
+    for foot in lifted:
+        stand = contacts.without(foot).positions(state)[:, :2]
+        picture = region_picture(state, feet, stand)
+        drawn += f'<div style="text-align: center"><b>without {foot}</b><br>{picture}</div>'
+    return HTML(f'<div style="display: flex; flex-wrap: wrap; gap: 2em">{drawn}</div>')
+
+
+def plot_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
+    """The distance of the centre of mass from the line of two feet, m, over time, s, and that of the pendulum of ω, 1/s."""
+    t, d = np.asarray(time), np.asarray(away)
+    figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
+    ax.plot(t, 1e3 * d, color=hexadecimal(GREYS[0]), linewidth=2, label="MuJoCo")
+    ax.plot(t, 1e3 * d[0] * np.cosh(omega * t), "--", color=hexadecimal(GREYS[1]), linewidth=2, label="pendulum, d cosh ωt")
+    ax.set(xlabel="time [s]", ylabel="away from the line [mm]", ylim=(0, None))
+    ax.grid(alpha=0.3)
+    ax.legend()
+    plt.close(figure)
+    return figure
+
+
+def plot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: float) -> Figure:
+    """The normal force of one foot, planned and measured, N, from begin to end, s. records: title -> record."""
+    figure, axes = plt.subplots(1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained")
+    for ax, (title, record) in zip(np.atleast_1d(axes), records.items(), strict=True):
+        rows = (record.time >= begin) & (record.time <= end)
+        for kind, colour, width in (("planned", plots.PLANNED, 3.5), ("measured", plots.MEASURED, 1.2)):
+            normal = record.force(foot, kind)[rows, 2]  # type: ignore[arg-type]
+            ax.plot(record.time[rows], normal, color=hexadecimal(colour), linewidth=width, label=kind)
+        ax.set(title=title, xlabel="time [s]")
+        ax.grid(alpha=0.3)
+    np.atleast_1d(axes)[0].set_ylabel(f"{foot}, normal force [N]")
+    np.atleast_1d(axes)[0].legend()
+    plt.close(figure)
+    return figure
+
+
+def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
+    """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label."""
+    feet = {foot.frame for foot in view.robot.feet}
+    picture: Picture = {}
+    aside = np.array([0.0, 0.12, 0.03])  # of the first label; the next one stands on the other side
+    for name, place in places.items():
+        at = np.array([*np.asarray(place, dtype=np.float64)[:2], _LIFTED])
+        foot = name in feet
+        picture[f"place/{name}"] = shapes.contact_patch(at, _UP, _SIZES["foothold" if foot else "point"])
+        if not foot:
+            picture[f"label/{name}"] = shapes.label(at + aside, name, 0.035)
+            aside = aside * [1.0, -1.0, 1.0]
+    return picture
+
+
+class PushTogether(widgets.VBox):
+    """Robots side by side, each with a controller of its own, pushed alike by one handle. Nothing moves before the first push.
+
+    controllers: title -> controller; each has a `robot`.
+    """
+
+    def __init__(self, controllers: Mapping[str, Any]):
+        self.views = {title: fb.Viewer(one.robot, height=300, follow=True) for title, one in controllers.items()}
+        self.runs: dict[str, Live] = {}
+        self.lines = {title: widgets.Label(value="paused") for title in controllers}
+        for title, one in controllers.items():
+            sim = fb.Simulation(one.robot)
+            self.views[title].show(sim.state, contacts=sim.feet, cones=False)
+            self.runs[title] = live(sim, one, self.views[title])
+            self.runs[title].on_status(partial(self._tell, title))
+        self.force = _slider("push [N]", 0.0, 200.0, _MOST, 10.0)
+        self.towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
+        self.button, self.reset = widgets.Button(description="push both"), widgets.Button(description="reset")
+        self.button.on_click(lambda _: self.push())
+        self.reset.on_click(lambda _: self.begin_anew())
+        self._pictures = {title: widgets.HTML() for title in controllers}
+        columns = [
+            widgets.VBox([widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]], layout=_HALF)
+            for title in controllers
+        ]
+        buttons = widgets.HBox([self.button, self.reset])
+        super().__init__([widgets.HBox(columns), self.force, self.towards, buttons])
+
+    def push(self) -> None:
+        """Push all of them now, for 0.1 s."""
+        angle = math.radians(self.towards.value)
+        for run in self.runs.values():
+            run.push([self.force.value * math.cos(angle), self.force.value * math.sin(angle), 0.0])
+
+    def begin_anew(self) -> None:
+        """Put all of them back on their feet."""
+        for run in self.runs.values():
+            run.reset()
+
+    def _tell(self, title: str, status: str) -> None:
+        self.lines[title].value = advice(status)
+
+    def close(self) -> None:
+        """Stop the runs and close the pictures."""
+        for run in self.runs.values():
+            run.close()
+        for view in self.views.values():
+            view.close()
+        super().close()
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        """The pictures are put in only here, as those of a slider panel."""
+        for title, picture in self._pictures.items():
+            picture.value = self.views[title]._repr_html_()
+        return super()._repr_mimebundle_(**kwargs)
+
+
+def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:
+    layout = widgets.Layout(width="60%")
+    return widgets.FloatSlider(value=first, min=low, max=high, step=step, description=text, readout_format=".0f", layout=layout)

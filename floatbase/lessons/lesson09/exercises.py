@@ -1,0 +1,243 @@
+"""Exercises of lesson 09, Feet with area."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.dynamics import FlatFootContact
+from floatbase.errors import InputError
+from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
+from floatbase.lessons.lesson09.helpers import AFTER, BEGIN, MU, SLOW_PERIOD, leaning, pressure, talos
+from floatbase.lessons.rounding import about
+from floatbase.linear_algebra import rank
+from floatbase.simulation import Rollout
+
+ANKLE = 0.107  # m: height of the sensor of exercise 09.1 above the sole
+CORNER_FORCES = ((30.0, 5.0, 210.0), (24.0, -6.0, 120.0), (14.0, 2.0, 60.0), (12.0, 9.0, 90.0))  # N, of exercise 09.1
+LENGTH, WIDTH, LOAD, SOLE_MU = 0.24, 0.10, 400.0, 0.6  # m, m, N and μ of the sole of exercise 09.3
+ROUND = 360  # facets that stand for a round cone: they miss 4e-5 of it
+LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: what exercise 09.4 asks for
+
+
+# 09.1 ---------------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def ankle_sensor() -> Array:
+    """What a sensor in the left ankle of Talos reads, shape (6,): force, N, and moment about itself, N·m, world."""
+    state = talos().standing()
+    sole = fb.Contacts.flat_feet(talos()).only("left_sole_link")
+    return contact_wrench(state, sole, np.array(CORNER_FORCES), state.point("left_sole_link") + [0.0, 0.0, ANKLE])
+
+
+def _pushed() -> Array:
+    """As the mean of the corners, weighted by their forces: no moment in it. Shape (2,), m, from the point below the sensor."""
+    state = talos().standing()
+    sole = fb.Contacts.flat_feet(talos()).only("left_sole_link")
+    return (centre_of_pressure(state, sole, np.array(CORNER_FORCES)) - state.point("left_sole_link"))[:2]
+
+
+def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Callable[[], Array]:
+    """The centre of pressure from the sensor. height: which is added to the moments as height · force, m."""
+
+    def value() -> Array:
+        fx, fy, fz, tx, ty, _ = ankle_sensor()
+        p = sign * np.array([-ty + height * fx, tx + height * fy]) / fz
+        return p[::-1] if swap else p
+
+    return value
+
+
+# 09.2 ---------------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def _new_soles() -> fb.Contacts:
+    """Two soles with six corners each."""
+    angles = np.pi / 3 * np.arange(6)
+    corners = np.column_stack([0.1 * np.cos(angles), 0.06 * np.sin(angles), np.zeros(6)])
+    return fb.Contacts([FlatFootContact(name, corners) for name in ("left_sole_link", "right_sole_link")])
+
+
+def _counted() -> Array:
+    """By rank: λ that nobody feels, internal forces, and the dimension of all motions."""
+    eom = fb.equations_of_motion(talos().standing(), _new_soles())
+    J = eom.J
+    return np.array([len(J) - rank(J), len(J) - rank(J[:, :6]), fb.feasible_space(eom).dimension])
+
+
+# 09.3 ---------------------------------------------------------------------------------------------------------------------
+
+
+def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
+    """The largest twist of the sole, N·m, by a linear program over its corner forces."""
+    corners = np.array([[sx * LENGTH / 2, sy * WIDTH / 2, 0.0] for sx in (1, -1) for sy in (1, -1)])
+    cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets)
+    limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), LOAD, np.full(4, np.inf))
+    return limits.reach([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, LOAD, 0.0, 0.0, 0.0])
+
+
+# 09.4 ---------------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def leaned(seconds: float, posture: float) -> Rollout:
+    """The record of the lean that exercise 09.4 asks for. seconds: it takes. posture: weight of the posture."""
+    controller = leaning(LEAN, seconds, posture)
+    ticks = int(np.ceil((BEGIN + seconds + AFTER) / SLOW_PERIOD))
+    return fb.rollout(fb.Simulation(talos()), controller, ticks * SLOW_PERIOD, control_period=SLOW_PERIOD)
+
+
+def _judge_lean(answer: Any) -> Verdict:
+    """A lean, judged on the physics."""
+    given = numbers(answer, (2,))
+    if isinstance(given, Verdict):
+        return given
+    seconds, posture = given.tolist()
+    if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
+        return Verdict(False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.")
+    try:
+        record = leaned(seconds, posture)
+    except InputError as error:
+        return Verdict(False, str(error))
+    if record.outcome != "completed":
+        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.")
+    return _judge_record(record, seconds)
+
+
+def _judge_record(record: Rollout, seconds: float) -> Verdict:
+    """Of a lean that lasted: where it ended, how near to the edge the ground had to push, and how long it took."""
+    settled = record.time > 0.1  # the robot is put down at first
+    toes, heels = record.foot_positions[..., 0].max(axis=1), record.foot_positions[..., 0].min(axis=1)
+    pushed = pressure(record)[:, 0]
+    ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
+    short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
+    told = f"{about(short, 'mm', floor=0.05)} short at the end; the centre of pressure stays {about(ahead, 'mm', floor=0.5)} "
+    told += f"from the toes and {about(behind, 'mm', floor=0.5)} from the heels"
+    if min(ahead, behind) < 1.0:
+        return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.")
+    if ahead < EDGE and abs(short) > NEAR:
+        return Verdict(False, f"Too near to the toes, and it does not get there either: {told}.")
+    if ahead < EDGE:
+        return Verdict(False, f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?")
+    if abs(short) > NEAR:
+        return Verdict(False, f"It does not get there: {told}. Another wish holds it back.")
+    if seconds > QUICK:
+        slow = about(seconds, "s", digits=3)
+        return Verdict(False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.")
+    return Verdict(True, f"On the physics: {told}.")
+
+
+EXERCISES = (
+    Exercise(
+        name="09.1",
+        statement="The centre of pressure of the left sole, shape (2,), m, from the point below the sensor: a sensor in the "
+        "ankle, 0.107 m above the sole, reads `sensor` = (f, τ), N and N·m, world, about itself.",
+        stub="pushed_at = np.zeros(2)  # replace: forwards and to the left, m",
+        solution="fx, fy, fz, tx, ty, tz = sensor\npushed_at = np.array([-ty - 0.107 * fx, tx - 0.107 * fy]) / fz",
+        judge=Numeric(
+            right=_pushed,
+            praise="The tangential force has a lever as long as the ankle is high.",
+            mistakes={
+                "Nothing there yet: that is the point below the sensor.": lambda: np.zeros(2),
+                "The ankle's height is missing: the formula of the lesson is about a point on the ground.": _read(0.0),
+                "The height goes in with the wrong sign: the ground is below the sensor.": _read(ANKLE),
+                "x and y are swapped: a push that is further ahead makes a moment about y.": _read(swap=True),
+                "Height forgotten, and x and y swapped.": _read(0.0, swap=True),
+                "The sign: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).": lambda: (
+                    np.array([ankle_sensor()[4] + ANKLE * ankle_sensor()[0], -ankle_sensor()[3] + ANKLE * ankle_sensor()[1]])
+                    / ankle_sensor()[2]
+                ),
+                "That is in mm.": lambda: 1e3 * _pushed(),
+                "Divide by the normal force: these are moments.": lambda: _pushed() * ankle_sensor()[2],
+                "The normal force is f_z alone, not the length of f.": lambda: (
+                    _pushed() * ankle_sensor()[2] / np.linalg.norm(ankle_sensor()[:3])
+                ),
+            },
+        ),
+        explanation="Moments about the point below the sensor: τ - (0, 0, -h) × f has -h f_x about y and h f_y about x.",
+    ),
+    Exercise(
+        name="09.2",
+        statement="Talos gets soles with six corners each. Three numbers: dimensions of λ that move nothing and that no torque "
+        "feels; dimensions of λ that do not push the base; dimension of all motions, dim β.",
+        stub="counted = np.array([12, 18, 44])  # of the lesson; replace all three",
+        solution="k, r, d = 36, 12, 32\ncounted = np.array([k - r, k - 6, d + k - r])",
+        judge=Shaped(
+            Numeric(
+                right=_counted,
+                praise="More corners add nothing to what a sole can do, only to what nobody can know.",
+                tolerance=1e-6,
+                count=True,
+                mistakes={
+                    "That is for four corners each.": lambda: np.array([12, 18, 44]),
+                    "That is one sole: there are two.": lambda: np.array([12, 12, 50]),
+                    "J has rank 12, however many corners a rigid sole has.": lambda: np.array([12, 30, 44]),
+                    "Rows of corners are no rows of motion: J has 36 rows and rank 12.": lambda: np.array([0, 30, 32]),
+                    "The first two are swapped.": lambda: np.array([30, 24, 56]),
+                    "The first two are right. dim β = d + k - r, with k = 36.": lambda: np.array([24, 30, 44]),
+                    "The first and the last are right. What the base feels has six dimensions, not twelve.": lambda: np.array(
+                        [24, 24, 56]
+                    ),
+                    "36 is the length of λ; what is left once each sole's six numbers are taken off?": lambda: np.array(
+                        [36, 30, 56]
+                    ),
+                },
+            ),
+            {(): "Three numbers are asked for: np.array([…, …, …])."},
+        ),
+        explanation="k = 36 and r = 12: k - r = 24, k - rank J_b = 30, d + k - r = 56.",
+    ),
+    Exercise(
+        name="09.3",
+        statement="The largest twist, N·m, that a sole of 24 cm × 10 cm bears on a floor of μ = 0.6, pressed with 400 N in its "
+        "middle, without a sideways force, by four corners with round cones.",
+        stub="largest_twist = 0.0  # N·m; replace by your expression",
+        solution="largest_twist = 0.6 * 400 * np.hypot(0.12, 0.05)",
+        judge=Numeric(
+            right=_twist,
+            praise="Each corner pushes at a right angle to its lever, as hard as friction lets it.",
+            mistakes={
+                "Nothing there yet.": lambda: 0.0,
+                "That is for pyramids with four facets inside the cones; here they are round.": lambda: _twist(4),
+                "That is μ f_z times half the length: the lever of a corner goes from the middle to the corner.": lambda: (
+                    SOLE_MU * LOAD * LENGTH / 2
+                ),
+                "That is μ f_z times half the width: the lever of a corner goes from the middle to the corner.": lambda: (
+                    SOLE_MU * LOAD * WIDTH / 2
+                ),
+                "Half the sides, not the sides: the levers begin in the middle.": lambda: (
+                    SOLE_MU * LOAD * float(np.hypot(LENGTH, WIDTH))
+                ),
+                "That is one corner; four carry.": lambda: _twist() / 4,
+                "Four corners share the 400 N: each has 100 N.": lambda: 4 * _twist(),
+                "μ is missing: friction gives less than the normal force.": lambda: _twist() / SOLE_MU,
+                "That is with the μ of the lesson; here it is 0.6.": lambda: _twist(mu=MU),
+                "Half the length plus half the width is the lever for square pyramids; use the distance.": lambda: (
+                    SOLE_MU * LOAD * (LENGTH + WIDTH) / 2
+                ),
+                "That is a disc of the sole's length that presses evenly: 2/3 μ f_z times its radius.": lambda: (
+                    2 / 3 * SOLE_MU * LOAD * LENGTH / 2
+                ),
+            },
+        ),
+        explanation="The levers of all corners are as long, so however they share the load: μ f_z times the distance.",
+    ),
+    Exercise(
+        name="09.4",
+        statement="Seconds for a lean of 6 cm forwards, and the weight of the posture: it ends within 2 mm of its goal, the "
+        "centre of pressure stays 15 mm from every edge, in at most 1.5 s.",
+        stub="design = np.array([1.0, 0.1])  # seconds, weight of the posture",
+        solution="design = np.array([1.5, 0.01])",
+        judge=_judge_lean,
+        explanation="Braking takes the centre of pressure ahead of x_c by the deceleration over ω², which falls with the "
+        "square of the time. The posture is a wish, too: with a tenth of its weight the lean ends where it should.",
+    ),
+)

@@ -1,0 +1,96 @@
+"""Lesson 09, Feet with area: Talos held upright, where the ground pushes, a lean, and the controllers of its roses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag
+
+import floatbase as fb
+from floatbase._arrays import Array, read_only
+from floatbase.behaviours import Gait, Stand, Swing
+from floatbase.dynamics import grasp_matrix
+from floatbase.friction import FrictionPolyhedron
+from floatbase.lessons.lesson06 import least_inside
+from floatbase.simulation import Rollout
+
+MU = 0.7
+PERIOD = 2e-3  # s: a tick of the controller; 1 ms makes no difference to what the lesson shows, and takes twice as long
+SLOW_PERIOD = 4e-3  # s, for long records
+ROSE_WATCH = 4.0  # s: who steps may fall late
+SWING = 0.4  # s of each step after a push
+_SETTLED = 1e-4  # weight of least corner forces beside a wish in N²
+BEGIN, AFTER = 0.2, 1.0  # s: before and after the lean of exercise 09.4
+
+
+@cache
+def talos() -> fb.Robot:
+    """The humanoid on its two soles."""
+    return fb.load("talos")
+
+
+def held(
+    contacts: fb.Contacts,
+    duration: float,
+    pushes: Sequence[fb.Push] = (),
+    sim: fb.Simulation | None = None,
+    **options: object,
+) -> Rollout:
+    """The record of a robot that the QP of lesson 07 keeps where it stands, ticking every 2 ms.
+
+    contacts: what the controller believes in. duration: s. pushes: on the robot.
+    sim: the physics; Talos on its soles by default. options: of `fb.WholeBodyController`.
+    """
+    sim = fb.Simulation(talos()) if sim is None else sim
+    tasks = fb.standing_tasks(sim.state)
+    controller = fb.WholeBodyController(sim.robot, contacts, tasks, **options)  # type: ignore[arg-type]
+    return fb.rollout(sim, controller, duration, pushes, PERIOD)
+
+
+def pressure(record: Rollout) -> Array:
+    """Where the ground pushed: the centre of pressure of all points together at each row, shape (n, 2), m, world.
+
+    NaN while nothing touches. The ground is level.
+    """
+    normal = record.measured[:, 2::3]
+    total = np.sum(normal, axis=1)
+    total = np.where(total > 0.0, total, np.nan)
+    return read_only(np.einsum("ij,ijk->ik", normal, record.foot_positions[:, :, :2]) / total[:, None])
+
+
+def corner_forces(state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4) -> Array:
+    """The forces at the corners of one sole, inside their pyramids, whose wrench is nearest to the one given, shape (k,), N.
+
+    Of those that make it, the smallest. wrench: shape (6,), about the origin of the sole's frame, N and N·m, world.
+    facets: of each pyramid.
+    """
+    cones = zip(sole.normals, sole.mus, strict=True)
+    rows = block_diag(*(FrictionPolyhedron(n, mu, facets).rows for n, mu in cones))
+    G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))
+    weights = np.repeat([1.0, 10.0], 3)  # 1 N·m counts as 10 N: at the corners, 10 cm away, it is
+    cost = fb.Quadratic.from_residual(weights[:, None] * G, weights * np.asarray(wrench))
+    return least_inside(cost + _SETTLED * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows)
+
+
+def leaning(centimetres: float, seconds: float, posture: float) -> fb.WholeBodyController:
+    """Talos moves its centre of mass forwards along a minimum-jerk path, from 0.2 s on, and stays there.
+
+    centimetres: how far. seconds: how long it takes. posture: weight of the posture.
+    """
+    robot, state = talos(), talos().standing()
+    path = Swing(state.com, state.com + [0.01 * centimetres, 0.0, 0.0], BEGIN, BEGIN + seconds, 0.0)
+    tasks = [fb.CoMTask(path), fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]
+    return fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot, mu=MU), tasks)
+
+
+def rose_controller() -> Stand:
+    """Talos stands on its soles, and steps when its capture point comes near their edge: its rose ends the lesson."""
+    return Stand(talos(), fb.Contacts.flat_feet(talos(), mu=MU), Gait.walk(talos(), swing=SWING))
+
+
+def standing_rose_controller() -> Stand:
+    """The same without steps."""
+    return Stand(talos(), fb.Contacts.flat_feet(talos(), mu=MU))
