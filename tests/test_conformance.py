@@ -123,7 +123,7 @@ EXAMPLES: dict[str, Any] = {
     "PostureTask.acceleration": ZERO, "moving_frame.acceleration": lambda t: UP,
     "actuators": HYDRAULIC, "after_reset": lambda: None, "alpha": 0.1, "angle": 30.0, "angular_acceleration": UP,
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
-    "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
+    "axes": "world", "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
     "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
     "plot_roses.axis": POLAR, "rolling": True, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,

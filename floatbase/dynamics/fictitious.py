@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._arrays import Array, Value, checked, function, of_kind, read_only
-from floatbase.errors import InputError
+from floatbase.errors import InputError, unknown_name
 from floatbase.robots import State
 
 Turning: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
@@ -25,8 +25,7 @@ _STEP = 1e-5  # m and rad to each side for central differences: curvature and ro
 class BiasForces(Value):
     """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each (nv,), N and N·m as h.
 
-    Which is which depends on the coordinates: v holds the base's velocity in the base frame, so ω × v of the base counts as
-    Coriolis. Source: the document, Appendix A.
+    Which is which, and how large, depends on the coordinates: see `bias_forces`. Source: the document, Appendix A.
     """
 
     gravity: Array
@@ -44,15 +43,36 @@ class BiasForces(Value):
         return read_only(self.gravity + self.centrifugal + self.coriolis)
 
 
-def bias_forces(state: State) -> BiasForces:
-    """App. A: h(q, v) taken apart. The velocity part is Σ_ij Γ_ij v_i v_j; moving one coordinate alone gives Γ_ii."""
+def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasForces:
+    """App. A: h(q, v) taken apart. The velocity part is Σ_ij Γ_ij v_i v_j; moving one coordinate alone gives Γ_ii.
+
+    axes: of the base's velocity, acceleration, force and moment: its own, as in v, which turn and so have m ω × v_lin as a
+        Coriolis force; or the world's. A robot without a floating base has the same parts in both.
+    """
     of_kind("state", state, State)
+    if not isinstance(axes, str) or axes not in ("base", "world"):
+        raise unknown_name("axes", axes, ("base", "world"))
     model = state.robot.model
     data = model.createData()
+    T = _to_base_axes(state) if axes == "world" else np.eye(model.nv)
     g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
-    alone = [pin.nonLinearEffects(model, data, state.q, unit) - g for unit in np.eye(model.nv)]
-    centrifugal = np.column_stack(alone) @ state.v**2
-    return BiasForces(read_only(g), read_only(centrifugal), read_only(state.h - g - centrifugal))
+
+    def moving(v: Array) -> Array:
+        """Σ_ij Γ_ij u_i u_j for the coordinates u with v = T u: q̈ = T u̇ + Ṫ u, and forces turn with Tᵀ."""
+        turning = state.M[:, :3] @ np.cross(v[:3], v[3:6]) if axes == "world" and state.robot.is_floating else 0.0
+        return np.asarray(T.T @ (pin.nonLinearEffects(model, data, state.q, v) - g + turning))
+
+    u = T.T @ state.v  # T is orthogonal
+    centrifugal = np.column_stack([moving(unit) for unit in T.T]) @ u**2
+    return BiasForces(read_only(T.T @ g), read_only(centrifugal), read_only(moving(state.v) - centrifugal))
+
+
+def _to_base_axes(state: State) -> Array:
+    """T with v = T u, shape (nv, nv), orthogonal: u has the base's velocities in the world's axes."""
+    T = np.eye(state.robot.nv)
+    if state.robot.is_floating:
+        T[:3, :3] = T[3:6, 3:6] = state.frame_pose("base").rotation.T
+    return T
 
 
 def coriolis_matrix(state: State) -> Array:

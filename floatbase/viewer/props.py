@@ -1,4 +1,4 @@
-"""Things beside the robot: a wheel, a hydraulic cylinder, a wall, bolts."""
+"""Things beside the robot: a wheel, a turntable, a hydraulic cylinder, a wall, bolts."""
 
 from __future__ import annotations
 
@@ -38,6 +38,18 @@ def wheel(centre: npt.ArrayLike, axis: npt.ArrayLike, radius: float, angle: floa
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     thick = 0.35 * radius if width is None else width
     return Item(_unit_wheel(), placed(centre, rest @ turn, (radius, radius, thick)))
+
+
+def turntable(centre: npt.ArrayLike, radius: float, angle: float) -> Item:
+    """A round level table with lines painted on it, one of them marked, on a foot.
+
+    centre: (3,), m, world, of its top.
+    radius: m.
+    angle: rad, how far it has turned about the vertical by the right-hand rule; at 0 the marked line points along x.
+    """
+    positive("radius of the turntable", radius, "m")
+    c, s = np.cos(angle), np.sin(angle)
+    return Item(_unit_table(), placed(centre, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), radius))
 
 
 def hydraulic_cylinder(
@@ -108,6 +120,20 @@ def _unit_wheel() -> Shape:
     angles = 2.0 * np.pi * np.arange(6) / 6
     spokes = [geometry.rod(np.zeros(3), [0.85 * np.cos(a), 0.85 * np.sin(a), 0.0], 0.06) for a in angles]
     parts = [(tyre, RUBBER), (hub, STEEL), (spokes[0], WARNING), *((spoke, STEEL) for spoke in spokes[1:])]
+    colours = [np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts]
+    return lowering.mesh(*geometry.merged([mesh for mesh, _ in parts]), colours=np.vstack(colours))
+
+
+@lru_cache(maxsize=1)
+def _unit_table() -> Shape:
+    """A disc of radius 1 with its top at z = 0, a rim and twelve painted lines, the one along x dark and wide."""
+    top = geometry.revolved([(0.97, 0.0), (0.0, 0.0)], 72)
+    rim = geometry.revolved([(0.97, -0.05), (1.0, -0.05), (1.0, 0.012), (0.97, 0.012), (0.97, -0.05)], 72)
+    foot = geometry.revolved([(0.0, -0.25), (0.3, -0.25), (0.06, -0.2), (0.06, -0.05), (0.0, -0.05)], 36)
+    angles = 2.0 * np.pi * np.arange(12) / 12
+    lines = [geometry.rod(np.zeros(3), [0.97 * np.cos(a), 0.97 * np.sin(a), 0.0], 0.005) for a in angles]
+    mark = geometry.rod([0.0, 0.0, 0.0], [0.97, 0.0, 0.0], 0.016)
+    parts = [(top, WALL), (rim, STEEL), (foot, STEEL), (mark, RUBBER), *((line, STEEL) for line in lines[1:])]
     colours = [np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts]
     return lowering.mesh(*geometry.merged([mesh for mesh, _ in parts]), colours=np.vstack(colours))
 

@@ -95,6 +95,7 @@ NAN = float("nan")
         (lambda: marks.frame_axes(np.eye(4), 0.0), "length of a frame's axes is 0"),
         (lambda: props.wheel([0, 0, 0], [0, 0, 0], 0.1, 0.0), "axis of the wheel is the zero vector"),
         (lambda: props.wheel([0, 0, 0], [0, 1, 0], 0.0, 0.0), "radius of the wheel is 0"),
+        (lambda: props.turntable([0, 0, 0], 0.0, 0.0), "radius of the turntable is 0"),
         (lambda: props.hydraulic_cylinder([0, 0, 0], [0, 0, 0], (0.1, 0.2)), "a cylinder of no length points nowhere"),
         (lambda: props.hydraulic_cylinder([0, 0, 0], [0, 0, 1], (0.2, 0.1)), r"stroke of the cylinder is \(0.2, 0.1\)"),
         (lambda: props.wall([0, 0, 0], [0, 0, 1], 1, 1), "normal of the wall is vertical; a wall stands"),
@@ -124,6 +125,12 @@ def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
     start, quarter = (props.wheel([0, 0, 1], [0, 1, 0], 1.0, angle).matrix[:3, 0] for angle in (0.0, np.pi / 2))
     np.testing.assert_allclose(start, [0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(quarter, [1, 0, 0], atol=1e-12)
+
+
+def test_a_turntables_mark_turns_to_the_left_and_its_top_is_where_it_was_put() -> None:
+    table = props.turntable([1, 0, 0.5], 0.4, np.pi / 2).matrix
+    np.testing.assert_allclose(table @ [1, 0, 0, 1], [1, 0.4, 0.5, 1], atol=1e-12)
+    np.testing.assert_allclose(table[:3, 2], [0, 0, 0.4], atol=1e-12)
 
 
 def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> None:
@@ -295,6 +302,7 @@ def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, st
     extra = below("wheel", {"": props.wheel([0.7, -0.5, 0.15], [0, 1, 0], 0.15, 0.6)})
     extra |= below("cylinder", props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)))
     extra |= below("wall", {"": props.wall([-0.6, 0, 0.3], [1, 0, 0], 0.6, 0.6)})
+    extra |= below("table", {"": props.turntable([-0.7, -0.6, 0.2], 0.3, 0.4)})
     extra |= below("bolts", props.bolts([0.3, -0.6, 0.0], 0.1))
     forces = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
     q = standing.q.copy()

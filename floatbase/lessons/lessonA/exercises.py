@@ -1,0 +1,159 @@
+"""Exercises of lesson A, Fictitious forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.dynamics import bias_forces, coriolis_matrix
+from floatbase.lessons.exercises import Exercise, Numeric
+
+TURNING, MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
+PLACE, WALK = np.array([2.0, 0.0, 0.0]), np.array([1.5, 0.0, 0.0])  # m and m/s, in the merry-go-round's axes
+LIFT, ELBOW = 1, 2  # of exercise A.2: ur5's joints
+MOVING = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # rad/s, of exercise A.3
+STEP = 1e-4  # s, and of differences
+
+
+@cache
+def arm(v: tuple[float, ...] = (0.0,) * 6) -> fb.State:
+    """ur5 as it stands, its joints moving with v, rad/s."""
+    return fb.load("ur5").standing().replace(v=np.array(v))
+
+
+def _force_on_the_walker() -> Array:
+    """Mass times the second difference of where the child is in the world."""
+
+    def place(t: float) -> Array:
+        angle = TURNING[2] * t
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (PLACE + t * WALK)
+
+    return np.asarray(MASS * (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2)
+
+
+def _walker(coriolis: float, inward: float, mass: float = MASS) -> Callable[[], Array]:
+    """Multiples of m 2 ω × ṗ and of m ω × (ω × p)."""
+
+    def force() -> Array:
+        turned = 2.0 * np.cross(TURNING, WALK)
+        return np.asarray(mass * (coriolis * turned + inward * np.cross(TURNING, np.cross(TURNING, PLACE))))
+
+    return force
+
+
+def _pair(i: int = LIFT, j: int = ELBOW) -> Array:
+    """What two joints at 1 rad/s make together: both columns of the Coriolis matrix, at the other's velocity."""
+    e = np.eye(6)
+    return np.asarray(coriolis_matrix(arm(tuple(e[i]))) @ e[j] + coriolis_matrix(arm(tuple(e[j]))) @ e[i])
+
+
+def _both(fictitious_only: bool) -> Array:
+    state = arm(tuple(np.eye(6)[LIFT] + np.eye(6)[ELBOW]))
+    return np.asarray(state.h - arm().h if fictitious_only else state.h)
+
+
+def _velocity_part() -> Array:
+    return bias_forces(arm(tuple(MOVING))).fictitious
+
+
+def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callable[[], Array]:
+    """rate · Ṁ v + slope · ∇(vᵀ M v) + gravity · g."""
+
+    def force() -> Array:
+        state = arm(tuple(MOVING))
+        v = state.v
+
+        def change(way: Array) -> Array:
+            after, before = (state.replace(q=state.integrate(s * STEP * way)).M for s in (1.0, -1.0))
+            return np.asarray((after - before) / (2.0 * STEP))
+
+        gradient = np.array([v @ change(unit) @ v for unit in np.eye(6)])
+        return np.asarray(rate * change(v) @ v + slope * gradient + gravity * arm().h)
+
+    return force
+
+
+EXERCISES = (
+    Exercise(
+        name="A.1",
+        statement="The force of the floor on a child that walks straight out on a merry-go-round, shape (3,), N.",
+        stub="floor = np.zeros(3)  # N, in the merry-go-round's axes; replace by your expression",
+        solution="coriolis = -2 * np.cross(omega, p_dot)\n"
+        "centrifugal = -np.cross(omega, np.cross(omega, p))\n"
+        "floor = -mass * (coriolis + centrifugal)",
+        judge=Numeric(
+            right=_force_on_the_walker,
+            praise="Inwards to keep the child on the disc, and sideways to keep up with it: a real force, from the floor.",
+            mistakes={
+                "Without a force the child would go straight in the world, and curve in these axes.": lambda: np.zeros(3),
+                "That is what the child feels pushed by. The floor has to answer it: the opposite.": _walker(-1.0, -1.0),
+                "The factor 2: half of 2 ω × ṗ is for the velocity's axes that turn, half for the place that does.": _walker(
+                    0.5, 1.0
+                ),
+                "That holds the child against the Coriolis term only; it is off the axis, too.": _walker(1.0, 0.0),
+                "That would do for a child that stands still: it also walks.": _walker(0.0, 1.0),
+                "Sideways right; but inwards, the other way: the floor has to bend the path towards the axis.": _walker(
+                    1.0, -1.0
+                ),
+                "Inwards right; but sideways the other way. In ω × ṗ the order counts.": _walker(-1.0, 1.0),
+                "That is an acceleration, m/s²: the mass is missing.": _walker(1.0, 1.0, 1.0),
+            },
+        ),
+        explanation="In these axes p̈ = 0, so the real force per mass and the two fictitious terms add up to zero.",
+    ),
+    Exercise(
+        name="A.2",
+        statement="What lift and elbow of ur5, at 1 rad/s each, make together and neither alone, shape (6,), N·m.",
+        stub="pair = np.zeros(6)  # N·m; replace by calls of h_of",
+        solution="lift, elbow = np.eye(6)[[1, 2]]\npair = h_of(lift + elbow) - h_of(lift) - h_of(elbow) + g",
+        judge=Numeric(
+            right=_pair,
+            praise="The Coriolis part of this pair. Two calls do: half of h(lift + elbow) - h(lift - elbow). Do you see why?",
+            mistakes={
+                "Nothing there yet. Call h_of with the lift alone, with the elbow alone, and with both.": lambda: np.zeros(6),
+                "Gravity stands in each call: here it was taken away once too often.": lambda: _pair() - arm().h,
+                "Gravity is still in it, once.": lambda: _pair() + arm().h,
+                "That is all of h with both moving: gravity and what each feels alone are in it.": lambda: _both(False),
+                "Without gravity, but what each joint makes alone is still in it.": lambda: _both(True),
+                "That is half of it: the sum over i and j has the pair twice, as (i, j) and as (j, i).": lambda: 0.5 * _pair(),
+                "That is the pair four times over: h(lift + elbow) - h(lift - elbow) has it twice.": lambda: 2.0 * _pair(),
+                "Those are other joints: counted from 0, lift is 1 and elbow 2.": lambda: _pair(ELBOW, ELBOW + 1),
+                "Those are pan and lift: counted from 0, lift is 1 and elbow 2.": lambda: _pair(0, 1),
+            },
+        ),
+        explanation="h = g + Σ Γ_ij v_i v_j; both moving, minus each alone, leaves 2 Γ_ij and minus one g, which goes back in.",
+    ),
+    Exercise(
+        name="A.3",
+        statement="C v of ur5 from M alone, by differences, shape (6,), N·m.",
+        stub="Cv = np.zeros(6)  # N·m; replace: from M_at and differences, without h",
+        solution="change = lambda way: (M_at(1e-4 * way) - M_at(-1e-4 * way)) / 2e-4\n"
+        "slopes = np.array([w @ change(unit) @ w for unit in np.eye(6)])\n"
+        "Cv = change(w) @ w - slopes / 2",
+        judge=Numeric(
+            right=_velocity_part,
+            praise="All of the fictitious forces, from how the inertia changes with the posture. That is where h comes from.",
+            mistakes={
+                "Nothing there yet.": lambda: np.zeros(6),
+                "Kinetic energy is ½ vᵀ M v: the half is missing in its slope.": _from_differences(1.0, -1.0),
+                "That is Ṁ v alone; the slope of the kinetic energy is missing.": _from_differences(1.0, 0.0),
+                "The sign of the slope: momentum changes by what pushes, and the slope stands on that side.": _from_differences(
+                    1.0, 0.5
+                ),
+                "That is the slope of the kinetic energy alone; d/dt of the momentum M v has Ṁ v.": _from_differences(
+                    0.0, -0.5
+                ),
+                "The half belongs to the kinetic energy's slope, not to Ṁ v.": _from_differences(0.5, -1.0),
+                "Both terms are halved: the half belongs to the kinetic energy alone.": _from_differences(0.5, -0.5),
+                "The other sign: C v stands on the side of M q̈.": _from_differences(-1.0, 0.5),
+                "Gravity is in it; C v is the velocity part of h.": _from_differences(1.0, -0.5, 1.0),
+            },
+        ),
+        explanation="Lagrange: d/dt (M v) = slope of ½ vᵀ M v + forces, so M q̈ + (Ṁ v - slope) = forces; the bracket is C v.",
+    ),
+)

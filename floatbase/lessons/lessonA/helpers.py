@@ -1,0 +1,67 @@
+"""Lesson A, Fictitious forces: a figure of eight for an arm, a base that circles, and how far balls have rolled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.simulation import Rollout
+
+REACH = np.array([0.5, 0.35, -0.5, 0.0, 0.0, 0.0])  # rad: how far ur5's joints swing on the figure of eight
+TIMES = np.array([1.0, 2.0, 2.0, 0.0, 0.0, 0.0])  # swings of each joint in one period
+SETTLED = 1.0 / 3.0  # of a record: what comes before does not count as an error
+TURN = 2.0 * np.pi  # rad
+
+Path = Callable[[float], tuple[Array, Array, Array]]
+
+
+def figure_of_eight(home: fb.State, period: float) -> Path:
+    """Joint positions, velocities and accelerations as functions of t, each (6,), with which ur5's tool draws an eight.
+
+    period: s, of one eight.
+    """
+    w = TURN * TIMES / period
+
+    def path(t: float) -> tuple[Array, Array, Array]:
+        swing = REACH * np.sin(w * t)
+        return home.q + swing, REACH * w * np.cos(w * t), -(w**2) * swing
+
+    return path
+
+
+def tool_error(record: Rollout, path: Path) -> float:
+    """Root mean square of the tool's distance from where the path has it, mm, after the first third of a record."""
+    rows = range(round(SETTLED * len(record)), len(record), 5)
+    wanted = [fb.State(record.robot, path(record.time[i])[0]).point("tool0") for i in rows]
+    off = np.array([record.state(i).point("tool0") for i in rows]) - wanted
+    return float(1000.0 * np.sqrt(np.mean(np.sum(off**2, axis=1))))
+
+
+def circling(pitch: float, yaw: float, rate: float, loops: int, phase: float = 90.0) -> Path:
+    """Base orientations that describe an ellipse in pitch and yaw `loops` times, as `OrientationTask` takes them.
+
+    The ellipse grows from nothing in the first loop and shrinks to nothing in the last. Returns R (3, 3), angular velocity
+    and acceleration, rad/s and rad/s², world, as a function of t.
+
+    pitch, yaw: rad, half the widths of the ellipse. rate: loops for each second.
+    phase: degrees between the two; 0 makes a line of the ellipse, to and fro.
+    """
+    total, step, shift = loops / rate, 1e-4, np.deg2rad(phase)
+
+    def angles(t: float) -> Array:
+        s = np.clip(rate * min(t, total - t), 0.0, 1.0)
+        size = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        return np.asarray(size * np.array([pitch * np.sin(TURN * rate * t), yaw * np.sin(TURN * rate * t + shift)]))
+
+    def path(t: float) -> tuple[Array, Array, Array]:
+        before, now, after = angles(t - step), angles(t), angles(t + step)
+        (p1, y1), (p2, y2) = (after - before) / (2.0 * step), (after - 2.0 * now + before) / step**2
+        R = pin.rpy.rpyToMatrix(0.0, now[0], now[1])
+        up, aside = np.array([0.0, 0.0, 1.0]), R[:, 1]  # the axes of yaw and of pitch
+        return R, y1 * up + p1 * aside, y2 * up + p2 * aside + y1 * p1 * np.cross(up, aside)
+
+    return path

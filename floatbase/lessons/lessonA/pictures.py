@@ -1,0 +1,174 @@
+"""Lesson A, Fictitious forces: a puck on a turntable, two ways to write one tumble, errors against speed, feet that travel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.dynamics import bias_forces, seen_from_turning_frame
+from floatbase.lessons.exercises import vector_text
+from floatbase.simulation import Rollout
+from floatbase.viewer import GREYS, Picture, View, Viewer, geometry, hexadecimal, props, shapes
+
+TABLE, HEIGHT = 1.0, 0.3  # m: radius of the turntable, and height of its top
+START = np.array([-0.7, 0.3, 0.0])  # m: where the puck begins, from the axis
+AT_TABLE = View(-90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0))  # x to the right, y away, as in the rider's drawing
+PIECES = 24  # of a drawn path
+SIDE = 250  # pixels of a drawing
+ACCELERATION = 0.05  # m drawn for 1 m/s²
+NEWTON = 0.003  # m drawn for 1 N of what is called a force
+SIDEWAYS = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.62), 0.5))
+AT_FEET = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.44))
+SEEN = 1e-3  # m: a shorter rod is not drawn
+BESIDE = 0.05  # m: from a foot to its pin, away from the robot, where they are seen
+FRAMES = 10  # pictures for each second of the travelling feet
+
+
+def show_ride(view: Viewer, omega: float, speed: float, time: float) -> str:
+    """Draw a puck that slides straight over a turning table and leaves chalk on it; what a rider sees, as SVG.
+
+    omega: rad/s, of the table, to the left. speed: m/s, of the puck, along x. time: s, at least a moment.
+    """
+    times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
+    seen = seen_from_turning_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
+    top = np.array([0.0, 0.0, HEIGHT])
+    straight = START + np.outer(times, [speed, 0.0, 0.0])
+    chalk = seen.position @ seen.rotation[-1].T  # where the table has carried it by now
+    picture = view.painter.stage() | {"table": props.turntable(top, TABLE, omega * time)}
+    picture |= _path("chalk", chalk + top + [0.0, 0.0, 0.006], 0.012, GREYS[0])
+    picture |= _path("way", straight + top + [0.0, 0.0, 0.05], 0.006, GREYS[1])
+    puck = straight[-1] + top
+    picture["puck"] = shapes.rod(puck, np.eye(3), 0.05, 0.055, GREYS[0])
+    view.draw(picture)
+    return _riders_drawing(seen.position, seen.centrifugal[-1], seen.coriolis[-1])
+
+
+def _path(name: str, points: Array, radius: float, colour: tuple[float, float, float]) -> Picture:
+    """Rods from point to point, m, world."""
+    return {f"{name}/{i}": rod for i, (a, b) in enumerate(pairwise(points)) if (rod := _rod(a, b, radius, colour))}
+
+
+def _rod(a: Array, b: Array, radius: float, colour: tuple[float, float, float]) -> shapes.Item | None:
+    length = float(np.linalg.norm(b - a))
+    return shapes.rod(a, geometry.frame_along((b - a) / length), length, radius, colour) if length > SEEN / 10 else None
+
+
+def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str:
+    """From above, as SVG, with the table at rest: the path, (n, 3), m, and the accelerations at its end, m/s²."""
+    half, scale = SIDE / 2, 0.95 * SIDE / (2 * TABLE)
+
+    def seen(points: Array) -> Array:
+        return half + scale * np.asarray(points)[..., :2] * [1.0, -1.0]
+
+    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in seen(position))
+    x, y = seen(position[-1])
+    tip = seen(np.array([0.95 * TABLE, 0.0]))
+    drawn = f'<circle cx="{half}" cy="{half}" r="{scale * TABLE:.1f}" fill="none" stroke="currentColor"/>'
+    drawn += f'<line x1="{half}" y1="{half}" x2="{tip[0]:.1f}" y2="{tip[1]:.1f}" stroke="currentColor" stroke-width="3"/>'
+    drawn += f'<polyline points="{path}" fill="none" stroke="{hexadecimal(GREYS[1])}" stroke-width="3"/>'
+    drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7"/>'
+    for acceleration, dashes in ((centrifugal, "4 3"), (coriolis, "")):
+        drawn += _arrow(seen(position[-1]), seen(position[-1] + ACCELERATION * acceleration), dashes)
+    sizes = [float(np.linalg.norm(each)) for each in (centrifugal, coriolis)]
+    words = ("what the rider sees", f"dashed: centrifugal, {sizes[0]:.1f} m/s²", f"solid: Coriolis, {sizes[1]:.1f} m/s²")
+    lines = "".join(
+        f'<text x="{half}" y="{SIDE + 40 + 18 * i}" text-anchor="middle" font-size="13">{word}</text>'
+        for i, word in enumerate(words)
+    )
+    return (
+        f'<svg width="300" viewBox="-25 -30 300 {SIDE + 18 * len(words) + 65}" style="max-width: 100%" '
+        f'fill="currentColor">{drawn}{lines}</svg>'
+    )
+
+
+def _arrow(start: Array, end: Array, dashes: str) -> str:
+    """A line with a tip, pixels; nothing where it would be shorter than its tip."""
+    way = end - start
+    length = float(np.linalg.norm(way))
+    if length < 6.0:
+        return ""
+    along, aside = way / length, np.array([-way[1], way[0]]) / length
+    corners = [end, end - 9.0 * along + 4.5 * aside, end - 9.0 * along - 4.5 * aside]
+    tip = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
+    (x1, y1), (x2, y2) = start, end - 8.0 * along
+    line = f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="currentColor" stroke-width="2"'
+    return f'{line} stroke-dasharray="{dashes}"/><polygon points="{tip}"/>'
+
+
+def show_tumble(view: Viewer, glide: float, spin: float) -> str:
+    """Draw a robot in the air that glides to its left and turns about the vertical, and what is called a force on its base.
+
+    Grey, since nobody exerts them: the velocity part of h on the base, written in the base's axes (dark) and in the world's
+    (light); their sizes and the base's acceleration, as text.
+
+    glide: m/s. spin: rad/s.
+    """
+    robot = view.robot
+    q, v = robot.standing().q.copy(), np.zeros(robot.nv)
+    q[2] += 0.25
+    v[1], v[5] = glide, spin
+    state = fb.State(robot, q, v)
+    parts = {axes: bias_forces(state, axes=axes).fictitious for axes in ("base", "world")}
+    picture = view.painter.picture(state, com=False)
+    base = state.frame_pose("base").translation + [0.0, 0.0, 0.1]
+    for (name, h), colour, lift in zip(parts.items(), (GREYS[0], GREYS[2]), (0.06, 0.0), strict=True):
+        tip = NEWTON * h[:3]
+        if np.linalg.norm(tip) > SEEN:
+            picture[f"called/{name}"] = shapes.arrow(base + [0.0, 0.0, lift], tip, colour, view.painter.size)
+            text_at = base + tip + np.array([0.0, 0.0, lift + 0.05]) + 0.12 * tip / np.linalg.norm(tip)
+            picture[f"label/{name}"] = shapes.label(text_at, f"{name}'s axes", 0.05, plate=False)
+    view.draw(picture)
+    places = [_falling(state, h, axes) for axes, h in parts.items()]
+    forces = " N, ".join(f"in the {axes}'s axes {vector_text(h[:3])}" for axes, h in parts.items())
+    apart = float(np.linalg.norm(places[0] - places[1]))
+    return f"{forces} N; the base's acceleration in the world by both: {apart:.1f} m/s² apart"
+
+
+def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
+    """Acceleration of the base in the world, (3,), m/s², from the velocity part of h alone, written in those axes."""
+    R = state.frame_pose("base").rotation
+    if axes == "base":
+        return np.asarray(R @ (np.linalg.solve(state.M, -fictitious)[:3] + np.cross(state.v[3:6], state.v[:3])))
+    T = np.eye(state.robot.nv)
+    T[:3, :3] = T[3:6, 3:6] = R.T
+    return np.asarray(np.linalg.solve(T.T @ state.M @ T, -fictitious)[:3])
+
+
+def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Axes:
+    """Curves of errors, name -> mm at each speed, on logarithmic axes, each with the slope of its ends."""
+    _, axis = plt.subplots(figsize=(7, 3.4), layout="constrained")
+    for (name, curve), colour, style in zip(errors.items(), GREYS, ("o-", "s--", "^:"), strict=False):
+        slope = np.log(curve[-1] / curve[0]) / np.log(speeds[-1] / speeds[0])
+        axis.loglog(speeds, curve, style, color=hexadecimal(colour), linewidth=2.0, label=f"{name}: slope {abs(slope):.1f}")
+    axis.set_xticks(speeds, [f"{speed:g}" for speed in speeds])
+    axis.minorticks_off()
+    axis.set(xlabel="speed, 1 for an eight in 6 s", ylabel="tool's error [mm]", ylim=(1e-2, 1e2))
+    axis.grid(alpha=0.25)
+    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return axis
+
+
+def play_travel(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
+    """A robot whose feet travel: beside each a pin where it began to stand, and a line as far to the side as it is now."""
+    contacts = record.contacts
+    home = contacts.positions(record.state(0))
+    rows = np.arange(0, len(record), max(1, round(1.0 / FRAMES / (record.time[1] - record.time[0]))))
+
+    def picture(i: int) -> Picture:
+        state = record.state(i)
+        drawn = view.painter.picture(state, com=False)
+        for j, (a, b) in enumerate(zip(home, contacts.positions(state), strict=True)):
+            pin = np.array([a[0] + np.sign(a[0]) * BESIDE, a[1], 0.006])
+            drawn[f"pin/{j}"] = shapes.rod(pin, np.eye(3), 0.05, 0.004, GREYS[0])
+            if rod := _rod(pin, np.array([pin[0], b[1], pin[2]]), 0.006, GREYS[0]):
+                drawn[f"way/{j}"] = rod
+        return drawn
+
+    view.play_pictures(record.time[rows], [picture(int(i)) for i in rows], speed=speed)
+    return view.camera(AT_FEET)

@@ -1,0 +1,201 @@
+"""Lesson A: its helpers do what they say, and wrong answers of each kind get the hint that fits."""
+
+from __future__ import annotations
+
+import re
+
+import judges
+import numpy as np
+import pinocchio as pin
+import pytest
+from hints import missed, right
+
+import floatbase as fb
+from floatbase.dynamics import bias_forces
+from floatbase.lessons.lessonA import circling, figure_of_eight, play_travel, plot_errors, show_ride, show_tumble, tool_error
+from floatbase.viewer import GREYS, hexadecimal
+
+PAN, LIFT, ELBOW = 0, 1, 2
+MOVING = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+DIFFERENCE = 1e-6  # of a central difference with 1e-4, in numbers of the order of 1 to 10
+
+
+def test_a_1_is_the_force_of_the_floor() -> None:
+    inwards, aside = np.array([-30 * 0.64 * 2.0, 0.0, 0.0]), np.array([0.0, 30 * 2 * 0.8 * 1.5, 0.0])
+    assert right("A.1", inwards + aside)
+    wrong = {
+        "would go straight": np.zeros(3),
+        "has to answer it": -inwards - aside,
+        "The factor 2": inwards + 0.5 * aside,
+        "Coriolis term only": aside,
+        "stands still": inwards,
+        "towards the axis": aside - inwards,
+        "the order counts": inwards - aside,
+        "the mass is missing": (inwards + aside) / 30,
+        "shape": np.zeros(2),
+        "no answer yet": None,
+        "Neither right": np.ones(3),
+    }
+    assert missed("A.1", [(answer, hint) for hint, answer in wrong.items()]) == []
+
+
+def test_a_2_is_the_pair_of_lift_and_elbow() -> None:
+    e, home = np.eye(6), fb.load("ur5").standing()
+
+    def h(v: np.ndarray) -> np.ndarray:
+        return home.replace(v=v).h
+
+    def pair(i: int, j: int) -> np.ndarray:
+        return (h(e[i] + e[j]) - h(e[i] - e[j])) / 2
+
+    this = pair(LIFT, ELBOW)
+    assert right("A.2", this)
+    wrong = {
+        "Nothing there yet": np.zeros(6),
+        "once too often": h(e[LIFT] + e[ELBOW]) - h(e[LIFT]) - h(e[ELBOW]),
+        "still in it, once": this + home.h,
+        "all of h": h(e[LIFT] + e[ELBOW]),
+        "Without gravity, but": h(e[LIFT] + e[ELBOW]) - home.h,
+        "half of it": this / 2,
+        "four times over": h(e[LIFT] + e[ELBOW]) - h(e[LIFT] - e[ELBOW]),
+        "other joints": pair(2, 3),
+        "pan and lift": pair(PAN, LIFT),
+        "the sign is not": -this,
+        "no answer yet": None,
+    }
+    assert missed("A.2", [(answer, hint) for hint, answer in wrong.items()]) == []
+
+
+def test_a_3_is_lagranges_formula() -> None:
+    state = fb.load("ur5").standing().replace(v=MOVING)
+    rate = judges.derivative(lambda s: s.M, state, MOVING, 1e-4) @ MOVING
+    slope = np.array([MOVING @ judges.derivative(lambda s: s.M, state, unit, 1e-4) @ MOVING for unit in np.eye(6)])
+    assert np.allclose(rate - slope / 2, bias_forces(state).fictitious, atol=DIFFERENCE)
+    assert right("A.3", rate - slope / 2)
+    wrong = {
+        "Nothing there yet.": np.zeros(6),
+        "the half is missing": rate - slope,
+        "Ṁ v alone": rate,
+        "The sign of the slope": rate + slope / 2,
+        "slope of the kinetic energy alone": -slope / 2,
+        "not to Ṁ v": rate / 2 - slope,
+        "Both terms are halved": (rate - slope) / 2,
+        "The other sign": slope / 2 - rate,
+        "Gravity is in it": state.h,
+        "shape": np.zeros((6, 6)),
+        "no answer yet": None,
+        "Neither right": np.ones(6),
+    }
+    assert missed("A.3", [(answer, hint) for hint, answer in wrong.items()]) == []
+
+
+def test_the_figure_of_eight_is_closed_and_its_rates_are_its_derivatives() -> None:
+    path, d = figure_of_eight(fb.load("ur5").standing(), 3.0), 1e-4
+    for t in (0.0, 0.7, 2.1):
+        (before, v0, _), (now, v, a), (after, v1, _) = path(t - d), path(t), path(t + d)
+        assert np.allclose(path(t + 3.0)[0], now, atol=1e-9)
+        assert np.allclose((after - before) / (2 * d), v, atol=1e-5)
+        assert np.allclose((v1 - v0) / (2 * d), a, atol=1e-5)
+
+
+def test_the_tools_error_is_its_distance_from_the_path() -> None:
+    robot = fb.load("ur5")
+    start = robot.standing()
+    sim = fb.Simulation(robot)
+    sim.reset(start)
+    record = fb.rollout(sim, judges.controller_of("ur5"), 0.06)
+    still = np.zeros(6)
+    assert tool_error(record, lambda t: (start.q, still, still)) < 1.0
+    turned = start.q + 0.1 * np.eye(6)[0]
+    away = 1000 * np.linalg.norm(fb.State(robot, turned).point("tool0") - start.point("tool0"))
+    assert tool_error(record, lambda t: (turned, still, still)) == pytest.approx(away, abs=1.0)
+
+
+@pytest.mark.parametrize("phase", [90.0, -90.0, 0.0])
+def test_a_circling_base_begins_and_ends_at_rest_and_its_rates_are_its_derivatives(phase: float) -> None:
+    path, d = circling(0.3, 0.35, 0.6, 6, phase), 1e-4
+    for t in (0.0, 10.0, 12.0):
+        R, omega, alpha = path(t)
+        assert np.allclose(R, np.eye(3), atol=1e-9)
+        assert np.allclose(np.concatenate([omega, alpha]), 0.0, atol=1e-4)
+    for t in (0.6, 3.3, 7.9):
+        R, omega, alpha = path(t)
+        before, after = path(t - d), path(t + d)
+        assert np.allclose(pin.log3(after[0] @ before[0].T) / (2 * d), omega, atol=1e-4)
+        assert np.allclose((after[1] - before[1]) / (2 * d), alpha, atol=1e-3)
+    angles = np.array([pin.rpy.matrixToRpy(path(t)[0])[1:] for t in np.linspace(2.0, 8.0, 200)])
+    assert np.allclose(abs(angles).max(axis=0), [0.3, 0.35], atol=1e-3)
+
+
+@pytest.mark.parametrize("phase", [90.0, -90.0])
+def test_four_feet_travel_that_are_neither_lifted_nor_slip(phase: float) -> None:
+    """On MuJoCo, and the other way when the ellipse is run through the other way."""
+    robot = fb.load("go2")
+    state, contacts = robot.standing(), fb.Contacts.points(robot)
+    com, _, _ = fb.standing_tasks(state)
+    tasks = [com, fb.OrientationTask("base", circling(0.3, 0.35, 0.6, 6, phase)), fb.PostureTask(state.q, weight=1e-3)]
+    controller = fb.WholeBodyController(robot, contacts, tasks)
+    record = fb.rollout(fb.Simulation(robot), controller, 10.2, control_period=0.002)
+    assert record.outcome == "completed"
+    gone = 1000 * np.array([record.final.point(f) - state.point(f) for f in contacts.names])
+    assert np.all(np.sign(gone[:, 1]) == np.sign(phase) * np.array([-1, -1, 1, 1]))
+    assert abs(gone[:, 1]).min() > 15
+    assert record.slip(rolling=False).max() < 0.002
+    assert record.measured[:, 2::3].min() > 5
+
+
+def test_the_rider_sees_what_the_particle_does_and_the_table_has_turned() -> None:
+    view = fb.Viewer(judges.load("go2"))
+    try:
+        drawn = show_ride(view, 2.0, 0.0, 0.5)
+        picture = view.canvas.picture
+        rest = show_ride(view, 0.0, 0.5, 1.0)
+    finally:
+        view.close()
+    r = np.hypot(0.7, 0.3)
+    assert f"centrifugal, {4 * r:.1f} m/s²" in drawn and f"Coriolis, {8 * r:.1f} m/s²" in drawn
+    assert "centrifugal, 0.0" in rest and "<polygon" not in rest
+    table = picture["table"].matrix
+    assert np.allclose(table[:2, 0], [np.cos(1.0), np.sin(1.0)])
+    puck = picture["puck"].matrix[:3, 3]
+    assert np.allclose(puck[:2], [-0.7, 0.3])
+    assert not [path for path in picture if path.startswith("way/")]  # at rest in the world
+    assert len([path for path in picture if path.startswith("chalk/")]) == 24
+    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hexadecimal(grey) for grey in GREYS}
+    assert re.findall(r"<text[^>]*\sfill=", drawn) == []
+
+
+def test_both_ways_to_write_a_tumble_give_one_acceleration() -> None:
+    view = fb.Viewer(judges.load("go2"))
+    try:
+        told = show_tumble(view, 3.0, 2.0)
+        called = [path for path in view.canvas.picture if path.startswith("called/")]
+        still = show_tumble(view, 3.0, 0.0)
+        none = [path for path in view.canvas.picture if path.startswith("called/")]
+    finally:
+        view.close()
+    assert told.endswith("0.0 m/s² apart") and still.endswith("0.0 m/s² apart")
+    pushed = float(re.findall(r"base's axes \((-?\d+),", told)[0])
+    assert abs(abs(pushed) - 16.085 * 6) < 5
+    assert called == ["called/base"] and none == []  # about the vertical, in the world's axes hardly anything is left
+
+
+def test_errors_are_plotted_with_their_slopes() -> None:
+    axis = plot_errors([1, 2, 4], {"one": [1, 4, 16], "two": [5, 5, 5]})
+    legend = axis.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["one: slope 2.0", "two: slope 0.0"]
+
+
+def test_the_travelling_feet_are_played_with_marks_where_they_began() -> None:
+    robot = judges.load("go2")
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+    view = fb.Viewer(robot)
+    try:
+        play_travel(view, fb.rollout(fb.Simulation(robot), controller, 0.3))
+        picture = view.canvas.picture
+    finally:
+        view.close()
+    pins = np.array([picture[f"pin/{i}"].matrix[:3, 3] for i in range(4)])
+    feet = fb.Contacts.points(robot).positions(robot.standing())
+    assert np.allclose(pins[:, 1], feet[:, 1], atol=1e-3) and np.all(abs(pins[:, 0]) > abs(feet[:, 0]) + 0.04)
