@@ -13,7 +13,7 @@ _MADE = re.compile(r"\b(?!push_)\w+_panel\(")
 
 
 def assert_every_slider_answers(panel: SliderPanel) -> None:
-    """Moved to its ends and its middle, each slider changes the picture or the note; one of them changes the picture."""
+    """Moved to its ends and its middle, each slider changes the picture or the note; one of them the picture, if any."""
     moves = []
     for name, slider in panel.sliders.items():
         first, seen = slider.value, []
@@ -23,7 +23,7 @@ def assert_every_slider_answers(panel: SliderPanel) -> None:
         slider.value = first
         assert any(other != seen[0] for other in seen), f"the slider {name} changes nothing"
         moves += [any(picture != seen[0][0] for picture, _ in seen)]
-    assert any(moves), f"none of the sliders {list(panel.sliders)} changes the picture"
+    assert any(moves) or panel.view is None, f"none of the sliders {list(panel.sliders)} changes the picture"
 
 
 def moved_sliders(notebook: Any) -> str:
@@ -42,4 +42,5 @@ def judge_all(count: int) -> None:
 
 
 def _drawn(panel: SliderPanel) -> Any:
-    return {path: (item.matrix.tolist(), item.colour) for path, item in panel.view.canvas.picture.items()}
+    picture = panel.view.canvas.picture if panel.view else {}
+    return {path: (item.matrix.tolist(), item.colour) for path, item in picture.items()}

@@ -28,16 +28,18 @@ from floatbase.behaviours import Gains, Gait, Stand, Walk
 from floatbase.control import AnalyticController
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import ConstantTorques
+from floatbase.qp import table_top
 from floatbase.simulation import Live
-from floatbase.viewer import plots, recording
+from floatbase.viewer import plots, programs, recording
 
 ROOMS = (
     "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp", "robots", "simulation",
     "viewer",
 )  # fmt: skip
-MODULES = (plots, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
+MODULES = (plots, programs, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
 OTHER, TALOS = judges.load("solo12"), judges.load("talos")
 QP = CONTROLLER.qp(STATE)
+TABLE = table_top()
 SPACE = fb.feasible_space(EOM)
 VIEW = fb.Viewer(ROBOT)
 PICTURE = VIEW.painter.picture(STATE, CONTACTS)
@@ -168,6 +170,8 @@ EXAMPLES: dict[str, Any] = {
     "show": lambda record: None, "sim": SIM, "Cylinders.size": np.ones(12), "solver": "daqp", "space": SPACE, "speed": 1.0,
     "places": np.zeros((2, 3)), "Viewer.step.step": WALK.history[0], "steps": list(WALK.history), "walk": WALK,
     "spread": 0.2, "WrenchSet.reach.start": 150.0 * np.eye(6)[2], "active_set.start": np.zeros(QP.n), "start": 0.1,
+    "most": 5, "box": (-1.0, 1.0, -1.0, 1.0), "programs.plot.axis": AXES, "programs.plot.qp": TABLE,
+    "programs.allowed.qp": TABLE, "plot.point": np.zeros(2),
     "state": STATE, "status": "inside", "step": 0.1, "stiffness": 100.0, "supply_pressure": 160e5, "support": True, "t": 0.5,
     "turn": 0.3, "solution": VALUES["Solution"],
     "tank_pressure": 2e5, "target": ZERO, "tasks": CONTROLLER.tasks, "cost_on_space.tau": fb.Quadratic.zero(12), "tau": ZERO,

@@ -22,25 +22,26 @@ from floatbase.viewer import Viewer, push_at
 class SliderPanel(widgets.VBox):
     """A live picture with sliders, as `slider_panel` makes it.
 
-    view: the `Viewer` of the picture. sliders: the slider of each name. note: the HTML that tells what a position means.
+    view: the `Viewer` of the picture, None where the note has all there is to see. sliders: the slider of each name. note: the
+    HTML that tells what a position means.
     """
 
-    def __init__(self, view: Viewer, sliders: dict[str, widgets.FloatSlider], beside: bool):
+    def __init__(self, view: Viewer | None, sliders: dict[str, widgets.FloatSlider], beside: bool):
         wide = widgets.Layout(width="62%", flex="0 0 auto") if beside else widgets.Layout(width="auto")
         self._picture = widgets.HTML(layout=wide)  # a long note beside it wraps, and takes nothing of it
         note = widgets.HTML()
-        top = [widgets.HBox([self._picture, note])] if beside else [self._picture, note]
+        top = [note] if view is None else [widgets.HBox([self._picture, note])] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])
         self.view, self.sliders, self.note = view, sliders, note
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The picture is put in only here: by now the camera has been placed, and a still picture keeps that view."""
-        self._picture.value = self.view._repr_html_()
+        self._picture.value = self.view._repr_html_() if self.view else ""
         return super()._repr_mimebundle_(**kwargs)
 
 
 def slider_panel(
-    view: Viewer,
+    view: Viewer | None,
     draw: Callable[..., str | None],
     wait: bool = False,
     beside: bool = False,
@@ -48,6 +49,7 @@ def slider_panel(
 ) -> SliderPanel:
     """The live picture of `view` with one slider for each of `ranges`, in the order in which they are given.
 
+    view: the `Viewer` that is drawn on; None where the note holds the picture, as one in the plane.
     draw: called once at first and at every move as draw(name=value, …), with the values as they are shown, in the kernel's
         thread; it draws on `view` and should take a few milliseconds. It may return a note, HTML or plain text.
     wait: call `draw` only when a slider is let go, for a function that takes longer.

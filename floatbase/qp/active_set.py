@@ -38,7 +38,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, read_only, texts
+from floatbase._arrays import Array, Value, checked, of_kind, read_only, texts, whole
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
@@ -49,6 +49,7 @@ from floatbase.qp.solution import Solution
 
 _ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60 terms
 _COUNTS = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
+_MANY = 10**6  # iterations, beyond any count that the method would take
 _VIOLATION = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 
 
@@ -85,19 +86,27 @@ class Iteration(Value):
 class ActiveSetRun(Value):
     """The answer of `active_set` and the way to it.
 
-    solution: the optimum, with its multipliers.
+    solution: the optimum, with its multipliers; where the run was stopped, the point it had come to, all multipliers 0.
     iterations: from a feasible point to the optimum, objective falling.
     phase_one: from the start to that feasible point, violation falling; empty when the start was feasible.
     working: names of the rows in W at the end, which the next problem can start from.
+    finished: whether the end is the optimum. A run that was stopped has a point that satisfies all rows once `iterations` holds
+        any; before, in phase 1, it may violate some.
     """
 
     solution: Solution
     iterations: tuple[Iteration, ...]
     phase_one: tuple[Iteration, ...]
     working: tuple[str, ...]
+    finished: bool = True
 
 
-def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str] = ()) -> ActiveSetRun:
+def active_set(
+    qp: QP,
+    start: npt.ArrayLike | None = None,
+    working: Sequence[str] = (),
+    most: int | None = None,
+) -> ActiveSetRun:
     """App. C: solve a convex QP by the active-set method of this module, keeping a record of every iteration.
 
     qp: the problem.
@@ -105,6 +114,8 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
         of `working`, as if there were no others.
     working: names of inequality rows to start with in W, such as the last run's `working`; those that depend on earlier
         ones are left out.
+    most: iterations after which to stop, those of phase 1 included, as a program in real time must; None does not stop. A
+        run that is stopped raises no error: `ActiveSetRun.finished` says so.
 
     Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum, is not
     convex or does not let the method end on its rows, `UnknownNameError` for a row that does not exist, `InputError` for a
@@ -113,9 +124,14 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
     space, problem = of_kind("qp", qp, QP).equality_space, qp.reduced
     rows = _independent_rows(problem, [_index(qp, name) for name in texts("working", working)])
     y = None if start is None else space.A.T @ (checked("start", start, (qp.n,)) - space.b)
-    search = _feasible_start(problem, _starting_point(problem, y, rows), rows)
-    walk = _walk(problem, search.x, search.rows)
-    if np.any(_violated(problem, walk.x)):  # rows so nearly parallel that the method takes them for one
+    left = _MANY if most is None else whole("most", most, 1, _MANY)
+    search = _feasible_start(problem, _starting_point(problem, y, rows), rows, left)
+    walk = (
+        _walk(problem, search.x, search.rows, left - len(search.iterations))
+        if search.finished
+        else replace(search, iterations=[])
+    )
+    if walk.finished and np.any(_violated(problem, walk.x)):  # rows so nearly parallel that the method takes them for one
         raise SolverError(f"active_set ends beyond rows of {qp!r} that nearly repeat each other. Check their scaling.")
     mu = np.zeros(len(qp.G))
     mu[walk.rows] = np.maximum(walk.multipliers, 0.0)
@@ -125,6 +141,7 @@ def active_set(qp: QP, start: npt.ArrayLike | None = None, working: Sequence[str
         iterations=tuple(_in_x(step, space, qp.objective(space.b)) for step in walk.iterations),
         phase_one=tuple(_in_x(step, space, 0.0) for step in search.iterations),
         working=tuple(qp.inequality_names[i] for i in walk.rows),
+        finished=walk.finished,
     )
 
 
@@ -141,19 +158,21 @@ def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """Where a walk ended: point, rows of W and their multipliers, and the iterations that led there."""
+    """Where a walk ended: point, rows of W and their multipliers, the iterations that led there, and whether it was done."""
 
     x: Array
     rows: list[int]
     multipliers: Array
     iterations: list[Iteration]
+    finished: bool = True
 
 
-def _walk(problem: QP, x: Array, rows: list[int], last: int | None = None) -> _Walk:
-    """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W; ends early when row `last` blocks."""
+def _walk(problem: QP, x: Array, rows: list[int], most: int, last: int | None = None) -> _Walk:
+    """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W, at most so often; row `last` ends it."""
     rows, stuck = list(rows), False
     iterations: list[Iteration] = []
-    for _ in range(100 + 20 * (problem.n + len(problem.G))):
+    enough = 100 + 20 * (problem.n + len(problem.G))
+    for _ in range(min(enough, most)):
         p, reach = _direction(problem, x, rows)
         length, blocking = _longest_step(problem, x, p, reach, rows)
         arrival = x + length * p
@@ -168,6 +187,8 @@ def _walk(problem: QP, x: Array, rows: list[int], last: int | None = None) -> _W
             rows.remove(drop)
         stuck = length * np.linalg.norm(p) <= _ROUNDING * (1.0 + np.linalg.norm(x))
         x = arrival
+    if most <= enough:
+        return _Walk(x, rows, np.zeros(len(rows)), iterations, finished=False)
     raise SolverError(
         f"active_set did not converge: its rows still change after {len(iterations)} iterations on {problem!r}. "
         "Check the scaling of the problem."
@@ -183,8 +204,8 @@ def _starting_point(problem: QP, y: Array | None, rows: list[int]) -> Array:
     return point + p if y is None and np.isfinite(reach) else point
 
 
-def _feasible_start(problem: QP, y: Array, rows: list[int]) -> _Walk:
-    """Phase 1: a point that satisfies all rows, with rows of W that it lies on.
+def _feasible_start(problem: QP, y: Array, rows: list[int], most: int) -> _Walk:
+    """Phase 1: a point that satisfies all rows, with rows of W that it lies on, in at most so many iterations.
 
     Minimises s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h on the others, by the
     same method. s = 0 is reached exactly if all rows can hold; otherwise the rows that stop s above 0 are in conflict.
@@ -207,12 +228,12 @@ def _feasible_start(problem: QP, y: Array, rows: list[int]) -> _Walk:
         inequality_names=(*problem.inequality_names, RowLabel(_VIOLATION)),
     )
     worst = int(np.argmax(violation))
-    walk = _walk(elastic, np.append(y, violation[worst]), [*rows, worst], last=s_row)
-    if walk.rows[-1] != s_row and np.any(_violated(problem, walk.x[:-1])):
+    walk = _walk(elastic, np.append(y, violation[worst]), [*rows, worst], most, last=s_row)
+    if walk.finished and walk.rows[-1] != s_row and np.any(_violated(problem, walk.x[:-1])):
         share = walk.multipliers * elastic.row_lengths[walk.rows]  # those of the violated rows add up to 1
         raise infeasible(problem.inequality_names[i] for i in sorted(np.array(walk.rows)[share > SHARE]))
     found = _independent_rows(problem, [i for i in walk.rows if i != s_row])
-    return _Walk(walk.x[:-1], found, np.zeros(0), walk.iterations)
+    return _Walk(walk.x[:-1], found, np.zeros(len(found)), walk.iterations, walk.finished)
 
 
 def _violated(problem: QP, x: Array) -> npt.NDArray[np.bool_]:

@@ -1,11 +1,11 @@
 """The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and saves them.
 
 `Viewer` draws. `View` says from where it looks. `shapes`, `marks` and `props` make further items for a picture, `walks` draws
-what a walk plans, `plots` makes figures of a rollout, `roses` shows push roses and compasses, and `FIGURES` are the document's
-figures. `page` and `wire` are for programs that write web pages.
+what a walk plans, `plots` makes figures of a rollout, `programs` of quadratic programs in the plane, `roses` shows push roses
+and compasses, and `FIGURES` are the document's figures. `page` and `wire` are for programs that write web pages.
 """
 
-from floatbase.viewer import geometry, marks, page, plots, props, recording, roses, shapes, walks, wire
+from floatbase.viewer import geometry, marks, page, plots, programs, props, recording, roses, shapes, walks, wire
 from floatbase.viewer.camera import PRESETS, View
 from floatbase.viewer.colours import (
     ALARM,
@@ -63,6 +63,7 @@ __all__ = [
     "marks",
     "page",
     "plots",
+    "programs",
     "props",
     "push_at",
     "recording",

@@ -36,6 +36,10 @@ def changed(answer: Any) -> Any:
         return fb.Quadratic(answer.H, answer.g + 1e-3, answer.c)
     if isinstance(answer, tuple):
         return tuple(changed(part) for part in answer)
+    if isinstance(answer, list) and isinstance(answer[0], str):  # of names
+        return answer[1:]
+    if callable(answer):
+        return lambda *given: answer(*given)
     return answer + 1
 
 

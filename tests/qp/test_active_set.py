@@ -109,6 +109,50 @@ def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised(
     check_record(run)
 
 
+# stopped before the end ----------------------------------------------------------------------------------------------
+
+
+def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so() -> None:
+    for qp in [*controller_qps("go2", 4, torque=0.3), table_top()]:
+        whole = active_set(qp)
+        rounds = [*whole.phase_one, *whole.iterations]
+        for most in range(1, len(rounds) + 2):
+            run = active_set(qp, most=most)
+            kept = rounds[:most]
+            assert run.solution.iterations == len(kept) == len(run.phase_one) + len(run.iterations)
+            assert run.finished == (most >= len(rounds))
+            assert np.allclose(run.solution.x, kept[-1].arrival, atol=1e-9)
+            assert run.finished or not np.any(run.solution.inequality_multipliers)
+
+
+def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may() -> None:
+    seen = set()
+    for qp in controller_qps("go2", 6, torque=0.3):
+        whole = active_set(qp)
+        for most in range(1, whole.solution.iterations):
+            run = active_set(qp, most=most)
+            broken = run.solution.residuals.inequality > 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_lengths))
+            assert not (broken and run.iterations)
+            seen.add((broken, bool(run.iterations)))
+    assert {(True, False), (False, True)} <= seen
+
+
+def test_a_stopped_run_can_be_taken_up_again_where_it_ended() -> None:
+    for qp in controller_qps("go2", 6, torque=0.3):
+        run = active_set(qp, most=1)
+        for _ in range(60):
+            x, working = run.solution.x, run.working
+            run = active_set(qp, x, working, most=1)
+        assert run.finished
+        assert np.allclose(run.solution.x, solve(qp).x, atol=1e-7)
+
+
+@pytest.mark.parametrize("most", [0, -1, 1.5, "3", True])
+def test_fewer_than_one_iteration_is_none(most: object) -> None:
+    with pytest.raises(InputError, match="most is .*; it must be a whole number ≥ 1"):
+        active_set(table_top(), most=most)  # type: ignore[arg-type]
+
+
 # the controller's problems -------------------------------------------------------------------------------------------
 
 

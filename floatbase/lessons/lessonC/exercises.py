@@ -1,0 +1,294 @@
+"""Exercises of lesson C, How a QP solver thinks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import floatbase as fb
+from floatbase.lessons.exercises import Exercise, Numeric, Verdict
+from floatbase.lessons.lessonC.helpers import braking
+from floatbase.qp import QP, active_set
+
+_NONE = np.zeros((0, 2)), np.zeros(0)
+_CLOSE = 1e-6  # of lengths, which are between 0 and 1
+
+
+# C.1 ----------------------------------------------------------------------------------------------------------------------
+
+
+def slanted() -> QP:
+    """The bowl and the slanted table of exercise C.1: up ≥ 0.5 along, written as a row of 0.5 along - up ≤ 0."""
+    H = np.diag([1.0, 4.0])
+    return QP(H, -H @ [2.0, -2.0], *_NONE, np.array([[0.5, -1.0]]), np.zeros(1), inequality_names=("slant",))
+
+
+def _price() -> float:
+    """By the rate at which the least objective falls when the row is loosened: no system of equations in it."""
+    qp = slanted()
+    h = 1e-4
+    low, high = (fb.solve(QP(qp.H, qp.g, qp.A, qp.b, qp.G, np.array([d]))).objective for d in (-h, h))
+    return (low - high) / (2 * h)
+
+
+# C.2 ----------------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A step in the plane, whose answer is known from how it was made, and the hint for a function that misses it."""
+
+    hint: str
+    p: tuple[float, float]
+    G: Sequence[Sequence[float]]
+    h: Sequence[float]
+    W: Sequence[int]
+    answer: tuple[float, int | None]
+
+
+_WAYS = (
+    _Way("Nothing is in the way here: 1, to arrive, and None.", (1, 0), [[1, 0], [0, 1]], [2, 2], [], (1.0, None)),
+    _Way(
+        "A row is in the way halfway: where it holds with equality, slack = length · speed.",
+        (2, 0), [[0, 1], [1, 0]], [5, 1], [], (0.5, 1),
+    ),
+    _Way(
+        "A row that the step moves away from (speed < 0) is never in the way.",
+        (1, 1), [[-1, 0], [0, -1]], [0.5, 0.25], [], (1.0, None),
+    ),
+    _Way(
+        "A row along which the step runs (speed 0) is never in the way, and nothing can be divided by its speed.",
+        (1, 0), [[0, 1], [0, -1]], [0, 0], [], (1.0, None),
+    ),
+    _Way(
+        "Two rows are in the way: the step must end at the first that it meets.",
+        (4, 0), [[1, 0], [2, 0], [1, 0]], [3, 2, 2.5], [], (0.25, 1),
+    ),
+    _Way(
+        "Here two rows are in the way at different speeds: it is not the slack alone that counts, but how soon it is used up.",
+        (2, 2), [[1, 0], [3, 3]], [1, 3], [], (0.25, 1),
+    ),
+    _Way(
+        "A row of W is held already, and rounding must not let it block.",
+        (1, 0), [[1, 1e-8], [1, 0]], [0, 0.5], [0], (0.5, 1),
+    ),
+    _Way(
+        "The point touches a row that is not in W and would cross it: then the step has length 0, and that row blocks.",
+        (1, 0), [[0, 1], [1, 0]], [1, 0], [], (0.0, 1),
+    ),
+    _Way(
+        "The row lies beyond the end of the step: length 1, and nothing blocks.",
+        (1, 0), [[1, 0]], [1.5], [], (1.0, None),
+    ),
+    _Way(
+        "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of equal rows the first.",
+        (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
+    ),
+)  # fmt: skip
+
+
+def _judge_step(answer: Any) -> Verdict:
+    def one(way: _Way) -> str:
+        for origin in (np.zeros(2), np.array([0.3, -0.2])):  # the same step elsewhere: the slack is h - G x
+            G = np.array(way.G, dtype=np.float64)
+            h = np.array(way.h, dtype=np.float64) + G @ origin
+            given = answer(origin, np.array(way.p, dtype=np.float64), G, h, list(way.W))
+            if not isinstance(given, tuple) or len(given) != 2:
+                return "Return two things: the length, and the number of the row or None."
+            length, row = given
+            if not isinstance(length, int | float | np.number) or not np.isfinite(length):
+                return f"The length is {length!r}; it should be a number from 0 to 1. Was it divided by a speed of zero?"
+            if length < 0:
+                return f"A length is negative ({length:.2g}). {way.hint}"
+            if row is not None and not isinstance(row, int | np.integer):
+                return f"The row is {row!r}; it should be its number in G, or None."
+            right, blocks = way.answer
+            if abs(length - right) > _CLOSE or row != blocks:
+                if row is not None and row in way.W:
+                    return f"Row {row} is in W and must not block. {way.hint}"
+                elsewhere = "Is the slack h - G x, or h alone? " if np.any(origin) else ""
+                return f"{elsewhere}{way.hint}"
+        return ""
+
+    return _tried(answer, [partial(one, way) for way in _WAYS], "As far as all rows hold, and no further.")
+
+
+def _tried(answer: Any, cases: Sequence[Callable[[], str]], praise: str) -> Verdict:
+    """Run cases of a learner's function; the first that has something to say decides."""
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, "There is no answer yet: give your function, without brackets.")
+    if not callable(answer):
+        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.")
+    for case in cases:
+        try:
+            with np.errstate(all="ignore"):
+                said = case()
+        except Exception as error:  # whatever a learner's function raises
+            said = f"Your function stops with {type(error).__name__}: {error}"
+        if said:
+            return Verdict(False, said)
+    return Verdict(True, praise)
+
+
+# C.3 ----------------------------------------------------------------------------------------------------------------------
+
+_DROPS: tuple[tuple[list[int], list[float], int | None, str], ...] = (
+    ([5, 3, 8], [2.0, -0.5, 1.0], 3, "One row pulls (its price is negative): that one has to go."),
+    ([4, 2], [1.0, 0.5], None, "No price is negative here: every row pushes, and none leaves."),
+    ([], [], None, "W may be empty: then there is nothing to drop."),
+    ([5, 3, 8], [-0.5, 1.0, -2.0], 8, "Two rows pull: drop the one with the most negative price."),
+    ([1, 6], [9.0, -0.1], 6, "Only a negative price counts, however large another one is."),
+    ([1, 6], [3.0, -1e-14], None, "-1e-14 is zero and rounding: such a row is not dropped. Say, below -1e-9."),
+)
+
+
+def _judge_drop(answer: Any) -> Verdict:
+    def one(W: list[int], prices: list[float], right: int | None, hint: str) -> str:
+        given = answer(list(W), np.array(prices))
+        if given is not None and not isinstance(given, int | np.integer):
+            return f"The answer is {given!r}; it should be a row's number in G, or None."
+        if given is not None and given not in W:
+            return "Give the row's number in G, which stands in W, not its place in W."
+        return "" if given == right else hint
+
+    cases = [partial(one, *case) for case in _DROPS]
+    return _tried(answer, cases, "A row may push, never pull: that is the whole test of an optimum.")
+
+
+# C.4 ----------------------------------------------------------------------------------------------------------------------
+
+
+def _judge_guess(answer: Any) -> Verdict:
+    """One system of equations with the rows of the guess, as in the game; whether it is the optimum a solver says."""
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, "There is no answer yet: list the names of rows.")
+    if not isinstance(answer, list | tuple) or not all(isinstance(name, str) for name in answer):
+        return Verdict(False, "The answer is a list of names, such as those in qp.inequality_names.")
+    qp = braking()
+    names = list(dict.fromkeys(answer))
+    if unknown := [name for name in names if name not in qp.inequality_names]:
+        return Verdict(False, f"There is no row {unknown[0]!r}; qp.inequality_names has all of them.")
+    if not names:
+        return Verdict(False, "With no row on, the plan pulls on the ground. Which feet does the push lift off?")
+    rows = [qp.inequality_names.index(name) for name in names]
+    small, Z = qp.reduced, qp.reduced.G[rows]
+    if np.linalg.matrix_rank(Z / np.linalg.norm(Z, axis=1)[:, None], 1e-9) < len(rows):
+        return Verdict(
+            False, "These rows depend on one another: a foot has three numbers, and no more than three rows can be on at it."
+        )
+    k = len(rows)
+    found = np.linalg.solve(np.block([[small.H, Z.T], [Z, np.zeros((k, k))]]), np.concatenate([-small.g, small.h[rows]]))
+    over, prices = small.G @ found[: small.n] - small.h, found[small.n :]
+    broken = [str(qp.inequality_names[i]) for i in np.flatnonzero(over > 1e-6)]
+    pulls = [name for name, price in zip(names, prices, strict=True) if price < -1e-9]
+    if not broken and not pulls:
+        return Verdict(True, "One system of equations, and nothing to correct: a solver that begins here is done in one round.")
+    if not any("foot" in name for name in names):
+        return Verdict(False, "Motors are far from their limits here. What does a push do to the feet?")
+    told = [f"{len(broken)} rows are broken, {_kinds(broken)}"] if broken else []
+    told += [f"{len(pulls)} of yours pull, {_kinds(pulls)}"] if pulls else []
+    return Verdict(False, f"With your rows on, {' and '.join(told)}. Correct the guess as the solver would, and check again.")
+
+
+def _kinds(names: Sequence[str]) -> str:
+    """The first of some rows, and how many more."""
+    return f"such as {names[0]}" if len(names) > 1 else f"namely {names[0]}"
+
+
+def rounds_from(guess: Sequence[str]) -> int:
+    """How many rounds `active_set` takes for the QP of exercise C.4 from a guess of its active rows."""
+    return active_set(braking(), working=tuple(guess)).solution.iterations
+
+
+STEP_STUB = '''def longest_step(x, p, G, h, W):
+    """How far from x along p, at most 1, all rows hold, and the row that blocks."""
+    return 1.0, None  # replace: from slack and speed of each row'''
+
+STEP = '''def longest_step(x, p, G, h, W):
+    """How far from x along p, at most 1, all rows hold, and the row that blocks."""
+    slack, speed = np.round(h - G @ x, 9), G @ p
+    length, blocking = 1.0, None
+    for i in range(len(h)):
+        if i not in W and speed[i] > 1e-9 and slack[i] < length * speed[i]:
+            length, blocking = slack[i] / speed[i], i
+    return length, blocking'''
+
+DROP_STUB = '''def row_to_drop(W, prices):
+    """The row of W that pulls hardest, or None."""
+    return None  # replace; W and prices have one entry for each row that is on'''
+
+DROP = '''def row_to_drop(W, prices):
+    """The row of W that pulls hardest, or None."""
+    if len(W) == 0 or min(prices) > -1e-9:
+        return None
+    return W[int(np.argmin(prices))]'''
+
+EXERCISES = (
+    Exercise(
+        name="C.1",
+        statement="The price of the row 0.5 along - up ≤ 0 for ψ = ½(along - 2)² + ½·4 (up + 2)².",
+        stub="price = 8.0  # of a level table; replace this number",
+        solution="W = [[0.5, -1]]\n"
+        "KKT = np.block([[np.diag([1, 4]), np.transpose(W)], [np.array(W), np.zeros((1, 1))]])\n"
+        "price = np.linalg.solve(KKT, [2, -8, 0])[2]",
+        judge=Numeric(
+            right=_price,
+            praise="Three equations: two say that the row balances the slope, one that the marble lies on it.",
+            mistakes={
+                "The sign: with H x + g + Gᵀ μ = 0 the price of a table that pushes is positive.": lambda: -_price(),
+                "That is the slope's length. A price belongs to the row as it is written; this one has length √1.25.": (
+                    lambda: _price() * np.sqrt(1.25)
+                ),
+                "That is the price of a level table. Here along and up pay together.": lambda: 8.0,
+                "The curvature of 4 is missing.": lambda: _price_of([1.0, 1.0]),
+                "The objective has a ½ before each square.": lambda: 2.0 * _price(),
+                "That is where the marble lies along the table.": lambda: float(fb.solve(slanted()).x[0]),
+                "That is how high the marble lies.": lambda: float(fb.solve(slanted()).x[1]),
+                "That is the distance by which the row is broken at the bowl's lowest point.": lambda: 3.0,
+            },
+        ),
+        explanation="On the row up = 0.5 along, so ψ = ½(a - 2)² + 2(0.5 a + 2)² with a = along, which is least at a = -1: the "
+        "marble lies at (-1, -0.5), where the slope is (-3, 6); the row (0.5, -1) times 6 balances it.",
+    ),
+    Exercise(
+        name="C.2",
+        statement="`longest_step(x, p, G, h, W)`: how far from x along p, at most 1, all rows of G x ≤ h hold, and the number "
+        "of the row that blocks, or None. Rows in the list W are held already.",
+        stub=STEP_STUB,
+        solution=STEP,
+        judge=_judge_step,
+        explanation="A row i leaves slack / speed of room along the step, if the step comes closer to it at all. The least of "
+        "these lengths decides, and 1 if none is less.",
+    ),
+    Exercise(
+        name="C.3",
+        statement="`row_to_drop(W, prices)`: the number of the row of W with the most negative price, or None if no row pulls.",
+        stub=DROP_STUB,
+        solution=DROP,
+        judge=_judge_drop,
+        explanation="A negative price says: ψ would fall if this row were left. The most negative one promises the most.",
+    ),
+    Exercise(
+        name="C.4",
+        statement="The names of the rows that are active in go2's QP, 50 ms into a push of 120 N forwards and to the left.",
+        stub='guess = ["RR_foot normal force"]  # more names, or others',
+        solution="guess = [\n"
+        '    "FR_foot facet 2", "FR_foot facet 3", "RL_foot facet 2",\n'
+        '    "RR_foot facet 2", "RR_foot facet 3", "RR_foot normal force",\n'
+        "]",
+        judge=_judge_guess,
+        explanation="To brake, the feet must push backwards and to the right: facets 2 and 3. The rear right foot, which the "
+        "push relieves, carries nothing: all its three numbers are held. FL, on which go2 leans, is free.",
+    ),
+)
+
+
+def _price_of(curvature: Sequence[float]) -> float:
+    """The price of C.1 for another bowl, from its equations."""
+    G, H = np.array([0.5, -1.0]), np.diag(curvature)
+    low = np.array([2.0, -2.0])
+    return float(G @ low / (G @ np.linalg.solve(H, G)))

@@ -1,0 +1,171 @@
+"""Lesson C, How a QP solver thinks: the table, a game of rows on and off, the way of a solver, rounds and slacks."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping, Sequence
+
+import ipywidgets as widgets
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.lessons.lessonC.helpers import corner_table
+from floatbase.lessons.rounding import about
+from floatbase.qp import QP, table_top
+from floatbase.viewer import GREYS, hexadecimal, programs
+
+_BESIDE = (-4.2, 3.4, -2.3, 3.2)  # what is seen of the table and its walls
+_NEAR = 1e-9  # a row broken by less, or a price less negative, is right but for rounding
+PUZZLES = ((0.5, -1.0), (2.5, 2.0), (-4.0, 1.5), (-1.5, -1.5), (-4.0, -1.0))  # lowest points of the bowls to be played
+_STYLES = ("-", "--", ":")
+
+
+def show_table(lowest: float) -> str:
+    """The document's table and a bowl with its lowest point so far above it: where the marble rests and what the row costs.
+
+    lowest: m, negative below the table. Returns HTML.
+    """
+    qp = table_top((0.5, lowest), (1.0, 2.0))
+    solution = fb.solve(qp)
+    price = float(solution.inequality_multipliers[0])
+    axis = _flat_axis(qp, (-2.5, 3.0, -2.2, 2.2), solution.active, solution.x)
+    axis.plot(0.5, lowest, "x", color=GREYS[1], markersize=9)
+    rests = "rests on the table" if solution.x[1] < _NEAR else "does not touch the table"
+    return _image(axis) + f"<div>the marble {rests}; price of the row: <b>{about(price)}</b></div>"
+
+
+class Game(widgets.VBox):
+    """A QP in the plane to be solved by hand: a button for each row, which is on or off, and one for the next bowl.
+
+    Each click solves one linear system, that of the rows which are on. `working` lists their names, `clicks` counts,
+    `solved` says whether the present point is the optimum.
+    """
+
+    def __init__(self, puzzles: Sequence[tuple[float, float]] = PUZZLES):
+        self._puzzles, self._at = tuple(puzzles), 0
+        self._picture, self._told = widgets.HTML(), widgets.HTML()
+        self.rows = {str(name): self._button(str(name)) for name in corner_table().inequality_names}
+        self.next = widgets.Button(description="next bowl", layout=widgets.Layout(width="8em"))
+        self.next.on_click(self._go_on)
+        super().__init__([self._picture, widgets.HBox([*self.rows.values(), self.next]), self._told])
+        self._begin()
+
+    @property
+    def qp(self) -> QP:
+        """The problem that is being played."""
+        return corner_table(self._puzzles[self._at])
+
+    @property
+    def told(self) -> str:
+        """What the game says about the rows that are on, HTML."""
+        return str(self._told.value)
+
+    def _button(self, name: str) -> widgets.Button:
+        made = widgets.Button(description=name, layout=widgets.Layout(width="8em"))
+        made.on_click(lambda _: self._click(name))
+        return made
+
+    def _begin(self) -> None:
+        self.working: tuple[str, ...] = ()
+        self.clicks = 0
+        self._show()
+
+    def _go_on(self, _: object) -> None:
+        self._at = (self._at + 1) % len(self._puzzles)
+        self._begin()
+
+    def _click(self, name: str) -> None:
+        on = set(self.working) ^ {name}
+        self.working = tuple(row for row in self.rows if row in on)
+        self.clicks += 1
+        self._show()
+
+    def _show(self) -> None:
+        for name, button in self.rows.items():
+            button.icon, button.style.font_weight = ("check", "bold") if name in self.working else ("", "normal")
+        x, faults = verdict(self.qp, self.working)
+        self.solved = not faults
+        axis = _flat_axis(self.qp, _BESIDE, self.working, x)
+        axis.plot(*self._puzzles[self._at], "x", color=GREYS[1], markersize=9)
+        self._picture.value = _image(axis)
+        clicks = f"{self.clicks} click{'' if self.clicks == 1 else 's'}"
+        words = "; ".join(faults) if faults else "<b>solved</b>: no row is broken, and none that is on pulls"
+        self._told.value = f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {words}"
+
+
+def verdict(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
+    """The least point on the rows of `working`, shape (n,), and in words what is wrong with it; nothing at the optimum.
+
+    None where these rows have no point in common, or depend on one another.
+    """
+    rows = [qp.inequality_names.index(name) for name in working]
+    G, k = qp.G[rows], len(rows)
+    if k and np.linalg.matrix_rank(G) < k:
+        return None, [f"{' and '.join(working)}: these lines have no point, or too many, in common"]
+    found = np.linalg.solve(np.block([[qp.H, G.T], [G, np.zeros((k, k))]]), np.concatenate([-qp.g, qp.h[rows]]))
+    x, prices = found[: qp.n], found[qp.n :]
+    over = qp.G @ x - qp.h
+    broken = [f"{name} is broken by {about(d)}" for name, d in zip(qp.inequality_names, over, strict=True) if d > _NEAR]
+    pulls = [f"{name} pulls: its price is {about(p)}" for name, p in zip(working, prices, strict=True) if p < -_NEAR]
+    return x, broken + pulls
+
+
+def plot_problem(qp: QP, start: npt.ArrayLike) -> Axes:
+    """A problem in the plane, with a solver's start as a dot."""
+    return programs.plot(qp, _six(), point=start)
+
+
+def show_way(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
+    """The way of a solver in the plane after so many rounds, as HTML; in words the rows that are on, and the objective.
+
+    ways: after each round, beginning with none, the point, shape (2,), and the rows that are on. rounds: between whole numbers
+    the point is under way.
+    """
+    whole = min(int(rounds), len(ways) - 1)
+    x, W = ways[whole]
+    if rounds > whole:
+        x = x + (rounds - whole) * (ways[whole + 1][0] - x)
+    names = [str(qp.inequality_names[i]) for i in W]
+    axis = _flat_axis(qp, _six(), names, x)
+    passed = [point for point, _ in ways[: whole + 1]]
+    axis.plot(*np.transpose([*passed, x]), "o-", color=GREYS[0], markersize=4, linewidth=1.5)
+    return _image(axis) + f"<div>on: {', '.join(names) or 'no row'}; objective {about(qp.objective(x), digits=3)}</div>"
+
+
+def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
+    """Numbers round by round. curves: name -> (n,) numbers, one before the first round and one after each. label: of them."""
+    figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
+    for (name, numbers), colour, style in zip(curves.items(), GREYS, _STYLES, strict=False):
+        ax.plot(np.atleast_1d(numbers), style, color=hexadecimal(colour), marker="o", label=name, linewidth=2)
+    ax.set(xlabel="rounds", ylabel=label)
+    ax.grid(alpha=0.3)
+    ax.legend()
+    plt.close(figure)
+    return figure
+
+
+def _six() -> tuple[float, float, float, float]:
+    return (-3.2, 3.2, -2.9, 4.3)
+
+
+def _flat_axis(qp: QP, box: tuple[float, float, float, float], working: Sequence[str], x: Array | None) -> Axes:
+    """A picture of a problem on a small figure of its own, which pyplot does not know and need not close."""
+    figure = Figure(figsize=(4.6, 3.8), dpi=80)
+    FigureCanvasAgg(figure)
+    axis = figure.add_axes((0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2))  # few: they take most of the time
+    return programs.plot(qp, box, working, x, axis)
+
+
+def _image(axis: Axes) -> str:
+    """The figure of an axis as HTML."""
+    data = io.BytesIO()
+    axis.figure.savefig(data, format="png")  # type: ignore[union-attr]
+    text = base64.b64encode(data.getvalue()).decode()
+    return f'<img src="data:image/png;base64,{text}" style="max-width: 100%" alt="a quadratic program in the plane">'

@@ -1,0 +1,273 @@
+"""Lesson C: the game is fair, the checks know what is wrong, and solvers in the loop do what the lesson says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from hints import missed, right
+
+import floatbase as fb
+from floatbase.lessons import about, all_exercises, check, progress
+from floatbase.lessons.lessonC import (
+    EveryTick,
+    Game,
+    Stopped,
+    beale,
+    between_walls,
+    braking,
+    corner_table,
+    longest_step,
+    plot_problem,
+    plot_rounds,
+    pushed,
+    right_or,
+    rounds_from,
+    row_to_drop,
+    show_table,
+    show_way,
+    six_edges,
+    standing,
+)
+from floatbase.qp import active_set, solve
+
+# exercises ----------------------------------------------------------------------------------------------------------------
+
+
+def test_c_1_knows_slope_length_and_curvature() -> None:
+    assert right("C.1", 6.0)
+    wrong = [
+        (-6.0, "The sign"),
+        (6.0 * 1.25**0.5, "as it is written"),
+        (8.0, "a level table"),
+        (2.4, "curvature of 4 is missing"),
+        (12.0, "a ½ before each square"),
+        (-1.0, "lies along the table"),
+        (-0.5, "how high"),
+        (3.0, "by which the row is broken"),
+        (17.0, "Neither right"),
+        (None, "no answer yet"),
+    ]
+    assert missed("C.1", wrong) == []
+
+
+def step(
+    slack: Callable[..., Any] = lambda x, G, h: np.round(h - G @ x, 9),
+    counts: Callable[..., Any] = lambda i, W, speed: i not in W and speed > 1e-9,
+    best: Callable[..., Any] = min,
+    most: float = 1.0,
+) -> Callable[..., Any]:
+    """A `longest_step` that does one thing in another way."""
+
+    def made(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
+        room, speed = slack(x, G, h), G @ p
+        found = [(room[i] / speed[i], i) for i in range(len(h)) if counts(i, W, speed[i])]
+        length, row = best(found, default=(most, None))
+        return (length, row) if length < most else (most, None)
+
+    return made
+
+
+def test_c_2_takes_steps_that_are_right_and_knows_what_is_wrong_with_others() -> None:
+    assert right("C.2", step()) and right("C.2", longest_step)
+    assert right("C.2", lambda *given: longest_step(*given))
+    wrong: list[tuple[Any, str]] = [
+        (step(slack=lambda x, G, h: G @ x - h), "negative"),
+        (step(slack=lambda x, G, h: h), "h - G x, or h alone"),
+        (step(counts=lambda i, W, speed: speed > 1e-9), "is in W and must not block"),
+        (step(counts=lambda i, W, speed: i not in W and speed != 0), "moves away"),
+        (step(counts=lambda i, W, speed: i not in W), "moves away"),
+        (step(best=max), "the first that it meets"),
+        (step(slack=lambda x, G, h: h - G @ x), "np.round(slack, 9)"),
+        (step(most=np.inf), "Nothing is in the way"),
+        (lambda x, p, G, h, W: (np.nan, None), "divided by a speed of zero"),
+        (lambda x, p, G, h, W: (1.0, None), "halfway"),
+        (lambda x, p, G, h, W: longest_step(x, p, G, h, W)[0], "Return two things"),
+        (lambda x, p, G, h, W: (longest_step(x, p, G, h, W)[0], "row"), "should be its number"),
+        (lambda x, p: 1.0, "TypeError"),
+        (0.5, "a function, written with def"),
+        (None, "no answer yet"),
+    ]
+    assert missed("C.2", wrong) == []
+
+
+def test_c_2_a_row_is_chosen_by_time_not_by_room() -> None:
+    def by_room(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
+        near = [(round(h[i] - G[i] @ x, 9), i) for i in range(len(h)) if i not in W and G[i] @ p > 1e-9]
+        room, row = min(near, default=(1.0, None))
+        length = room / (G[row] @ p) if row is not None else 1.0
+        return (length, row) if length < 1 else (1.0, None)
+
+    assert missed("C.2", [(by_room, "how soon it is used up")]) == []
+
+
+def test_c_3_knows_places_signs_and_rounding() -> None:
+    assert right("C.3", row_to_drop)
+
+    def chosen(take: Callable[..., Any], limit: float = -1e-9) -> Callable[..., Any]:
+        return lambda W, prices: take(W, prices) if len(W) and min(prices) < limit else None
+
+    wrong: list[tuple[Any, str]] = [
+        (lambda W, prices: None, "One row pulls"),
+        (chosen(lambda W, prices: int(np.argmin(prices))), "not its place in W"),
+        (chosen(lambda W, prices: W[int(np.argmax(np.abs(prices)))]), "One row pulls"),
+        (chosen(lambda W, prices: next(r for r, p in zip(W, prices, strict=True) if p < 0)), "the most negative"),
+        (chosen(lambda W, prices: W[int(np.argmin(prices))], limit=0.0), "zero and rounding"),
+        (lambda W, prices: W[int(np.argmin(prices))] if len(W) else None, "every row pushes"),
+        (lambda W, prices: W[int(np.argmin(prices))] if min(prices) < -1e-9 else None, "ValueError"),
+        (chosen(lambda W, prices: float(W[int(np.argmin(prices))])), "should be a row's number"),
+        ([3], "a function, written with def"),
+        (None, "no answer yet"),
+    ]
+    assert missed("C.3", wrong) == []
+
+
+def test_c_4_is_judged_by_one_system_of_equations() -> None:
+    active = list(solve(braking()).active)
+    assert right("C.4", active) and right("C.4", tuple(reversed(active)))
+    wrong: list[tuple[Any, str]] = [
+        ([], "With no row on"),
+        (active[:-1], "rows are broken"),
+        ([*active, "FL_foot facet 0"], "1 of yours pull, namely FL_foot facet 0"),
+        ([next(name for name in braking().inequality_names if "upper" in name)], "far from their limits"),
+        ([f"RR_foot facet {i}" for i in range(4)], "depend on one another"),
+        (["RR facet 2"], "no row 'RR facet 2'"),
+        ("RR_foot facet 2", "a list of names"),
+        (None, "no answer yet"),
+    ]
+    assert missed("C.4", wrong) == []
+    assert rounds_from(active) == 1 and abs(rounds_from([]) - 9) <= 3
+
+
+def test_functions_and_names_that_stand_in_a_stub_count_no_try(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
+    for name in ("C.2", "C.3", "C.4"):
+        made: dict[str, Any] = {}
+        exec("# of a cell\n\n" + all_exercises()[name].stub, {"np": np}, made)
+        assert not check(name, next(iter(made.values()))).right
+    assert progress.load() == {}
+    check("C.2", lambda x, p, G, h, W: (1.0, None))
+    check("C.4", ["RR_foot facet 2"])
+    assert progress.load() == {name: {"tries": 1, "right": 0} for name in ("C.2", "C.4")}
+
+
+def test_the_lesson_goes_on_with_an_answer_only_if_it_is_right(capsys: pytest.CaptureFixture[str]) -> None:
+    mine = step()
+    assert right_or("C.2", mine, longest_step) is mine
+    assert "with yours" in capsys.readouterr().out
+    assert right_or("C.2", step(best=max), longest_step) is longest_step
+    assert "not yet right" in capsys.readouterr().out
+
+
+# problems in the plane ----------------------------------------------------------------------------------------------------
+
+
+def test_every_bowl_of_the_game_can_be_solved_by_its_rows_and_by_no_others() -> None:
+    game = Game()
+    seen = []
+    for _ in range(5):
+        solved_by = []
+        for n in range(4):
+            for rows in combinations(game.rows, n):
+                for row in rows:
+                    game.rows[row].click()
+                assert game.working == rows
+                if game.solved:
+                    solved_by.append(rows)
+                for row in rows:
+                    game.rows[row].click()
+        assert game.working == () and game.clicks == 2 * (4 + 2 * 6 + 3 * 4)
+        assert solved_by == [solve(game.qp).active]
+        seen += solved_by
+        game.next.click()
+        assert game.clicks == 0
+    assert len(set(seen)) == 4 and max(map(len, seen)) == 2
+
+
+def test_the_game_tells_what_is_broken_what_pulls_and_what_has_no_point() -> None:
+    game = Game([(0.5, -1.0)])
+    assert "table is broken by 1;" in game.told and "0 clicks" in game.told and not game.solved
+    game.rows["table"].click()
+    assert "solved" in game.told and "1 click:" in game.told and game.solved
+    game.rows["ramp"].click()
+    assert "ramp pulls: its price is -1.5" in game.told and not game.solved
+    game.rows["roof"].click()
+    assert "no point" in game.told and not game.solved
+    assert "✓" not in game.told and game.rows["roof"].icon == "check" and game.rows["wall"].icon == ""
+
+
+def test_the_rows_of_a_qp_are_those_that_the_lesson_describes() -> None:
+    along, up = 0.7, 0.1
+    assert np.allclose(corner_table().G @ [along, up], [-up, along - 3 * up, 2 * along + 3 * up, -along])
+    edges = six_edges()
+    assert np.allclose(np.linalg.norm(edges.G, axis=1), 1.0) and np.all(edges.h == 2.0)
+    assert np.allclose(np.linalg.solve(edges.H, -edges.g), [1.0, 3.9])
+    assert np.allclose(np.linalg.eigvalsh(edges.H), [1.0, 8.0])
+    assert np.sum(beale().h == 0.0) == 6
+
+
+def test_the_soft_walls_lead_through_the_middle_to_the_optimum() -> None:
+    for qp, start in ((six_edges(), (1.5, 0.0)), (corner_table((2.5, 2.0)), (-1.0, 0.5))):
+        softness = 100.0 * 0.5 ** np.arange(30)
+        points = between_walls(qp, start, softness)
+        for t, x in zip(softness, points, strict=True):
+            slack = qp.h - qp.G @ x
+            assert np.all(slack > 0)
+            slope = qp.H @ x + qp.g
+            assert np.allclose(slope + qp.G.T @ (t / slack), 0.0, atol=1e-6 * (1 + np.abs(slope).max()))
+        assert np.allclose(points[-1], solve(qp).x, atol=1e-5)
+
+
+# in the loop --------------------------------------------------------------------------------------------------------------
+
+
+def test_any_solver_may_drive_the_robot_and_the_same_answer_gives_the_same_torques() -> None:
+    controller = standing()
+    state = controller.robot.standing().replace(v=0.5 * np.eye(18)[1])
+    for solver in (lambda qp: solve(qp).x, lambda qp: active_set(qp).solution.x):
+        found = EveryTick(controller, solver)(state.q, state.v, 0.0)
+        expected = controller(state.q, state.v)
+        assert np.allclose(found.tau, expected.tau, atol=1e-6)
+        assert found.forces is not None and np.allclose(np.ravel(found.forces), np.ravel(expected.forces), atol=1e-6)
+    with pytest.raises(fb.FloatbaseError, match="x has shape"):
+        EveryTick(controller, lambda qp: np.zeros(3))(state.q, state.v, 0.0)
+
+
+def test_a_stopped_solver_keeps_its_rows_for_the_next_tick_only_when_it_is_warm() -> None:
+    qp = braking()
+    for warm in (True, False):
+        solver = Stopped(most=1, warm=warm)
+        for _ in range(40):
+            solver(qp)
+        assert {run.solution.iterations for run in solver.runs} == {1}
+        assert not solver.runs[0].finished and solver.runs[-1].finished == warm
+        if warm:
+            assert np.allclose(solver.runs[-1].solution.x, solve(qp).x, atol=1e-7)
+
+
+def test_a_push_goes_where_it_is_sent() -> None:
+    (push,) = pushed(standing(), 30.0, 0.06, towards=45.0).pushes
+    assert np.allclose(push.force, 30.0 * np.array([0.5**0.5, 0.5**0.5, 0.0]))
+    assert (push.start, push.duration) == (0.05, 0.1)
+
+
+# pictures -----------------------------------------------------------------------------------------------------------------
+
+
+def test_pictures_show_what_they_are_given() -> None:
+    assert "does not touch" in show_table(1.0) and "price of the row: <b>3</b>" in show_table(-1.5)
+    edges = six_edges()
+    ways = [(np.zeros(2), []), (np.array([1.0, 0.0]), [0])]
+    assert "on: no row" in show_way(edges, ways, 0) and "on: edge 0" in show_way(edges, ways, 1)
+    between = show_way(edges, ways, 0.5)
+    assert "on: no row" in between and between != show_way(edges, ways, 0)
+    assert about(edges.objective(np.array([0.5, 0.0])), digits=3) in between
+    problem: Any = plot_problem(edges, (1.5, 0.0))
+    assert problem.lines[-1].get_xydata().tolist() == [[1.5, 0.0]]
+    rounds: Any = plot_rounds({"yours": [3.0, 2.0, 1.0]}, "objective")
+    assert rounds.axes[0].lines[0].get_ydata().tolist() == [3.0, 2.0, 1.0]
+    plt.close("all")
