@@ -14,6 +14,7 @@ Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accele
 Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask, TorqueTask, standing_tasks
 Control       WholeBodyController (26)(27), QP, solve
 Simulation    Simulation, Ground, Push, rollout, Rollout, sweep, push_rose
+Walking       from floatbase.behaviours import Gait, Walk, Stand
 Pictures      Viewer
 Errors        FloatbaseError, InfeasibleError
 

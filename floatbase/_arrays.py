@@ -93,14 +93,15 @@ class Value:
 class Fixed:
     """Base of objects that keep what they were made with: once they have `_made`, no public attribute takes another value.
 
-    A class derived from one of them may set attributes of its own.
+    A class derived from one of them may set attributes of its own; properties that can be set stay so.
     """
 
     _instead: ClassVar[dict[str, str]] = {}  # by public name: what to do instead of assigning to it
 
     def __setattr__(self, name: str, value: object) -> None:
         known = name in self._instead
-        if name.startswith("_") or "_made" not in vars(self) or not (known or Fixed in type(self).__bases__):
+        own = name.startswith("_") or getattr(getattr(type(self), name, None), "fset", None) is not None
+        if own or "_made" not in vars(self) or not (known or Fixed in type(self).__bases__):
             object.__setattr__(self, name, value)
             return
         kind = type(self).__name__

@@ -25,6 +25,7 @@ from floatbase.viewer import push_at
 
 GAITS = {4: {"trot": Gait.trot, "crawl": Gait.crawl}, 2: {"walk": Gait.walk}}  # by number of feet
 STEPS = {4: partial(Gait.trot, swing=0.2), 2: partial(Gait.walk, swing=0.4)}  # with which a robot catches itself
+_HARDEST = 2.5  # times the weight: a push that asks for steps
 _AHEAD = 1.0  # s from a control to the first step
 PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller: with each, robots stand a push
 
@@ -78,7 +79,7 @@ class Playground:
         view.button("pause", self.run.pause)
         view.button("reset", self.run.reset)
         view.slider("speed", self.run.slow_motion, 1.0, 0.05, 1.0, 0.05)
-        view.slider("push [N]", partial(setattr, self, "force"), self.force, 0.0, 0.5 * weight, 1.0)
+        view.slider("push [N]", partial(setattr, self, "force"), self.force, 0.0, _HARDEST * weight, 1.0)
         view.slider("push towards [°]", partial(setattr, self, "towards"), self.towards, -180.0, 180.0, 5.0)
         view.button("push", self._push)
         if not self.robot.is_floating:
@@ -183,10 +184,12 @@ class Playground:
         with self._drawing:
             speed = self.pace.update(now)
             pace = "" if speed is None else f", {speed:.0%} of real time"
-            headline = f"{self.robot.name}, {now:.1f} s{pace}, control every {1e3 * self.period:g} ms"
+            gait = f", {self.gait}" if self.gait else ""
+            headline = f"{self.robot.name}{gait}, {now:.1f} s{pace}, control every {1e3 * self.period:g} ms"
             self.view.show(
                 record.final, record.contacts, record.measured[-1], record.planned[-1], push=push_at(record, -1, SEEN),
                 support=True, title="\n".join(filter(None, [headline, self.outcome, self.note])),
+                extra=self.view.walking(self.controller, record.final) if isinstance(self.controller, Walk) else None,
             )  # fmt: skip
 
 

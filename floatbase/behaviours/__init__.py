@@ -3,9 +3,10 @@
 from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment, support_margin
 from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
+from floatbase.behaviours.options import Gains
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing
-from floatbase.behaviours.walk import Gains, Step, Walk, below_the_body
+from floatbase.behaviours.walk import Step, Walk, below_the_body
 
 __all__ = [
     "LIPM", "Gains", "Gait", "Stand", "Step", "Swing", "Walk", "below_the_body", "capture_point", "neutral_point",

@@ -48,10 +48,14 @@ def _horizontal(name: str, vector: npt.ArrayLike, unit: str) -> Array:
 def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
     """How far a point is inside the convex hull of the feet, m; negative: how far outside. Level ground, seen from above.
 
-    point: (2,), m, world, such as the capture point or the ZMP. feet: (n, 2), m, world, of all points that touch.
+    point: (2,), m, world, such as the capture point or the ZMP. feet: (n, 2), m, world, of all points that touch. Both may have
+        heights, which do not count.
     On other ground the support region is another: `floatbase.friction.WrenchSet.support_region`, whose corners fit, too.
     """
-    point, feet = checked("point", point, (2,), "m"), checked("feet", feet, (None, 2), "m")
+    point, feet = _horizontal("point", point, "m"), checked("feet", feet, (None, None), "m")
+    if feet.shape[1] not in (2, 3):
+        raise InputError(f"feet has shape {feet.shape}; it must have shape (n, 2) or (n, 3) (m).")
+    feet = feet[:, :2]
     if not len(feet):
         raise InputError("a robot in the air has no support region: feet must hold one point at least.")
     corners = _hull(feet)

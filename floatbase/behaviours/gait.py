@@ -14,6 +14,7 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot
 
 SAME_TIME = 1e-9  # s: times of a schedule that differ by less are the same; sums of periods round
+_LONGEST = 100.0  # s, of a period: more is a slip of units
 _MOST_PHASES = 1000  # asked for at once
 
 
@@ -21,7 +22,7 @@ _MOST_PHASES = 1000  # asked for at once
 class Gait(Value):
     """A contact schedule: foot f is in the air for `swing` s from start + (n + offsets[f]) period on, n = 0, 1, 2, …
 
-    offsets: for each foot the part of the period at which it lifts, from 0 to 1.
+    offsets: for each foot the part of the period at which it lifts, from 0 to 1; feet that are not among them never lift.
     period: s, from one lift-off of a foot to its next.
     swing: s, for which a foot is in the air, less than the period.
     start: s, before which no foot lifts.
@@ -44,8 +45,8 @@ class Gait(Value):
             if not 0.0 <= offset < 1.0:
                 raise InputError(f"the offset of {foot} is {offset:g}; it must be from 0 to less than 1.")
         object.__setattr__(self, "offsets", MappingProxyType(offsets))
-        for name in ("period", "swing"):
-            object.__setattr__(self, name, positive(name, getattr(self, name), "s"))
+        for name in ("swing", "period"):
+            object.__setattr__(self, name, positive(name, getattr(self, name), "s", most=_LONGEST))
         object.__setattr__(self, "start", number("start", self.start, "s"))
         if self.stop is not None:
             object.__setattr__(self, "stop", number("stop", self.stop, "s"))
@@ -153,8 +154,8 @@ def check_that_one_stands(gait: Gait) -> None:
     for offset in gait.offsets.values():
         if not endless.stance(gait.start + (1.0 + offset) * gait.period):
             raise InputError(
-                f"this gait has all feet in the air at {offset:g} of its period; one must stand at any time: give feet other "
-                f"offsets, or a swing of less than {gait.swing:g} s."
+                f"this gait has all feet in the air at {offset:g} of its period; one must stand at any time, as running is not "
+                "built: give feet other offsets, or a shorter swing."
             )
 
 

@@ -15,6 +15,7 @@ from floatbase.behaviours.gait import Gait, check_that_one_stands
 from floatbase.behaviours.walk import Walk
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
+from floatbase.errors import InputError
 from floatbase.robots import Robot, State
 
 _SLOW = 0.1  # m/s of the centre of mass, below which it stops stepping
@@ -34,7 +35,9 @@ class Stand(Walk):
     def __init__(self, robot: Robot, contacts: Contacts, steps: Gait | None = None, *, margin: float = 0.03, **options: Any):
         gait = Gait(dict.fromkeys(of_kind("contacts", contacts, Contacts).names, 0.0), 1.0, 0.5) if steps is None else steps
         self._never = replace(of_kind("steps", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0)
-        self.steps, self.margin = steps, positive("margin", margin, "m", allow_zero=True)
+        self.steps, self.margin = steps, positive("margin", margin, "m", allow_zero=True, most=1.0)
+        if {"velocity", "yaw_rate", "gait"} & set(options):
+            raise InputError("a Stand goes nowhere, and has no velocity, yaw_rate or gait: give it steps, or make a Walk.")
         super().__init__(robot, contacts, self._never, **options)
         if steps is not None and len(steps.feet) == len(contacts):
             check_that_one_stands(replace(steps, stop=None))

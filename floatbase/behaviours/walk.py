@@ -7,19 +7,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import copysign, hypot, inf, sqrt
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, function, number, of_kind, positive
+from floatbase._arrays import Array, Fixed, checked, function, number, of_kind, positive
 from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
 from floatbase.behaviours.gait import SAME_TIME, Gait, check_that_one_stands
 from floatbase.behaviours.lipm import LIPM, Piece
+from floatbase.behaviours.options import Gains, check_feet, check_options, flat_among
 from floatbase.behaviours.reference import Motion, Reference, Swinging, turned, yaw_of
 from floatbase.behaviours.swing import Swing
 from floatbase.control import Command, WholeBodyController
-from floatbase.dynamics import Contacts, FlatFootContact
+from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
 from floatbase.robots import Robot, State
@@ -37,29 +38,8 @@ _OWN_SIDE = 0.25  # part of its distance from the middle that a foot keeps to it
 _REACH, _REACH_FLAT = 0.2, 0.3  # m
 _LOAD = 2.0  # times its even share of the weight: the normal force from which a ramp comes down
 _SOFT = 1e4  # weight of contacts that must give way, beside 10 of the tasks
+_FASTEST = 10.0  # m/s and rad/s: more is a slip of units
 _HISTORY = 2000  # changes of stance that are kept: minutes of walking
-
-
-@dataclass(frozen=True, eq=False)
-class Gains(Value):
-    """(kp in 1/s², weight) of each kind of task of a `Walk`; all are critically damped."""
-
-    com: tuple[float, float] = (100.0, 10.0)
-    base: tuple[float, float] = (100.0, 10.0)
-    swing: tuple[float, float] = (900.0, 10.0)
-    posture: tuple[float, float] = (100.0, 1e-2)
-
-    def __post_init__(self) -> None:
-        for name in ("com", "base", "swing", "posture"):
-            kp, weight = checked(f"gains of {name}", getattr(self, name), (2,)).tolist()
-            gains = positive(f"kp of {name}", kp, "1/s²"), positive(f"weight of {name}", weight, allow_zero=True)
-            object.__setattr__(self, name, gains)
-
-    @staticmethod
-    def of(contacts: Contacts) -> Gains:
-        """Gains that go with point feet or with flat feet."""
-        flat = _flat_among(of_kind("contacts", contacts, Contacts))
-        return Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
 
 
 @dataclass(frozen=True)
@@ -82,7 +62,7 @@ class Step:
     swings: dict[str, Swing]
 
 
-class Walk:
+class Walk(Fixed):
     """Walks by a gait at a velocity: a controller like any other, for `fb.rollout`, `Live`, `fb.sweep` and `fb.push_rose`.
 
     At each change of stance it takes the feet where they are, plans the next footholds (`neutral_point`) and a linear inverted
@@ -105,9 +85,17 @@ class Walk:
     gains: of its tasks; `Gains.of(contacts)` by default.
     options: more arguments of `fb.WholeBodyController`, such as facets.
 
-    `stance`, `footholds`, `swings`, `plan` and `history` tell what it is doing. Raises `InputError` for arguments that do not
-    fit.
+    At velocity (0, 0) it marches on the spot; `walk.gait = dataclasses.replace(walk.gait, stop=walk.time)` makes it stand.
+    `stance`, `footholds`, `swings`, `plan` and `history` tell what it is doing. A controller of your own around it needs its
+    `contacts`, as they are at each tick. Raises `InputError` for arguments that do not fit.
     """
+
+    _instead: ClassVar[dict[str, str]] = {
+        **dict.fromkeys(("robot", "clearance", "reach", "ramp", "foothold", "gains", "omega"), "make another one"),
+        **dict.fromkeys(("time", "stance", "contacts", "footholds", "swings", "plan", "history"), "it tells what it is doing"),
+    }
+
+    history: deque[Step]
 
     def __init__(
         self,
@@ -125,14 +113,15 @@ class Walk:
         **options: Any,
     ):
         self.robot, self._all = of_kind("robot", robot, Robot), of_kind("contacts", contacts, Contacts)
-        self._flat = _flat_among(contacts)
+        self._flat = flat_among(contacts)
         self._reference: Reference | None = None
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
-        self.clearance = positive("clearance", clearance, "m", allow_zero=True)
-        self.reach = positive("reach", (_REACH_FLAT if self._flat else _REACH) if reach is None else reach, "m")
-        self.ramp = positive("ramp", ramp, "s", allow_zero=True)
+        self.clearance = positive("clearance", clearance, "m", allow_zero=True, most=1.0)
+        self.reach = positive("reach", (_REACH_FLAT if self._flat else _REACH) if reach is None else reach, "m", most=1.0)
+        self.ramp = positive("ramp", ramp, "s", allow_zero=True, most=1.0)
         self.foothold = below_the_body if foothold is None else function("foothold", foothold, "foothold(foot, land, walk)")
         self.gains = Gains.of(contacts) if gains is None else of_kind("gains", gains, Gains)
+        check_options(type(self).__name__, options)
         self._limits = WholeBodyController(robot, contacts, (), **options).limits  # what does not fit is told now
         self._options, self._standing = options, robot.standing()
         self._alone = {contact.name: Contacts([contact]) for contact in contacts}
@@ -142,6 +131,7 @@ class Walk:
         ground = float(contacts.positions(self._standing)[:, 2].mean())
         self.omega = sqrt(robot.gravity / (self._standing.com[2] - ground))
         self._forget()
+        self._made = True
 
     @property
     def gait(self) -> Gait:
@@ -150,8 +140,7 @@ class Walk:
 
     @gait.setter
     def gait(self, gait: Gait) -> None:
-        for foot in of_kind("gait", gait, Gait, "Gait.trot(robot)").feet:
-            self._all[foot]  # an `UnknownNameError` tells what there is
+        check_feet(of_kind("gait", gait, Gait, "Gait.trot(robot)"), self._all)
         if len(gait.feet) == len(self._all):
             check_that_one_stands(gait)
         self._gait = gait
@@ -164,6 +153,7 @@ class Walk:
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
         self._velocity = checked("velocity", velocity, (2,), "m/s")
+        number("speed", float(np.linalg.norm(self._velocity)), "m/s", most=_FASTEST)
 
     @property
     def yaw_rate(self) -> float:
@@ -172,7 +162,7 @@ class Walk:
 
     @yaw_rate.setter
     def yaw_rate(self, yaw_rate: float) -> None:
-        self._yaw_rate = number("yaw_rate", yaw_rate, "rad/s")
+        self._yaw_rate = number("yaw_rate", yaw_rate, "rad/s", -_FASTEST, _FASTEST)
 
     @property
     def time(self) -> float | None:
@@ -247,7 +237,7 @@ class Walk:
     def _forget(self) -> None:
         self._controllers: dict[tuple[tuple[str, ...], bool], WholeBodyController] = {}
         self._reference = None
-        self.history: deque[Step] = deque(maxlen=_HISTORY)
+        vars(self)["history"] = deque(maxlen=_HISTORY)
 
     def _path(self, t: float) -> tuple[Array, float, Array]:
         """Place, yaw and velocity of the path at t; it stands before the first foot lifts, and once none does any more."""
@@ -444,7 +434,3 @@ def below_the_body(foot: str, land: float, walk: Walk) -> Array:
     """The foothold, (2,) m, of a foot that lands at `land` s: `neutral_point` below the body on its path."""
     gait = walk.gait
     return neutral_point(walk.below(foot, land), walk.velocity_at(land), gait.period - gait.swing)
-
-
-def _flat_among(contacts: Contacts) -> set[str]:
-    return {contact.name for contact in contacts if isinstance(contact, FlatFootContact)}

@@ -216,6 +216,6 @@ def _planned(command: Any, stance: Contacts) -> Array | None:
     if planned.shape != (stance.k,):
         raise InputError(
             f"the controller planned forces of shape {planned.shape}; its contacts ({', '.join(stance.names)}) have "
-            f"{stance.k} numbers. A controller that changes its stance has the present one as its .contacts."
+            f"{stance.k} numbers. A controller that changes its stance, or one around it, has the present one as .contacts."
         )
     return planned

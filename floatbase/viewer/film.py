@@ -59,9 +59,14 @@ def shoot(page: str, target: Path, size: tuple[int, int]) -> None:
     page: its HTML. size: width and height in pixels, see `pixels`.
     Raises `ViewerError` where browser or packages are missing, and for a recording that is too long.
     """
-    target.open("ab").close()  # an `OSError` now, and not after the work
-    with ThreadPoolExecutor(1) as thread:  # playwright refuses one that has an event loop, such as a notebook's
-        thread.submit(_shoot, page, target, size).result()
+    unfinished = target.with_name(f"{target.stem}.part{target.suffix}")
+    unfinished.touch()  # an `OSError` now, and not after the work
+    try:
+        with ThreadPoolExecutor(1) as thread:  # playwright refuses one that has an event loop, such as a notebook's
+            thread.submit(_shoot, page, unfinished, size).result()
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 def _shoot(page: str, target: Path, size: tuple[int, int]) -> None:

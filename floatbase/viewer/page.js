@@ -100,6 +100,7 @@ function spot(colour, symbol = "patch") {
 }
 
 const LAG = 0.3;  // s by which the camera is behind what it follows, so that it does not shake with every step
+const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
@@ -117,7 +118,7 @@ function startCamera(viewer) {
 
   // Go with what is followed, at the same height; the scale goes with the camera. Returns whether it is still on its way.
   function go() {
-    const now = performance.now(), part = smooth && !anew ? 1 - Math.exp(-Math.min(now - clock, 100) / 1000 / LAG) : 1;
+    const now = performance.now(), part = smooth && !anew ? 1 - Math.exp(-Math.min(now - clock, SLOWEST) / 1000 / LAG) : 1;
     clock = now;
     const found = node(path), way = new Vector3();
     if (!found) return false;

@@ -17,7 +17,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.behaviours import Gains, Gait, Stand, Walk, below_the_body
-from floatbase.errors import InputError, UnknownNameError
+from floatbase.errors import InputError
 from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
@@ -435,8 +435,20 @@ def test_copies_begin_anew_and_walk_alike() -> None:
 def test_what_does_not_fit_is_told_when_it_is_made() -> None:
     robot = judges.load("go2")
     contacts = fb.Contacts.feet(robot)
-    with pytest.raises(UnknownNameError, match="FL_foot"):
+    with pytest.raises(InputError, match="the gait lifts FL_foot, which is no contact"):
         Walk(robot, contacts.without("FL_foot"), Gait.trot(robot))
+    with pytest.raises(InputError, match="there are none"):
+        Walk(robot, fb.Contacts.none(), Gait.trot(robot))
+    for wrong in ({"speed": 0.3}, {"tasks": []}):
+        with pytest.raises(InputError, match="Walk has no option .*; beside its own, .* facets"):
+            Walk(robot, contacts, Gait.trot(robot), **wrong)
+    for wrong in ({"velocity": (20.0, 0.0)}, {"yaw_rate": 30.0}, {"clearance": 5.0}, {"reach": 20.0}, {"ramp": 300.0}):
+        with pytest.raises(InputError, match=r"(at most|to) 10?( |\b)"):  # slips of units
+            Walk(robot, contacts, Gait.trot(robot), **wrong)
+    with pytest.raises(InputError, match="swing is 250"):
+        Gait.trot(robot, swing=250.0)
+    with pytest.raises(InputError, match="give it steps, or make a Walk"):
+        Stand(robot, contacts, velocity=(0.3, 0.0))
     with pytest.raises(InputError, match=r"Gait\.trot\(robot\)"):
         Walk(robot, contacts, "trot")
     with pytest.raises(InputError, match="velocity"):
@@ -454,3 +466,10 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         Walk(robot, contacts, Gait.trot(robot), foothold=lambda foot: np.zeros(2))
     with pytest.raises(InputError, match="yaw_rate"):
         walk.yaw_rate = np.nan
+    for name, told in {
+        "velocty": "no 'velocty' to set",
+        "clearance": "make another one",
+        "time": "tells what it is doing",
+    }.items():
+        with pytest.raises(InputError, match=told):
+            setattr(walk, name, 0.2)
