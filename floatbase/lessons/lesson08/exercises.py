@@ -200,11 +200,11 @@ EXERCISES = (
         name="08.1",
         statement="RR stands 6 cm further back. The shortest shift of x_c, (2,), mm, forwards and to the left, after which "
         "FR can be lifted.",
-        stub="shift = np.zeros(2)  # replace: forwards and to the left, mm",
+        stub="way = np.zeros(2)  # replace: forwards and to the left, mm",
         solution="feet = dict(zip(contacts.names, contacts.positions(uneven)))\n"
         'a, b = feet["FL_foot"][:2], feet["RR_foot"][:2]\n'
         "across = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)\n"
-        "shift = 1000 * ((a - uneven.com[:2]) @ across) * across",
+        "way = 1000 * ((a - uneven.com[:2]) @ across) * across",
         judge=Shaped(
             Numeric(
                 right=_shift,
@@ -221,8 +221,8 @@ EXERCISES = (
         name="08.2",
         statement="The coefficients of u⁰ to u⁶, (7,), m, of a bump that is at rest at u = 0 and 1, without acceleration "
         "there, and 0.05 m high half-way.",
-        stub="bump = np.zeros(7)  # replace: coefficients of u⁰, u¹, …, u⁶, in m",
-        solution="bump = 0.05 * 64 * np.array([0, 0, 0, 1, -3, 3, -1])  # 64 u³ (1 - u)³",
+        stub="coefficients = np.zeros(7)  # replace: coefficients of u⁰, u¹, …, u⁶, in m",
+        solution="coefficients = 0.05 * 64 * np.array([0, 0, 0, 1, -3, 3, -1])  # 64 u³ (1 - u)³",
         judge=Shaped(
             Numeric(
                 right=_bump,
