@@ -215,8 +215,11 @@ def test_footholds_lie_on_the_ground_and_others_have_a_label() -> None:
     view = fb.Viewer(judges.load("go2"))
     try:
         marks = footholds(view, {"FL_foot": [0.1, 0.2], "here": [0.0, 0.0]})
+        two = footholds(view, {"FL_foot": [0.1, 0.2], "RR_foot": [-0.2, -0.2]})
     finally:
         view.close()
+    assert set(two) == {"place/FL_foot", "place/RR_foot", "line"}
+    assert np.allclose(two["line"].matrix[:2, 2], [-0.3, -0.4])
     assert set(marks) == {"place/FL_foot", "place/here", "label/here"}
     assert np.allclose(marks["place/FL_foot"].matrix[:2, 3], [0.1, 0.2])
 
