@@ -74,13 +74,12 @@ class Stand(Walk):
 
     def _begun(self, steps: Gait, state: State, dcm: Array) -> Gait:
         """The gait, begun where in its period the feet that stay are clearly nearer to the capture point, (2,) m."""
+        from_zero = replace(steps, start=0.0, stop=None)
+        own, *others = (from_zero.after(part * steps.period) for part in sorted(set(steps.offsets.values())))
 
-        def margin(first: float) -> float:
-            stay = [name for name in self._all.names if steps.offsets.get(name) != first]
+        def margin(gait: Gait) -> float:
+            stay = [name for name in self._all.names if gait.offsets.get(name) != 0.0]
             return support_margin(dcm, self._all.only(*stay).positions(state)[:, :2]) if stay else -inf
 
-        own, *others = sorted(set(steps.offsets.values()))
-        first = max(others, key=margin, default=own)
-        if margin(first) < margin(own) + _CLEARLY:
-            return steps
-        return replace(steps, offsets={foot: (offset - first) % 1.0 for foot, offset in steps.offsets.items()})
+        best = max(others, key=margin, default=own)
+        return best if margin(best) >= margin(own) + _CLEARLY else own

@@ -164,6 +164,24 @@ def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float,
     assert next(step.stance for step in stand.history if len(step.stance) == 2) == ("FL_foot", "RR_foot")
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_biped_that_is_pushed_aside_lifts_the_other_foot_first(side: str) -> None:
+    robot = judges.load("talos")
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot))  # whose first foot is the left one
+    push = fb.Push([0.0, 400.0 if side == "left" else -400.0, 0.0], start=0.1)
+    assert run(stand, 1.3, push).outcome == "completed"
+    assert next(step.stance for step in stand.history if len(step.stance) == 1) == (f"{side}_sole_link",)
+
+
+def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_then() -> None:
+    robot = judges.load("go2")
+    gait = Gait({"FL_foot": 0.8, "RR_foot": 0.8, "FR_foot": 0.1 + 0.2, "RL_foot": 0.3}, 0.5, 0.2)
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), gait)
+    for towards in (1.0, -1.0):
+        assert run(stand, 0.7, fb.Push([0.0, 250.0 * towards, 0.0], start=0.2)).outcome == "completed"
+        assert next(len(step.stance) for step in stand.history if len(step.stance) < 4) == 2
+
+
 def test_it_stands_without_a_step_as_long_as_the_capture_point_is_inside() -> None:
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))

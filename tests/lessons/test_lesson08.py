@@ -61,6 +61,10 @@ def test_08_1_knows_sign_unit_stance_foot_start_end_and_detours() -> None:
         (-way, "The sign"),
         (way / 1e3, "In mm"),
         (1e3 * shortest_shift(state.robot.standing(), "FR_foot"), "usual stance"),
+        (1e3 * shortest_shift(state.robot.standing(), "FR_foot", lambda _: state.com[:2]), "contacts.positions(uneven)"),
+        (way[::-1], "The order"),
+        (way * [1, -1], "To the left is positive"),
+        (way * [-1, 1], "Forwards is positive"),
         (1e3 * shortest_shift(state, "FL_foot"), "frees FL"),
         (1e3 * shortest_shift(state, "FR_foot", lambda _: feet.mean(axis=0)), "middle of the feet"),
         (1e3 * (feet[[0, 2, 3]].mean(axis=0) - state.com[:2]), "middle of the three"),
@@ -97,7 +101,7 @@ def test_08_2_takes_the_bump_without_jumps_and_knows_those_with() -> None:
 
 def test_08_3_takes_the_rule_and_knows_time_mass_rate_height_edge_and_origin() -> None:
     state = judges.load("anymal_kinova").standing()
-    robot, h = state.robot, state.com[2]
+    robot, h, go2 = state.robot, state.com[2], judges.load("go2").standing()
     x = fb.Contacts.points(robot).positions(state)[:, 0]
     s, omega = state.com[0] - x.min(), np.sqrt(robot.gravity / h)
     rule = robot.mass * omega * s / 0.1
@@ -109,6 +113,9 @@ def test_08_3_takes_the_rule_and_knows_time_mass_rate_height_edge_and_origin() -
         (rule / omega**2, "not √(h/g)"),
         (rule * omega, "the root is missing"),
         (rule * np.sqrt(h / state.q[2]), "not that of the base"),
+        (rule * np.sqrt(h / go2.com[2]), "That ω is go2's"),
+        (rule * go2.robot.mass / robot.mass, "That mass is go2's"),
+        (rule * go2.robot.mass / robot.mass * np.sqrt(h / go2.com[2]), "Mass and ω are go2's"),
         (rule * (x.max() - state.com[0]) / s, "forwards"),
         (rule * -x.min() / s, "the world's origin"),
         (rule * 0.1 * omega / (1 - np.exp(-0.1 * omega)), "finer than"),
@@ -208,8 +215,11 @@ def test_footholds_lie_on_the_ground_and_others_have_a_label() -> None:
     view = fb.Viewer(judges.load("go2"))
     try:
         marks = footholds(view, {"FL_foot": [0.1, 0.2], "here": [0.0, 0.0]})
+        two = footholds(view, {"FL_foot": [0.1, 0.2], "RR_foot": [-0.2, -0.2]})
     finally:
         view.close()
+    assert set(two) == {"place/FL_foot", "place/RR_foot", "line"}
+    assert np.allclose(two["line"].matrix[:2, 2], [-0.3, -0.4])
     assert set(marks) == {"place/FL_foot", "place/here", "label/here"}
     assert np.allclose(marks["place/FL_foot"].matrix[:2, 3], [0.1, 0.2])
 

@@ -55,6 +55,12 @@ def _shifts() -> dict[str, Callable[[], Any]]:
         "The sign: this way leads further away from the other three feet.": lambda: -1e3 * shortest_shift(state, FOOT),
         "In mm, please; these are metres.": lambda: shortest_shift(state, FOOT),
         "That is the way for the usual stance; here RR stands further back.": lambda: 1e3 * shortest_shift(usual, FOOT),
+        "The feet are those of the usual stance; contacts.positions(uneven) tells where they stand here.": lambda: (
+            1e3 * shortest_shift(usual, FOOT, lambda _: state.com[:2])
+        ),
+        "The order: first forwards, then to the left.": lambda: 1e3 * shortest_shift(state, FOOT)[::-1],
+        "To the left is positive, as y is.": lambda: 1e3 * shortest_shift(state, FOOT) * [1.0, -1.0],
+        "Forwards is positive, as x is.": lambda: 1e3 * shortest_shift(state, FOOT) * [-1.0, 1.0],
         "That way frees FL. Which two feet does FR's triangle share with the other one?": lambda: (
             1e3 * shortest_shift(state, "FL_foot")
         ),
@@ -142,6 +148,15 @@ def _pushes() -> dict[str, Callable[[], Any]]:
 
         return value
 
+    def of_go2(mass: bool = False, omega: bool = False) -> Callable[[], float]:
+        def value() -> float:
+            state, h, s, _ = _backwards()
+            go2 = fb.load("go2").standing()
+            m = (go2 if mass else state).robot.mass
+            return float(m * s * np.sqrt(state.robot.gravity / (go2.com[2] if omega else h)) / PUSH)
+
+        return value
+
     def long() -> float:
         state, h, s, _ = _backwards()
         omega = np.sqrt(state.robot.gravity / h)
@@ -154,6 +169,9 @@ def _pushes() -> dict[str, Callable[[], Any]]:
         "ω is √(g/h), not √(h/g).": push(power=-1.0),
         "ω is √(g/h): the root is missing.": push(power=2.0),
         "h is the height of the centre of mass above the feet, not that of the base.": push(height="base"),
+        "That ω is go2's; this robot's centre of mass is higher.": of_go2(omega=True),
+        "That mass is go2's.": of_go2(mass=True),
+        "Mass and ω are go2's.": of_go2(mass=True, omega=True),
         "That is a push forwards, against the front feet.": push(edge="front"),
         "Measure from the centre of mass, not from the world's origin.": push(edge="origin"),
         "That is finer than what is asked: it lets the ground push back while the push lasts. Take an impulse.": long,
@@ -200,11 +218,11 @@ EXERCISES = (
         name="08.1",
         statement="RR stands 6 cm further back. The shortest shift of x_c, (2,), mm, forwards and to the left, after which "
         "FR can be lifted.",
-        stub="shift = np.zeros(2)  # replace: forwards and to the left, mm",
+        stub="way = np.zeros(2)  # replace: forwards and to the left, mm",
         solution="feet = dict(zip(contacts.names, contacts.positions(uneven)))\n"
         'a, b = feet["FL_foot"][:2], feet["RR_foot"][:2]\n'
         "across = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)\n"
-        "shift = 1000 * ((a - uneven.com[:2]) @ across) * across",
+        "way = 1000 * ((a - uneven.com[:2]) @ across) * across",
         judge=Shaped(
             Numeric(
                 right=_shift,
@@ -221,8 +239,8 @@ EXERCISES = (
         name="08.2",
         statement="The coefficients of u⁰ to u⁶, (7,), m, of a bump that is at rest at u = 0 and 1, without acceleration "
         "there, and 0.05 m high half-way.",
-        stub="bump = np.zeros(7)  # replace: coefficients of u⁰, u¹, …, u⁶, in m",
-        solution="bump = 0.05 * 64 * np.array([0, 0, 0, 1, -3, 3, -1])  # 64 u³ (1 - u)³",
+        stub="coefficients = np.zeros(7)  # replace: coefficients of u⁰, u¹, …, u⁶, in m",
+        solution="coefficients = 0.05 * 64 * np.array([0, 0, 0, 1, -3, 3, -1])  # 64 u³ (1 - u)³",
         judge=Shaped(
             Numeric(
                 right=_bump,

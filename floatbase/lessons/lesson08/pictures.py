@@ -18,7 +18,7 @@ import floatbase as fb
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.panels import live
 from floatbase.simulation import Live, Rollout, advice
-from floatbase.viewer import GREYS, Picture, Viewer, hexadecimal, plots, shapes
+from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, shapes
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
@@ -68,7 +68,10 @@ def plot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: flo
 
 
 def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
-    """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label."""
+    """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label.
+
+    Two feet have the line between them, too.
+    """
     feet = {foot.frame for foot in view.robot.feet}
     picture: Picture = {}
     aside = np.array([0.0, 0.12, 0.03])  # of the first label; the next one stands on the other side
@@ -79,6 +82,11 @@ def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
         if not foot:
             picture[f"label/{name}"] = shapes.label(at + aside, name, 0.035)
             aside = aside * [1.0, -1.0, 1.0]
+    ends = [np.array([*np.asarray(places[name], dtype=np.float64)[:2], _LIFTED]) for name in places if name in feet]
+    if len(ends) == 2:
+        way = ends[1] - ends[0]
+        length = float(np.linalg.norm(way))
+        picture["line"] = shapes.rod(ends[0], geometry.frame_along(way / length), length, _LIFTED, GREYS[1])
     return picture
 
 
