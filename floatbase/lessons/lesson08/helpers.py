@@ -17,7 +17,7 @@ from floatbase.simulation import Rollout
 
 MU = 0.7
 PERIOD = 2e-3  # s, between ticks of the records: half the work of 1 ms, and nothing else changes
-SLOW_PERIOD = 4e-3  # s, of exercise 08.4: what it judges changes by 1 % or less
+SLOW_PERIOD = 4e-3  # s, of exercise 08.4: what it judges changes by about 2 %
 BACK = 0.06  # m by which RR stands further back in exercise 08.1
 CRAWL = 6.0  # s of exercise 08.4
 _EVERY = 3  # rows of a record from one look at the margin to the next: 12 ms of a crawl
