@@ -127,9 +127,9 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
 def drawn_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
     """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot be drawn."""
     of_kind("contacts", contacts, Contacts)
-    drawn = [contact.k == 3 * len(contact.point_names) for contact in contacts]
+    drawn = np.array([contact.k == 3 * len(contact.point_names) for contact in contacts], dtype=bool)
     names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
-    return contacts.only(*names), np.repeat(drawn, [contact.k for contact in contacts])
+    return contacts.only(*names), np.repeat(drawn, np.array([contact.k for contact in contacts], dtype=int))
 
 
 def lifted_at(rollout: Rollout, row: int) -> frozenset[str]:
