@@ -19,6 +19,7 @@ from floatbase.viewer import GREYS, hexadecimal
 
 PAN, LIFT, ELBOW = 0, 1, 2
 MOVING = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+FEET = ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
 DIFFERENCE = 1e-6  # of a central difference with 1e-4, in numbers of the order of 1 to 10
 
 
@@ -149,6 +150,9 @@ def test_four_feet_travel_that_are_neither_lifted_nor_slip(phase: float) -> None
     assert np.all(np.sign(gone[:, 1]) == np.sign(phase) * np.array([-1, -1, 1, 1]))
     assert abs(gone[:, 1]).min() > 15
     assert record.slip(rolling=False).max() < 0.002
+    omega = np.array([[record.state(i).frame_velocity(f)[3:] for f in FEET] for i in range(0, len(record), 10)])
+    rolled = 1000 * 0.02 * np.cross(omega, [0.0, 0.0, record.contacts["RL_foot"].radius]).sum(axis=0)  # mm; 0.02 s each
+    assert abs(rolled - gone)[:, 1].max() < 2  # what the contact of the engine gives way
     assert record.measured[:, 2::3].min() > 5
 
 
