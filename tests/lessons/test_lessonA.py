@@ -151,7 +151,7 @@ def test_four_feet_travel_that_are_neither_lifted_nor_slip(phase: float) -> None
     assert abs(gone[:, 1]).min() > 15
     assert record.slip(rolling=False).max() < 0.002
     omega = np.array([[record.state(i).frame_velocity(f)[3:] for f in FEET] for i in range(0, len(record), 10)])
-    rolled = 1000 * 0.02 * np.cross(omega, [0.0, 0.0, record.contacts["RL_foot"].radius]).sum(axis=0)  # mm; 0.02 s each
+    rolled = 1000 * 0.02 * np.cross(omega, [0.0, 0.0, fb.load("go2").feet[0].radius]).sum(axis=0)  # mm; 0.02 s each
     assert abs(rolled - gone)[:, 1].max() < 2  # what the contact of the engine gives way
     assert record.measured[:, 2::3].min() > 5
 
