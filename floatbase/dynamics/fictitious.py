@@ -34,12 +34,12 @@ class BiasForces(Value):
 
     @property
     def fictitious(self) -> Array:
-        """The part that comes from moving along curved coordinates, shape (nv,): C v."""
+        """The part that comes from moving along coordinates that curve or turn, shape (nv,): C v."""
         return read_only(self.centrifugal + self.coriolis)
 
     @property
     def total(self) -> Array:
-        """h(q, v), shape (nv,)."""
+        """h(q, v), shape (nv,), for the axes that the parts are for."""
         return read_only(self.gravity + self.centrifugal + self.coriolis)
 
 
@@ -48,6 +48,8 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
 
     axes: of the base's velocity, acceleration, force and moment: its own, as in v, which turn and so have m ω × v_lin as a
         Coriolis force; or the world's. A robot without a floating base has the same parts in both.
+
+    Raises `InputError` for other axes.
     """
     of_kind("state", state, State)
     if not isinstance(axes, str) or axes not in ("base", "world"):

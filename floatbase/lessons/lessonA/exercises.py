@@ -121,7 +121,9 @@ EXERCISES = (
                 "That is all of h with both moving: gravity and what each feels alone are in it.": lambda: _both(False),
                 "Without gravity, but what each joint makes alone is still in it.": lambda: _both(True),
                 "That is half of it: the sum over i and j has the pair twice, as (i, j) and as (j, i).": lambda: 0.5 * _pair(),
-                "That is the pair four times over: h(lift + elbow) - h(lift - elbow) has it twice.": lambda: 2.0 * _pair(),
+                "That is twice the pair: it stands in h(lift + elbow), and with the other sign in h(lift - elbow).": lambda: (
+                    2.0 * _pair()
+                ),
                 "Those are other joints: counted from 0, lift is 1 and elbow 2.": lambda: _pair(ELBOW, ELBOW + 1),
                 "Those are pan and lift: counted from 0, lift is 1 and elbow 2.": lambda: _pair(0, 1),
             },
