@@ -87,8 +87,8 @@ class ActiveSetRun(Value):
     """The answer of `active_set` and the way to it.
 
     solution: the optimum, with its multipliers; where the run was stopped, the point it had come to, all multipliers 0.
-    iterations: from a feasible point to the optimum, objective falling.
-    phase_one: from the start to that feasible point, violation falling; empty when the start was feasible.
+    iterations: from a feasible point to the optimum, objective never rising.
+    phase_one: from the start to that feasible point, violation never rising; empty when the start was feasible.
     working: names of the rows in W at the end, which the next problem can start from.
     finished: whether the end is the optimum. A run that was stopped has a point that satisfies all rows once `iterations` holds
         any; before, in phase 1, it may violate some.
@@ -119,7 +119,7 @@ def active_set(
 
     Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum, is not
     convex or does not let the method end on its rows, `UnknownNameError` for a row that does not exist, `InputError` for a
-    start of another shape.
+    start of another shape or a `most` below 1.
     """
     space, problem = of_kind("qp", qp, QP).equality_space, qp.reduced
     rows = _independent_rows(problem, [_index(qp, name) for name in texts("working", working)])

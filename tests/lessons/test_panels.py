@@ -94,6 +94,14 @@ def test_a_panel_holds_its_picture_once_it_is_displayed(view: fb.Viewer, beside:
     assert "<iframe" in picture.value
 
 
+def test_a_panel_without_a_view_shows_what_its_function_returns() -> None:
+    panel = slider_panel(None, lambda x: f"<img alt='{x:.1f}'>", x=(0.0, 1.0, 2.0))
+    panel._repr_mimebundle_()
+    assert panel.view is None and panel.children == (panel.note, panel.sliders["x"])
+    panel.sliders["x"].value = 2.0
+    assert panel.note.value == "<img alt='2.0'>"
+
+
 class Pushed:
     """What a reader can touch of a push panel, and the run behind it."""
 

@@ -88,6 +88,10 @@ _WAYS = (
         "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of equal rows the first.",
         (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
     ),
+    _Way(
+        "A speed of 1e-7 is zero and rounding: such a row is not in the way. Let 1e-6 be the limit.",
+        (1, 0), [[1e-7, 1]], [0], [], (1.0, None),
+    ),
 )  # fmt: skip
 
 
@@ -213,7 +217,7 @@ STEP = '''def longest_step(x, p, G, h, W):
     slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
     for i in range(len(h)):
-        if i not in W and speed[i] > 1e-9 and slack[i] < length * speed[i]:
+        if i not in W and speed[i] > 1e-6 and slack[i] < length * speed[i]:
             length, blocking = slack[i] / speed[i], i
     return length, blocking'''
 

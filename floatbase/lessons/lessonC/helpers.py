@@ -145,7 +145,7 @@ def longest_step(x: Array, p: Array, G: Array, h: Array, W: Sequence[int]) -> tu
     slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
     for i in range(len(h)):
-        if i not in W and speed[i] > 1e-9 and slack[i] < length * speed[i]:
+        if i not in W and speed[i] > 1e-6 and slack[i] < length * speed[i]:
             length, blocking = float(slack[i] / speed[i]), i
     return length, blocking
 
