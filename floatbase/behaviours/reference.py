@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, sealed
 from floatbase.affine import Affine
 from floatbase.behaviours.gait import SAME_TIME, Gait
 from floatbase.behaviours.lipm import LIPM
@@ -18,6 +18,7 @@ from floatbase.robots import State
 Motion: TypeAlias = tuple[Array, Array, Array]  # position, velocity, acceleration
 FREE = 1e6  # N: a bound that no robot of the catalogue reaches
 _SPEEDING = 1.0  # m/s² and rad/s²: a jump of the desired velocity makes robots fall
+_NO_VECTOR = sealed(np.zeros(3))
 _THIN = 1e-3  # part of the feet's extent: what is thinner shows no slope
 
 
@@ -91,21 +92,25 @@ class Reference:
 
     def on_ground(self, foot: str, xy: Array) -> Array:
         """Where a foot's frame is when it stands at (2,) m; (3,) m, world."""
-        return np.array([*xy, self.nominal[foot][2] + self.ground(xy)[0]])
+        return np.array([*xy, self.nominal[foot][2] + self._height(xy)])
+
+    def _height(self, xy: Array) -> float:
+        """Of the ground at (2,) m: `ground`, without its checks, as it is asked several times a tick."""
+        return float(self.ground.A[0] @ xy + self.ground.b[0])
 
     def com(self, t: float) -> Motion:
         """Target of the centre of mass at t in s: the plan, at the posture's height above the ground."""
         assert self.plan is not None
         x, v, a = self.plan(t)
         slope = self.ground.A[0]
-        height = self.standing.com[2] + self.ground(x)[0]
-        return np.array([*x, height]), np.array([*v, slope @ v]), np.array([*a, slope @ a])
+        height = self.standing.com[2] + self._height(x)
+        return sealed(np.array([*x, height])), sealed(np.array([*v, slope @ v])), sealed(np.array([*a, slope @ a]))
 
     def base(self, t: float) -> Motion:
         """Target of the base's rotation at t in s: as in the posture, turned by the path's yaw."""
         yaw = self.yaw + self.velocity[2] * (t - self.time)
-        rotation = about_z(yaw) @ self.standing.frame_pose("base").rotation
-        return rotation, np.array([0.0, 0.0, self.velocity[2]]), np.zeros(3)
+        rotation = sealed(about_z(yaw) @ self.standing.frame_pose("base").rotation)
+        return rotation, sealed(np.array([0.0, 0.0, self.velocity[2]])), _NO_VECTOR
 
     def foot(self, foot: str, t: float) -> Motion:
         """Target of a foot in the air at t in s; where it stands otherwise."""

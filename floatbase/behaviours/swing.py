@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from floatbase._arrays import Array, Value, checked, number, positive, read_only
 from floatbase.errors import InputError
@@ -18,7 +19,7 @@ class Swing(Value):
     lift, land: s, when it begins and ends.
     height: m, of the bump, half-way.
 
-    It may be aimed elsewhere at every tick: the value with another `end`. Raises `InputError` for numbers that do not fit.
+    It may be aimed elsewhere at every tick, by `towards`. Raises `InputError` for numbers that do not fit.
     """
 
     start: Array
@@ -35,6 +36,12 @@ class Swing(Value):
         object.__setattr__(self, "height", positive("height", self.height, "m", allow_zero=True))
         if not self.land > self.lift:
             raise InputError(f"the foot lifts at {self.lift:g} s and lands at {self.land:g} s; it must land later.")
+
+    def towards(self, end: npt.ArrayLike) -> Swing:
+        """The same path to another end, (3,), m, world; cheap enough for the loop."""
+        other = object.__new__(Swing)
+        vars(other).update(vars(self), end=checked("end", end, (3,), "m"))
+        return other
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
         """Position, m, velocity, m/s, and acceleration, m/s², shape (3,) each, at time t in s; at rest before and after.

@@ -361,7 +361,7 @@ class Walk(Fixed):
             for foot, each in now.swinging.items():
                 if each.path.land == land:
                     end = self._within_reach(foot, each.planned[:2] + shift, body)
-                    each.path = replace(each.path, end=now.on_ground(foot, end))
+                    each.path = each.path.towards(now.on_ground(foot, end))
 
     def _within_reach(self, foot: str, end: Array, body: Array) -> Array:
         """The foothold nearest to `end`, (2,) m, that the leg reaches from the body, (2,) m, and that is on the foot's side."""

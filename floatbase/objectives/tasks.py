@@ -22,6 +22,7 @@ from floatbase._arrays import (
     Array,
     Value,
     checked,
+    cross,
     flat_forces,
     function,
     number,
@@ -41,6 +42,7 @@ Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike | tuple[npt.
 _ZERO3 = (0.0, 0.0, 0.0)
 _ALL_THREE = "all three together, as in lambda t: (position, velocity, acceleration)"
 _ROTATION_TOLERANCE = 1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
+_IDENTITY = sealed(np.eye(3))
 _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 
 
@@ -361,8 +363,8 @@ def nearest_rotation(name: str, R: Array) -> Array:
     Raises `InputError` where R Rᵀ is off by more than 1e-6 of the identity, or R mirrors.
     """
     R = checked(f"rotation of {name}", R, (3, 3))
-    error = np.max(np.abs(R @ R.T - np.eye(3))) if np.all(np.isfinite(R)) else np.inf
-    if not error <= _ROTATION_TOLERANCE or np.linalg.det(R) < 0:
+    error = np.max(np.abs(R @ R.T - _IDENTITY))
+    if not error <= _ROTATION_TOLERANCE or cross(R[0], R[1]) @ R[2] < 0:
         raise InputError(f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, determinant +1.")
     if error < _ROTATION_ROUNDING:
         return R
