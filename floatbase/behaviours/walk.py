@@ -39,7 +39,7 @@ _REACH, _REACH_FLAT = 0.2, 0.3  # m
 _LOAD = 2.0  # times its even share of the weight: the normal force from which a ramp comes down
 _SOFT = 1e4  # weight of contacts that must give way, beside 10 of the tasks
 _FASTEST = 10.0  # m/s and rad/s: more is a slip of units
-_HISTORY = 2000  # changes of stance that are kept: minutes of walking
+_HISTORY = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
 @dataclass(frozen=True)
