@@ -19,11 +19,12 @@ import numpy.typing as npt
 
 from floatbase._arrays import LARGEST, Array
 from floatbase.affine import Quadratic
-from floatbase.errors import unknown_name
+from floatbase.errors import FloatbaseError, unknown_name
 from floatbase.lessons import progress
 from floatbase.lessons.rounding import about
 
 TRIES = 2  # so many before `reveal` shows a solution
+_NO_ANSWER = "There is no answer yet: replace the placeholder by your expression."
 NEAR = 0.02  # of the right value: as much as a number with two digits may spoil
 
 
@@ -38,13 +39,30 @@ class Verdict:
         return f"{'✓ Right.' if self.right else '✗ Not yet.'} {self.text}"
 
 
+def least_point(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
+    """The least point, (n,), of a cost that a learner gives, or a `Verdict` that says what is wrong with the cost.
+
+    answer: whatever a learner may give. n: how many numbers it is to be on. block: their name. hint: where they are others.
+    """
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, _NO_ANSWER)
+    if not isinstance(answer, Quadratic):
+        return Verdict(False, f"Give the cost, an fb.Quadratic on {block}, not its minimiser or {type(answer).__name__}.")
+    if answer.n != n:
+        return Verdict(False, f"This is a cost on {answer.n} numbers; {block} has {n}.{hint and f' {hint}'}")
+    try:
+        return answer.minimiser()
+    except FloatbaseError as error:
+        return Verdict(False, f"It has no least point: {error}")
+
+
 def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
     """The answer as an array of finite numbers in one of `shapes`, or a `Verdict` that says what is wrong with it.
 
     answer: whatever a learner may give. shapes: those allowed; a message names the first.
     """
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
+        return Verdict(False, _NO_ANSWER)
     try:
         plain = np.asarray(answer)
         given = np.asarray(plain, dtype=np.float64) if not np.iscomplexobj(plain) else None

@@ -491,3 +491,10 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
     }.items():
         with pytest.raises(InputError, match=told):
             setattr(walk, name, 0.2)
+
+
+@pytest.mark.parametrize("name", ["anymal_kinova", "hyq", "g1"])
+def test_the_other_robots_walk_with_the_same_settings(name: str) -> None:
+    record = run(walk_of(name, Gait.walk if name == "g1" else Gait.trot, (0.2, 0.0)), 3.0)
+    assert record.outcome == "completed"
+    assert np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1  # 2 s, in which it speeds up at 1 m/s²

@@ -10,7 +10,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, least_point
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson04.helpers import DESIRED, tilted
 from floatbase.linear_algebra import rank
@@ -101,16 +101,9 @@ def _first_costs() -> dict[str, Any]:
 def _judge_design(answer: Any) -> Verdict:
     """Any cost on torques whose least point does what exercise 04.3 states."""
     eom = standing_go2()
-    if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
-    if not isinstance(answer, fb.Quadratic):
-        return Verdict(False, f"Give the cost, an fb.Quadratic on torques, not its minimiser or {type(answer).__name__}.")
-    if answer.n != eom.d:
-        return Verdict(False, f"This is a cost on {answer.n} numbers; on torques it has 12. Pull it back through η.")
-    try:
-        tau = answer.minimiser()
-    except fb.FloatbaseError as error:
-        return Verdict(False, f"It has no least point: {error}")
+    tau = least_point(answer, eom.d, "τ", "Pull it back through η.")
+    if isinstance(tau, Verdict):
+        return tau
     eta, zeta = fb.accelerations_from_torques(eom), fb.forces_from_torques(eom)
     a = eom.state.com_jacobian @ eta(tau)
     turning = np.linalg.norm(eta(tau)[3:6])

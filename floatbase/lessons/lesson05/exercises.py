@@ -10,7 +10,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, least_point
 from floatbase.lessons.lesson03 import standing_go2, standing_still
 from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, three_feet
 from floatbase.lessons.rounding import about
@@ -144,16 +144,9 @@ def _first_design() -> dict[str, Any]:
 def _judge_design(answer: Any) -> Verdict:
     """Any cost on λ whose least point does what exercise 05.4 states, on paper and on the physics."""
     eom = standing_go2()
-    if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
-    if not isinstance(answer, fb.Quadratic):
-        return Verdict(False, f"Give the cost, an fb.Quadratic on λ, not its minimiser or {type(answer).__name__}.")
-    if answer.n != eom.k:
-        return Verdict(False, f"This is a cost on {answer.n} numbers; λ has {eom.k}.")
-    try:
-        forces = answer.minimiser()
-    except fb.FloatbaseError as error:
-        return Verdict(False, f"It has no least point: {error}")
+    forces = least_point(answer, eom.k, "λ")
+    if isinstance(forces, Verdict):
+        return forces
     return _wrong_forces(eom, forces) or _on_physics(eom, forces)
 
 
