@@ -29,7 +29,7 @@ from floatbase.control import AnalyticController, Belief
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import ConstantTorques
 from floatbase.qp import table_top
-from floatbase.simulation import Live
+from floatbase.simulation import AlteredSimulation, Live, World
 from floatbase.viewer import plots, programs, recording
 
 ROOMS = (
@@ -191,7 +191,10 @@ EXAMPLES: dict[str, Any] = {
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
     "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02,
     "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
-    "contact_weight": 1e4, "Belief.mass": 1.2, "gravity": False, "velocity_forces": False, "drift": False,
+    "contact_weight": 1e4,
+    "AlteredSimulation.ground": 0.7, "mass": 1.2, "friction": 0.5, 
+    "untouched": ["FL_foot"], "magnets": 20.0, "world": World(mass=1.2),
+    "gravity": False, "velocity_forces": False, "drift": False,
     "unfelt": ["FL_foot"], "underactuated": False, "Belief.cones": False, "belief": Belief(mass=1.2),
 }  # fmt: skip
 
@@ -210,7 +213,7 @@ LEFT_OUT = {
         "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
-        "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
+        "Simulation.advance", "AlteredSimulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
         "vertices", "conflicting_rows", "linear_program", "motion_of", "below_the_body", "target_shapes", "targets_at",
         "QP.objective", "Belief.program", "Belief.check",
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
@@ -231,7 +234,8 @@ LEFT_OUT = {
 }  # fmt: skip
 ALONE = {name for names in LEFT_OUT.values() for name in names}
 SELVES: dict[str, Any] = {
-    "Simulation": SIM, "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
+    "Simulation": SIM, "AlteredSimulation": AlteredSimulation(ROBOT),
+    "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
     "AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "HydraulicActuators": HYDRAULIC,
     "Walk": WALK, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)),
     "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
