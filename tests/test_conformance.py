@@ -24,6 +24,7 @@ import pytest
 from values import CONTACTS, CONTROLLER, EOM, HYDRAULIC, RECORD, ROBOT, STATE, UP, VALUES
 
 import floatbase as fb
+from floatbase.actuators import Delay, FirstOrderLag
 from floatbase.behaviours import Gains, Gait, Stand, Walk
 from floatbase.control import AnalyticController, Belief
 from floatbase.errors import FloatbaseError
@@ -125,7 +126,8 @@ EXAMPLES: dict[str, Any] = {
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "axes": "world", "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
     "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
-    "plot_roses.axis": POLAR, "rolling": True, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
+    "plot_roses.axis": POLAR, "rolling": True, "azimuth": 10.0, "b": ZERO, "background": "dark", "bandwidth": 10.0,
+    "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,
     "bulk_modulus": 1.3e9,
     "column": "force", "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,
@@ -134,7 +136,8 @@ EXAMPLES: dict[str, Any] = {
     "control_period": 0.002, "controller": CONTROLLER, "corners": TALOS.feet[0].corners,
     "cost": fb.Quadratic.zero(SPACE.dimension), "cost_on_qdd": fb.Quadratic.zero(18), "crank": 0.045, "curvature": (1.0, 2.0),
     "digits": 3, "force_weight": 1.0, "kinds": QP.inequality_names[0].kind, "moment_weight": 1.0,
-    "damping": 10.0, "dead_volume": 8e-6, "direction": np.ones(6), "distance": 1.0, "dt": 1e-3, "duration": 0.002,
+    "damping": 10.0, "dead_volume": 8e-6, "delay": 0.01,
+    "direction": np.ones(6), "distance": 1.0, "dt": 1e-3, "duration": 0.002,
     "dv": np.zeros(18), "elevation": 10.0, "eom": EOM, "equality_names": tuple("abcdefghijkl"), "extra": {},
     "f": fb.Affine(np.eye(12), ZERO), "facets": 4, "View.feet": True, "feet": ["FL_foot"], "load_urdf.feet": ["tool0"],
     "floor": 1e-6,
@@ -237,6 +240,7 @@ SELVES: dict[str, Any] = {
     "Simulation": SIM, "AlteredSimulation": AlteredSimulation(ROBOT),
     "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
     "AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "HydraulicActuators": HYDRAULIC,
+    "Delay": Delay(ROBOT, 0.01), "FirstOrderLag": FirstOrderLag(ROBOT, 10.0),
     "Walk": WALK, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)),
     "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
     "ConstantTorques": ConstantTorques(ZERO),
