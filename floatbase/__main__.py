@@ -42,16 +42,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _view(options: argparse.Namespace) -> int:
     """Show a robot until Ctrl-C or SIGTERM."""
-    from floatbase.playground import Playground  # loads MuJoCo and the viewer, which the other commands do without
+    from floatbase.playground import Playground, Settings  # loads MuJoCo and the viewer, which the other commands do without
 
     ended = threading.Event()
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         robot = fb.load(options.robot)
-        page = Playground(robot, friction=options.friction, background=options.background, port=options.port)
+        settings = Settings(friction=(options.friction, options.friction))
+        page = Playground(robot, settings, background=options.background, port=options.port)
         with closing(page):
             page.start()
-            print(f"{options.robot} at {page.view.url} (end with Ctrl-C)", flush=True)
+            print(f"{options.robot} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
                 page.view.window.open()
             ended.wait()

@@ -62,22 +62,22 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
     def drawn() -> set[str]:
         return {path for path in playground.view.canvas.picture if path.startswith("measured/")}
 
-    page.goto(playground.view.url)
+    page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     control("CoM x [m]", "setValue(0.04)")
-    until(lambda: abs(playground.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work)
+    until(lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work)
     control("facets", "setValue(6)")
     control("friction believed", "setValue(0.3)")
-    until(lambda: abs(playground.mu - 0.3) < 1e-9, work)
-    assert (playground.facets, playground.view.painter.facets) == (6, 6)
+    until(lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9, work)
+    until(lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work)
     picture(page, "bare_page")
     control("pause", "fire()")
     until(lambda: playground.run.status == "paused", work)
     playground.run.close()  # waits for the last slice
-    stopped = playground.sim.time
+    stopped = playground.session.sim.time
     control("on FL_foot", "setValue(false)")
     control("run", "fire()")
-    until(lambda: playground.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
+    until(lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
     assert "measured/FR_foot" in drawn()
 
 
@@ -89,22 +89,22 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground:
         page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
 
     def place() -> np.ndarray:
-        return playground.last.final.com if playground.last else np.zeros(3)
+        return playground.session.last.final.com if playground.session.last else np.zeros(3)
 
-    page.goto(playground.view.url)
-    page.wait_for_function("window.viewer && viewer.gui_controllers['trot']")
+    page.goto(playground.url)
+    page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
     control("forwards [m/s]", "setValue(0.5)")
     control("turn [rad/s]", "setValue(0.5)")
-    control("trot", "setValue(true)")
+    control("gait", "setValue(2)")
     until(lambda: place()[0] > 0.3, work)
     picture(page, "bare_page_walking")
-    control("trot", "setValue(false)")
-    until(lambda: playground.last.contacts_at(-1).names == tuple(playground.stance), work)
+    control("gait", "setValue(0)")
+    until(lambda: playground.session.last.contacts_at(-1).names == tuple(foot.frame for foot in playground.robot.feet), work)
     stopped = place()
     control("CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
     until(lambda: place()[2] < stopped[2] - 0.01, work)
     assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
-    control("step when pushed", "setValue(true)")
+    control("gait", "setValue(1)")
     control("reset", "fire()")
     until(lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05, work)
 
@@ -112,9 +112,9 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground:
 def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
-    page.goto(playground.view.url)
+    page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    page.evaluate("viewer.gui_controllers['push towards [°]'].setValue(-90)")
+    page.evaluate("viewer.gui_controllers['towards [°]'].setValue(-90)")
     page.evaluate("viewer.gui_controllers['push [N]'].setValue(40)")
     drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
     arrow = None
@@ -139,7 +139,7 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
 
 @pytest.mark.filterwarnings("error")  # as an exception in the run's thread would be
 def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> None:
-    until(lambda: playground.last is not None)
+    until(lambda: playground.session.last is not None)
     playground.view.close()
     until(lambda: playground.run.status != "running")
     assert "window is closed" in playground.run.status
@@ -174,6 +174,6 @@ def test_the_control_period_leaves_room_and_the_robot_where_it_stood(go2: Robot)
 def test_robots_without_point_feet_run_too(name: str) -> None:
     playground = Playground(load(name))
     playground.start()
-    until(lambda: playground.sim.time >= 0.05)
+    until(lambda: playground.session.sim.time >= 0.05)
     assert playground.run.status == "running"
     playground.close()
