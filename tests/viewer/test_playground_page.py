@@ -65,7 +65,7 @@ def test_a_challenge_is_begun_and_solved_and_tells_so(page, field: Playground) -
 
 
 def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, field: Playground) -> None:
-    """Too light by a third, its plan lacks 0.5 m g, which only kp times the error in height makes up for: 0.5 g / kp = 49 mm."""
+    """Its plan lacks 0.5 m g, which only kp times the error in height makes up for: it sinks by 0.5 g / kp = 49 mm."""
     opened(page, field)
 
     def sunk() -> float:
