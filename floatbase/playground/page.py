@@ -195,7 +195,7 @@ class Playground:
         for name, (attribute, low, high, step) in _PAIRS.items():
             for i, column in enumerate(("believed", "true")):
                 value, changed = getattr(s, attribute)[i], partial(self._set_part, attribute, i)
-                view.slider(f"{name} {column}", changed, value, low, high, step, "what it believes", column)
+                view.slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column)
         self._add_stance()
         self._add_walk()
         where = "its quadratic program"

@@ -48,7 +48,7 @@ def _inertia(record: fb.Rollout, scale: float) -> Picture:
 def _gravity(record: fb.Rollout, scale: float) -> Picture:
     """The weight, as an arrow that ends at the centre of mass: below it there is the ground."""
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
-    words = shapes.label(at - weight, "m g", _TEXT)
+    words = shapes.label(at + [0.0, 0.08, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "m g", _TEXT)
     return {"/m g": shapes.arrow(at - weight, weight, COM, 0.5), "/m g label": words}
 
 
