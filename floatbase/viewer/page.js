@@ -10,10 +10,15 @@ function startViewer() {
   const panel = startPanel(viewer);
   const camera = startCamera(viewer, panel);
   const legend = startLegend(viewer, camera);
+  const manners = startManners(viewer, camera);
   const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
-    set_title: (command) => { part("title").textContent = command.text; },
+    set_views: manners.views,
+    set_title: (command) => {
+      part("title").textContent = command.text;
+      manners.describe(command.text);
+    },
     set_legend: (command) => { legend.show(command.items); },
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
     set_theme: (command) => { document.body.className = command.name; },
@@ -191,7 +196,7 @@ function startPlayer(viewer) {
       if (![...speed.options].some((option) => option.value == requested)) speed.add(new Option(`${requested}×`, requested));
       speed.value = requested;
       animator().mixer.timeScale = command.options.speed;
-      if (command.options.paused) {
+      if (command.options.paused || calm()) {
         animator().pause();
         animator().seek(0);  // the first picture: before this, items that come later are seen, too
       }
