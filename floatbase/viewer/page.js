@@ -108,6 +108,7 @@ function spot(colour, symbol = "patch") {
 
 const LAG = 0.3;  // s by which the camera is behind what it follows, so that it does not shake with every step
 const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
+const WIDE = 1.2;  // width over height of a picture into which the robot fits; a narrower one shows it smaller
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
@@ -143,6 +144,11 @@ function startCamera(viewer, panel) {
   viewer.render = () => {
     const moving = path.length > 0 && go();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
+    const zoom = Math.min(1, (w - 2 * aside()) / h / WIDE);
+    if (zoom != viewer.camera.zoom) {
+      viewer.camera.zoom = zoom;
+      viewer.camera.updateProjectionMatrix();
+    }
     if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
     else viewer.camera.clearViewOffset();
     render();
