@@ -1,4 +1,4 @@
-"""Lesson B, Torque is an abstraction: one cylinder on a test bench, in plain numbers, so quick that a slider can wait for it."""
+"""Lesson B, Torque is an abstraction: one cylinder on a test bench, in plain numbers, quick enough for a slider."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ KNEE = (
 LAMINAR = 1e5  # Pa: as the package's cylinders have it; a test compares both
 PARTS = 5  # of a millisecond
 CORNER = 0.05  # of a loop's bandwidth: where its integral begins
+ROUNDING = 1e-9  # rad
 LEAST = 1e-9  # N·m/s: a valve that changes the torque by less, all open, is left shut
 
 Motion = Callable[[float], tuple[float, float]]
@@ -31,20 +32,20 @@ class Row(NamedTuple):
 
 
 def held_then_turned(speed: float, start: float = 0.15, end: float = 0.6) -> Motion:
-    """The joint is held at its centre until `start`, s, then turned evenly, rad/s, and held again when it has come to `end`, rad.
+    """The joint is held at its centre until `start`, s, then turned evenly, rad/s, and from `end`, rad, on held again.
 
     speed: ≥ 0; the rod goes out.
     """
 
     def motion(t: float) -> tuple[float, float]:
         angle = speed * (t - start)
-        return (0.0, 0.0) if t < start else (angle, speed) if angle < end else (end, 0.0)
+        return (0.0, 0.0) if t < start else (angle, speed) if angle < end - ROUNDING else (end, 0.0)
 
     return motion
 
 
 class Bench:
-    """The hydraulic cylinder of one of go2's knees. The bench holds or turns the joint, whatever its torque; the valve is yours.
+    """The hydraulic cylinder of a knee of go2. The bench holds or turns the joint, whatever its torque; the valve is yours.
 
     `step(u)` tells the valve u, from -1 to 1, and lets a millisecond pass. `torque`, N·m, is what the joint gets, `wanted`
     what it should; `rows` is the record. Equations, spool and steps are those of `Cylinders` and `HydraulicActuators`.
@@ -86,6 +87,12 @@ class Bench:
     def torque(self) -> float:
         """What the joint gets, N·m."""
         return self.lever * (self.area * self.a - self.ring * self.b)
+
+    @property
+    def volumes(self) -> tuple[float, float]:
+        """Of the oil in the chambers A and B, m³."""
+        beta = self.hydraulics.bulk_modulus
+        return self._soft_a * beta, self._soft_b * beta
 
     @property
     def spring(self) -> float:

@@ -18,6 +18,7 @@ WANTED, GOT = np.array([12.0, 12.0, -12.0, -12.0]), np.array([9.0, 15.0, -9.0, -
 LEVER, GAIN = np.array([0.036, 0.036, 0.036, -0.020]), 0.001  # m; 1/N
 NEAR_HOME = 1.0  # mm, of exercise B.3
 MOST_DAMPING = 20.0  # 1/s
+LOST, SOFT = 50.0, 100.0  # mm; 1/s²
 
 
 def _length(gamma: float, sign: float = -1.0) -> float:
@@ -49,8 +50,11 @@ def _judge_gains(answer: Any) -> Verdict:
         return Verdict(False, f"kd = {about(kd)} is more than the {MOST_DAMPING:g} that the measured velocities allow.")
     outcome, off, swing = comes_back(kp, kd)
     far = f"{about(off)} mm off in the end"
-    if outcome != "completed":
-        return Verdict(False, f"{outcome}: far too much kp for this kd. A late torque feeds the swing that it was to end.")
+    if outcome != "completed" or off > LOST:
+        what = far if outcome == "completed" else outcome
+        if kp < SOFT:
+            return Verdict(False, f"{what}: too soft. What leaks pushes it aside before the loops have learned how much it is.")
+        return Verdict(False, f"{what}: far too much kp for this kd. A late torque feeds the swing that it was to end.")
     if off <= NEAR_HOME:
         return Verdict(True, f"{far}: stiff enough for what leaks, and not yet too stiff for a torque that comes late.")
     if swing > off:
@@ -65,15 +69,16 @@ EXERCISES = (
     Exercise(
         name="B.1",
         statement="The torque of an excavator's cylinder on its arm, N·m.",
-        stub="torque = piston * b  # N·m, if crank and cylinder were square; replace by your expression",
+        stub="torque = piston * b  # N·m, if crank and cylinder were square; replace",
+        names=lambda: {"piston": PISTON, "b": CRANK},
         solution="length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(gamma))\ntorque = piston * a * b * np.sin(gamma) / length",
         judge=Numeric(
             right=_torque,
             praise="Force times dℓ/dq: which is the distance of the joint from the line of the cylinder.",
             mistakes={
                 "That would be so if crank and cylinder were square. They are not here.": lambda: PISTON * CRANK,
-                "γ is the angle at the joint, between the crank and the way to the foot. The force goes along the cylinder, so it "
-                "is the angle between crank and cylinder that counts.": lambda: PISTON * CRANK * np.sin(GAMMA),
+                "γ is the angle at the joint, between crank and foot. What counts is the angle between the crank and the "
+                "cylinder, along which the force goes.": lambda: PISTON * CRANK * np.sin(GAMMA),
                 "The cosine is along the crank, and has no lever. And γ is not the angle between crank and cylinder.": lambda: (
                     PISTON * CRANK * np.cos(GAMMA)
                 ),
@@ -102,6 +107,7 @@ EXERCISES = (
         name="B.2",
         statement="What the loop tells the valve in four situations, shape (4,).",
         stub="u = k * (wanted - got)  # shape (4,); replace: an error of the piston's force",
+        names=lambda: {"k": GAIN, "wanted": WANTED, "got": GOT},
         solution="u = k * (wanted / lever - got / lever)",
         judge=Numeric(
             right=_opening(lambda wanted, got: wanted - got),
@@ -124,7 +130,7 @@ EXERCISES = (
                     GAIN * (WANTED - GOT) * np.sign(LEVER)
                 ),
                 "Force is torque divided by the lever, not times it.": lambda: GAIN * (WANTED - GOT) * LEVER,
-                "That opens for what is wanted, and never looks at what is there. Without a measurement it is no loop.": _opening(
+                "That opens for what is wanted, and never looks at what is there: no loop.": _opening(
                     lambda wanted, got: wanted
                 ),
             },
@@ -135,8 +141,8 @@ EXERCISES = (
         name="B.3",
         statement="Gains kp and kd ≤ 20 with which go2 on 5 Hz comes back to within 1 mm.",
         stub="gains = (100.0, 20.0)  # kp in 1/s², kd in 1/s; kd at most 20; replace",
-        solution="gains = (420.0, 20.0)",
+        solution="gains = (490.0, 20.0)",
         judge=_judge_gains,
-        explanation="What leaks is a force, so it leaves go2 aside by an amount ∝ 1/kp; but kp/kd must stay well below 2π · 5 Hz.",
+        explanation="What leaks is a force, so go2 stays aside by an amount ∝ 1/kp; but kp/kd must stay below 2π · 5 Hz.",
     ),
 )

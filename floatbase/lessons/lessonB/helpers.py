@@ -41,4 +41,4 @@ def comes_back(kp: float, kd: float, bandwidth: float = 5.0) -> Return:
     push = fb.Push(PUSH, start=sim.time + BEFORE)
     record = fb.rollout(sim, controller, BEFORE + AFTER, [push], actuators=oil)
     end = 1000.0 * (record.com - state.com)[record.time > record.time[-1] - LAST]
-    return Return(record.outcome, float(np.linalg.norm(end, axis=1).max()), float(np.ptp(end[:, 1])))
+    return Return(record.outcome, float(np.linalg.norm(end, axis=1).max()), float(np.ptp(end, axis=0).max()))

@@ -29,7 +29,7 @@ LASTS = 0.4  # s, of the panel's run
 
 
 def show_crank(view: Viewer, angle: float, torque: float) -> str:
-    """Draw a knee's cylinder, three times as large: its lever, and the pressures that a torque takes, which are returned as text.
+    """Draw a knee's cylinder, three times as large; as text its lever, and the pressures that a torque takes.
 
     angle: °, of the joint from where the lever is longest; the rod goes out as it grows. torque: N·m.
     """
@@ -167,7 +167,8 @@ def _strip(top: float, title: str, span: tuple[float, float], curves: Mapping[st
     heights = [y(values[-1]) for values in curves.values()]
     if abs(heights[0] - heights[1]) < 12.0:  # names must not lie on each other
         up = 1.0 if heights[0] > heights[1] else -1.0
-        heights = [np.mean(heights) + 7.0 * up, np.mean(heights) - 7.0 * up]
+        middle = sum(heights) / 2
+        heights = [middle + 7.0 * up, middle - 7.0 * up]
     for (name, values), at, dash, grey in zip(curves.items(), heights, ("5 4", ""), (GREYS[2], GREYS[1]), strict=True):
         path = " ".join(f"{x(1e-3 * i):.1f},{y(value):.1f}" for i, value in enumerate(values))
         style = f'stroke="{hexadecimal(grey)}" stroke-width="2.5" stroke-dasharray="{dash}"'
