@@ -77,6 +77,7 @@ class HydraulicActuators:
         """Close the valves, with pressures that give torques tau, (d,) N·m, zero by default, as far as the supply goes.
 
         q_joints: (d,) rad, the centre by default. A robot that is to stand from the start needs the torques it stands with.
+        The integrals begin empty: torques are off, by what leaks, until they have learned how much that is.
         """
         cylinders = self.cylinders
         tau = checked("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
