@@ -22,10 +22,10 @@ from floatbase.lessons.lessonB import (
     plot_sway,
     plot_torques,
     plot_watts,
+    run_loop,
     show_crank,
     show_step,
 )
-from floatbase.lessons.lessonB.bench import run_loop
 from floatbase.viewer import GREYS, hexadecimal
 
 ROBOT = judges.load("go2")

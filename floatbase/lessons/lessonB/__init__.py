@@ -1,6 +1,6 @@
 """Lesson B, Torque is an abstraction."""
 
-from floatbase.lessons.lessonB.bench import Bench, held_then_turned
+from floatbase.lessons.lessonB.bench import Bench, held_then_turned, run_loop
 from floatbase.lessons.lessonB.exercises import EXERCISES
 from floatbase.lessons.lessonB.helpers import comes_back
 from floatbase.lessons.lessonB.pictures import (
@@ -15,5 +15,5 @@ from floatbase.lessons.lessonB.pictures import (
 
 __all__ = [
     "AT_JOINT", "EXERCISES", "Bench", "comes_back", "held_then_turned", "plot_lever", "plot_sway", "plot_torques",
-    "plot_watts", "show_crank", "show_step",
+    "plot_watts", "run_loop", "show_crank", "show_step",
 ]  # fmt: skip
