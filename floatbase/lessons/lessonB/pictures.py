@@ -131,11 +131,11 @@ def show_step(bandwidth: float, supply: float, turning: float) -> str:
     hydraulics = replace(Hydraulics(), supply_pressure=supply * BAR)
     rows = run_loop(Bench(held_then_turned(turning), hydraulics=hydraulics), bandwidth, LASTS)
     torques = [row.torque for row in rows]
-    low, high = min(0.0, *torques), max(16.0, *torques)
-    low, high = 10 * np.floor(low / 10), 10 * np.ceil(high / 10)
-    drawn = _strip(0.0, "torque [N·m]", (low, high), {"wanted": [12.0] * len(rows), "got": torques})
+    low, high = np.floor(min(torques) / 20 + 0.02), np.ceil(max(torques) / 20)
+    ticks = 20 * np.linspace(low, high, round(high - low) + 1)
+    drawn = _strip(0.0, "torque [N·m]", ticks, {"wanted": [12.0] * len(rows), "got": torques})
     pressures = {"A": [row.a / BAR for row in rows], "B": [row.b / BAR for row in rows]}
-    drawn += _strip(HEIGHT + GAP, "pressure [bar]", (-20.0, 220.0), pressures)
+    drawn += _strip(HEIGHT + GAP, "pressure [bar]", np.linspace(0.0, 200.0, 5), pressures)
     boiling = sum(min(row.a, row.b) <= VACUUM for row in rows)
     reached = next((row.time for row in rows if abs(row.torque - 12.0) < 0.6), None)
     late = "12 N·m are not reached" if reached is None else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
@@ -145,19 +145,19 @@ def show_step(bandwidth: float, supply: float, turning: float) -> str:
     return f"{svg}<div>{late}; while it turns, {min(torques[150:]):.1f} to {max(torques[150:]):.1f} N·m; {boils}</div>"
 
 
-def _strip(top: float, title: str, span: tuple[float, float], curves: Mapping[str, Sequence[float]]) -> str:
+def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[float]]) -> str:
     """Curves over the panel's time, one strip of SVG: solid and dark the last, dashed the first."""
-    right = WIDTH - 70.0
+    right, low, high = WIDTH - 70.0, ticks[0], ticks[-1]
 
     def x(t: float) -> float:
         return LEFT + (right - LEFT) * t / LASTS
 
     def y(value: float) -> float:
-        return top + HEIGHT * (span[1] - value) / (span[1] - span[0])
+        return float(top + HEIGHT * (high - value) / (high - low))
 
     drawn = f'<text x="14" y="{top + HEIGHT / 2}" font-size="12" text-anchor="middle" '
     drawn += f'transform="rotate(-90 14 {top + HEIGHT / 2})">{title}</text>'
-    for value in np.linspace(*span, 3 if span[1] - span[0] < 100 else 5):
+    for value in ticks:
         drawn += (
             f'<line x1="{LEFT}" y1="{y(value):.1f}" x2="{right}" y2="{y(value):.1f}" stroke="currentColor" opacity="0.15"/>'
         )
