@@ -26,12 +26,11 @@ _ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "n
 
 
 def plot(rollout: Rollout) -> Figure:
-    """A figure of three plots: centre of mass, friction and torques."""
+    """A figure of four plots: centre of mass, normal forces, friction used, torques."""
     checked_rollout(rollout)
-    figure, axes = plt.subplots(3, 1, figsize=(8, 8), sharex=True, layout="constrained")
-    plot_com(rollout, axes[0])
-    plot_friction(rollout, axes[1])
-    plot_torques(rollout, axes[2])
+    figure, axes = plt.subplots(4, 1, figsize=(8, 11), sharex=True, layout="constrained")
+    for plotted, axis in zip((plot_com, plot_forces, plot_friction, plot_torques), axes, strict=True):
+        plotted(rollout, axis)
     axes[0].set_title(f"{rollout.robot.name}: {rollout.outcome}")
     for axis in axes[:-1]:
         axis.set_xlabel("")
