@@ -351,9 +351,9 @@ def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
     assert np.isnan(used[3, -1])
     figure = plots.plot(rollout)
     assert [axis.get_ylabel() for axis in figure.axes] == [
-        "centre of mass moved [mm]", "friction used, of μ · normal force", "torques, of their limits"
+        "centre of mass moved [mm]", "normal forces [N]", "friction used, of μ · normal force", "torques, of their limits"
     ]  # fmt: skip
-    assert MEASURED in [line.get_color() for line in figure.axes[1].lines]
+    assert all(MEASURED in [line.get_color() for line in axis.lines] for axis in figure.axes[1:3])
     forces = plots.plot_forces(rollout)
     np.testing.assert_allclose(forces.lines[1].get_ydata(), rollout.measured[:, 2])
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
