@@ -110,7 +110,7 @@ class PushTogether(widgets.VBox):
         self.button, self.reset = widgets.Button(description="push both"), widgets.Button(description="reset")
         self.button.on_click(lambda _: self.push())
         self.reset.on_click(lambda _: self.begin_anew())
-        self._pictures = {title: widgets.HTML() for title in controllers}
+        self._pictures = {title: widgets.VBox() for title in controllers}
         columns = [
             widgets.VBox([widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]], layout=_HALF)
             for title in controllers
@@ -143,7 +143,7 @@ class PushTogether(widgets.VBox):
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The pictures are put in only here, as those of a slider panel."""
         for title, picture in self._pictures.items():
-            picture.value = self.views[title]._repr_html_()
+            picture.children = [self.views[title].widget()]
         return super()._repr_mimebundle_(**kwargs)
 
 
