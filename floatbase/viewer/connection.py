@@ -183,4 +183,3 @@ class Connection:
         before, self.shown = self.shown, self.scene
         is_kept = wire.page_command("set_kept", kept=self.scene is not self.hub.scene)[1]
         return self.scene.newest, [*self.scene.change_from(before), is_kept]
-

@@ -6,6 +6,7 @@ second.
 
 from __future__ import annotations
 
+import base64
 import io
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
@@ -16,18 +17,24 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw
 
 from floatbase._arrays import Array
-from floatbase.viewer.colours import RGB
+from floatbase.viewer.canvas import ROOT
+from floatbase.viewer.colours import BACKGROUNDS, RGB, hexadecimal
 from floatbase.viewer.lowering import Shape
-from floatbase.viewer.shapes import Item
+from floatbase.viewer.scene import Scene
+from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.text import LETTER, font
 
 FINE = 2  # pixels drawn for each of the image, across and down
 NEAR = 0.05  # m from the camera: what is nearer is not drawn
+_WIDE, _SMALLER = 1.7, 0.8  # width over height, and the size of the image over that of the picture in the page
+_COLOURS = 256
 _AMBIENT, _LIGHT = 0.5, 0.55
 _SUN = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
-_AT_ONCE = 1 << 21  # samples, so that large triangles take no more memory than small ones
+_AT_ONCE = 1 << 20  # samples, so that many triangles take no more memory than few
+_PIECE = 32  # pixels: a box around a longer triangle has much that is not in the triangle
+_ALIKE = 8  # pixels: boxes whose sides differ by less are made equal, to be filled together
 
-Image_ = npt.NDArray[np.float32]
+Pixels = npt.NDArray[np.float32]
 
 
 class Camera(NamedTuple):
@@ -53,14 +60,6 @@ class Camera(NamedTuple):
         return 0.5 * self.size[1] / float(np.tan(np.radians(self.angle) / 2))
 
 
-class Caption(NamedTuple):
-    """title: a line at the top. legend: (colour as "#rrggbb", meaning) of each line. text: RGB of both."""
-
-    title: str
-    legend: Sequence[tuple[str, str]]
-    text: RGB
-
-
 class _Mesh(NamedTuple):
     """vertices, normals: (n, 3). faces: (m, 3). colours: (n, 3) from 0 to 1, without light."""
 
@@ -71,41 +70,86 @@ class _Mesh(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    """What triangles cover. at: number of a pixel, row by row. depth: m. colour: (n, 3)."""
+    """What triangles cover. at: number of a pixel, row by row. depth: -1/m, less is nearer. colour: (n, 3)."""
 
     at: npt.NDArray[np.int64]
-    depth: Image_
-    colour: Image_
+    depth: Pixels
+    colour: Pixels
 
 
-def png(
-    items: Sequence[Item], camera: Camera, paper: tuple[RGB, RGB], caption: Caption, colours: int = 255
-) -> bytes:
-    """The image of items as a PNG file.
-
-    items: of a picture. camera: from where; its size is that of the image. paper: RGB of the background at top and bottom.
-    caption: the words. colours: how many the image may have: fewer make a smaller file.
-    """
-    fine = camera._replace(size=(FINE * camera.size[0], FINE * camera.size[1]))
-    canvas = _paper(fine.size, paper)
-    kinds = [item.shape.lowered["object"]["type"] for item in items]
-    _draw_lines([item for item, kind in zip(items, kinds, strict=True) if kind == "LineSegments"], fine, canvas)
-    _draw_meshes([item for item, kind in zip(items, kinds, strict=True) if kind == "Mesh"], fine, canvas)
+def png(picture: Picture, scene: Scene, height: int) -> bytes:
+    """A picture as a PNG file, with the settings of its scene: camera, background, title and legend. height: in the page."""
+    size = round(_WIDE * _SMALLER * height), round(_SMALLER * height)
+    background = BACKGROUNDS[_setting(scene, "set_theme", {"name": "light"})["name"]]
+    canvas, camera = (
+        _paper((FINE * size[0], FINE * size[1]), background),
+        _camera(picture, scene, (FINE * size[0], FINE * size[1])),
+    )
+    kinds: dict[str, list[Item]] = {"LineSegments": [], "Mesh": [], "Sprite": []}
+    for item in picture.values():
+        kinds[item.shape.lowered["object"]["type"]].append(item)
+    _draw_lines(kinds["LineSegments"], camera, canvas)
+    _draw_meshes(kinds["Mesh"], camera, canvas)
     image = Image.fromarray(np.clip(255.0 * canvas + 0.5, 0, 255).astype(np.uint8))
-    _draw_labels([item for item, kind in zip(items, kinds, strict=True) if kind == "Sprite"], fine, image)
-    _draw_caption(caption, image)
+    _draw_labels(kinds["Sprite"], camera, image)
+    _draw_caption(scene, background[3], image)
+    return _file(image.reduce(FINE))
+
+
+def beside(files: Sequence[bytes]) -> bytes:
+    """Several PNG files of pictures as one, from left to right."""
+    images = [Image.open(io.BytesIO(file)).convert("RGB") for file in files]
+    whole = Image.new("RGB", (sum(image.width for image in images), max(image.height for image in images)), "white")
+    for i, image in enumerate(images):
+        whole.paste(image, (sum(before.width for before in images[:i]), 0))
+    return _file(whole)
+
+
+def with_image(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What a notebook stores of a widget, and beside it an image of the pictures in it, for wherever no widget can be.
+
+    bundle: of the widget, as `_repr_mimebundle_` returns it. pictures: widgets of viewers.
+    """
+    data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
+    files = [picture.still for picture in pictures if getattr(picture, "still", b"")]  # a scene that needs no kernel has none
+    if files:
+        data = {**data, "image/png": base64.b64encode(beside(files) if len(files) > 1 else files[0]).decode()}
+    return data, metadata
+
+
+def _file(image: Image.Image) -> bytes:
     file = io.BytesIO()
-    image.reduce(FINE).quantize(colours, dither=Image.Dither.NONE).save(file, "png", optimize=True)
+    image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, "png")
     return file.getvalue()
 
 
-def _paper(size: tuple[int, int], paper: tuple[RGB, RGB]) -> Image_:
+def _setting(scene: Scene, kind: str, default: dict[str, Any]) -> dict[str, Any]:
+    return scene.command(("/", kind, "")) or default
+
+
+def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
+    """The camera where it was set, gone with what it follows."""
+    set_to = _setting(scene, "set_camera", {"position": [2.0, 1.0, 0.0], "target": [0.0, 0.0, 0.0], "fov": 32.0})
+    eye, target = (_ours(set_to[name]) for name in ("position", "target"))
+    follow = _setting(scene, "set_follow", {"node": ""})
+    item = picture.get(follow["node"].removeprefix(ROOT))
+    gone = np.zeros(3) if item is None else (item.matrix[:3, 3] - _ours(follow["from"])) * [1.0, 1.0, 0.0]
+    return Camera(eye + gone, target + gone, set_to["fov"], size)
+
+
+def _ours(point: Sequence[float]) -> Array:
+    """A point of three.js, y up, in our coordinates, z up: the inverse of `wire`'s."""
+    x, y, z = point
+    return np.array([x, -z, y])
+
+
+def _paper(size: tuple[int, int], background: tuple[RGB, ...]) -> Pixels:
     down = np.linspace(0.0, 1.0, size[1], dtype=np.float32)[:, None, None]
-    top, bottom = (np.array(colour, dtype=np.float32) for colour in paper)
+    top, bottom = (np.array(colour, dtype=np.float32) for colour in background[:2])
     return np.ascontiguousarray(np.broadcast_to(top + down * (bottom - top), (size[1], size[0], 3)))
 
 
-def _draw_lines(items: Sequence[Item], camera: Camera, canvas: Image_) -> None:
+def _draw_lines(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
     image = Image.fromarray((255.0 * canvas).astype(np.uint8))
     draw = ImageDraw.Draw(image)
     for item in items:
@@ -118,9 +162,9 @@ def _draw_lines(items: Sequence[Item], camera: Camera, canvas: Image_) -> None:
     canvas[:] = np.asarray(image, dtype=np.float32) / 255.0
 
 
-def _draw_meshes(items: Sequence[Item], camera: Camera, canvas: Image_) -> None:
+def _draw_meshes(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
     """Opaque meshes first, then translucent ones from far to near, then what is drawn over whatever is in front of it."""
-    pixels, depth = canvas.reshape(-1, 3), np.full(canvas.shape[0] * canvas.shape[1], np.inf, dtype=np.float32)
+    pixels, depth = canvas.reshape(-1, 3), np.full(canvas.shape[0] * canvas.shape[1], 0.0, dtype=np.float32)
     opaque = [item for item in items if _opacity(item) >= 1.0 and not _is_on_top(item)]
     for item in opaque:
         for samples in _samples(item, camera):
@@ -133,19 +177,19 @@ def _draw_meshes(items: Sequence[Item], camera: Camera, canvas: Image_) -> None:
             before = samples.depth < depth[samples.at]
             _tint(_Samples(*(part[before] for part in samples)), _opacity(item), _hides_back(item), pixels)
     for item in (item for item in items if _is_on_top(item)):
-        over = np.full_like(depth, np.inf)
+        over = np.zeros_like(depth)
         for samples in _samples(item, camera):
             _cover(samples, pixels, over)
 
 
-def _cover(samples: _Samples, pixels: Image_, depth: Image_) -> None:
+def _cover(samples: _Samples, pixels: Pixels, depth: Pixels) -> None:
     """Draw the nearest of the samples where it is nearer than what is there."""
     np.minimum.at(depth, samples.at, samples.depth)
     seen = samples.depth == depth[samples.at]
     pixels[samples.at[seen]] = samples.colour[seen]
 
 
-def _tint(samples: _Samples, opacity: float, only_nearest: bool, pixels: Image_) -> None:
+def _tint(samples: _Samples, opacity: float, only_nearest: bool, pixels: Pixels) -> None:
     """Lay translucent samples over what is there; those of one pixel count as layers of their mean colour."""
     where, which, layers = np.unique(samples.at, return_inverse=True, return_counts=True)
     rest = (1.0 - opacity) ** (np.ones_like(layers) if only_nearest else layers)
@@ -164,37 +208,61 @@ def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
         towards = np.sign(np.sum(normals * (camera.eye - points), axis=1))  # both sides of a surface are lit
         light = _AMBIENT + _LIGHT * np.maximum(towards * (normals @ _SUN), 0.0)
         colours = np.minimum(colours * light[:, None], 1.0)
-    corners = camera.project(points)[mesh.faces].astype(np.float32)
-    corners_colours = colours[mesh.faces].astype(np.float32)
-    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
-    seen = (high > 0).all(axis=1) & (low < camera.size).all(axis=1) & (corners[:, :, 2] > NEAR).all(axis=1)
-    wide = np.ceil(np.minimum(high, camera.size) - np.maximum(low, 0.0)).max(axis=1) + 1.0
-    side = 2
-    while side < 2 * max(camera.size):
-        rows = np.flatnonzero(seen & (wide <= side) & ((wide > side // 2) | (side == 2)))
-        step = max(_AT_ONCE // side**2, 1)
+    seen = camera.project(points)
+    ahead = (seen[:, 2] > NEAR)[mesh.faces].all(axis=1)
+    seen[:, 2] = -1.0 / np.maximum(seen[:, 2], NEAR)  # linear over a triangle in the image, as the distance is not
+    corners = np.concatenate([seen, colours], axis=1)[mesh.faces[ahead]].astype(np.float32)
+    corners, low, sides = _split(corners, camera.size)
+    for wide, tall in np.unique(sides, axis=0).tolist():
+        rows = np.flatnonzero((sides == (wide, tall)).all(axis=1))
+        step = max(_AT_ONCE // (wide * tall), 1)
         for part in (rows[i : i + step] for i in range(0, len(rows), step)):
-            yield _filled(corners[part], corners_colours[part], side, camera.size)
-        side *= 2
+            yield _filled(corners[part], low[part], (wide, tall), camera.size)
 
 
-def _filled(corners: Image_, colours: Image_, side: int, size: tuple[int, int]) -> _Samples:
-    """The pixels in triangles none of which is wider or higher than `side`. corners, colours: (n, 3, 3)."""
-    start = np.floor(np.maximum(corners[:, :, :2].min(axis=1), 0.0)).astype(np.int64)
-    across = np.arange(side)
-    x, y = (start[:, 0, None, None] + across[None, None, :]), (start[:, 1, None, None] + across[None, :, None])
-    (ax, ay), (bx, by), (cx, cy) = (corners[:, i, :2].T[:, :, None, None] for i in range(3))
-    px, py = x + np.float32(0.5), y + np.float32(0.5)
+def _split(corners: Pixels, size: tuple[int, int]) -> tuple[Pixels, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The triangles in the image, long ones in pieces, and of a box around each its first pixel and its sides, powers of two."""
+    while True:
+        a, b, c = (corners[:, i, :2] for i in range(3))
+        low = np.floor(np.maximum(np.minimum(np.minimum(a, b), c), 0.0)).astype(np.int64)
+        high = np.ceil(np.minimum(np.maximum(np.maximum(a, b), c), size)).astype(np.int64)
+        inside = (high > low).all(axis=1)
+        corners, low, sides = corners[inside], low[inside], (high - low)[inside]
+        is_long = sides.max(axis=1) > _PIECE
+        if not is_long.any():
+            return corners, low, -(sides // -_ALIKE) * _ALIKE
+        edges = np.linalg.norm(corners[is_long, :, :2] - np.roll(corners[is_long, :, :2], -1, axis=1), axis=2)
+        turn = (edges.argmax(axis=1)[:, None] + np.arange(3)) % 3  # the longest edge first
+        a, b, c = np.swapaxes(np.take_along_axis(corners[is_long], turn[:, :, None], axis=1), 0, 1)
+        middle = 0.5 * (a + b)
+        halves = [np.stack(half, axis=1) for half in ((a, middle, c), (middle, b, c))]
+        corners = np.concatenate([corners[~is_long], *halves])
+
+
+def _filled(corners: Pixels, start: npt.NDArray[np.int64], sides: tuple[int, int], size: tuple[int, int]) -> _Samples:
+    """The pixels in triangles. corners: (n, 3, 6), place, depth and colour. start, sides: of a box around each, pixels."""
+    (ax, ay), (bx, by), (cx, cy) = (corners[:, i, :2].T for i in range(3))
     area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / area
-        w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / area
-    inside = (v >= 0) & (w >= 0) & (v + w <= 1) & (x < size[0]) & (y < size[1])
-    which, row, column = np.nonzero(inside)
-    weights = np.stack([1.0 - v[inside] - w[inside], v[inside], w[inside]], axis=1)
-    at = (start[which, 1] + row) * size[0] + start[which, 0] + column
-    depth = 1.0 / np.einsum("ni,ni->n", weights, 1.0 / corners[which, :, 2])
-    return _Samples(at, depth.astype(np.float32), np.einsum("ni,nij->nj", weights, colours[which]).astype(np.float32))
+    area = np.where(area == 0.0, np.float32(np.nan), area)  # seen from the side: it covers nothing
+    px, py = (start + 0.5).astype(np.float32).T
+    across, down = (np.arange(side, dtype=np.float32) for side in sides)
+    v = _plane((px - ax) * (cy - ay) - (cx - ax) * (py - ay), cy - ay, ax - cx, area, across, down)
+    w = _plane((bx - ax) * (py - ay) - (px - ax) * (by - ay), ay - by, bx - ax, area, across, down)
+    found = np.flatnonzero((v >= 0.0) & (w >= 0.0) & (v + w <= 1.0))
+    which, rest = np.divmod(found, sides[0] * sides[1])
+    row, column = np.divmod(rest, sides[0])
+    v, w = v.ravel()[found], w.ravel()[found]
+    x, y = start[which, 0] + column, start[which, 1] + row
+    inside = (x < size[0]) & (y < size[1])
+    which, v, w = which[inside], v[inside, None], w[inside, None]
+    mixed = (1.0 - v - w) * corners[which, 0, 2:] + v * corners[which, 1, 2:] + w * corners[which, 2, 2:]
+    return _Samples(y[inside] * size[0] + x[inside], mixed[:, 0], mixed[:, 1:])
+
+
+def _plane(at_start: Pixels, along_x: Pixels, along_y: Pixels, area: Pixels, across: Pixels, down: Pixels) -> Pixels:
+    """A linear function on boxes of pixels, (n, tall, wide), from its value at their first pixels and its slopes."""
+    first, x, y = (part[:, None] / area[:, None] for part in (at_start, along_x, along_y))
+    return (first + y * down)[:, :, None] + (x * across)[:, None, :]
 
 
 def _draw_labels(items: Sequence[Item], camera: Camera, image: Image.Image) -> None:
@@ -209,13 +277,13 @@ def _draw_labels(items: Sequence[Item], camera: Camera, image: Image.Image) -> N
         image.paste(made.convert("RGB"), (round(x - size[0] / 2), round(y - size[1] / 2)), made.getchannel("A"))
 
 
-def _draw_caption(caption: Caption, image: Image.Image) -> None:
-    draw, ink = ImageDraw.Draw(image), tuple(round(255 * part) for part in caption.text)
-    for i, line in enumerate(caption.title.splitlines()):
+def _draw_caption(scene: Scene, text: RGB, image: Image.Image) -> None:
+    draw, ink = ImageDraw.Draw(image), hexadecimal(text)
+    for i, line in enumerate(_setting(scene, "set_title", {"text": ""})["text"].splitlines()):
         draw.text((12 * FINE, 8 * FINE + 1.3 * i * LETTER), line, font=font(), fill=ink)
-    for i, (colour, meaning) in enumerate(reversed(caption.legend)):
-        y = image.size[1] - 12 * FINE - round(1.4 * i * LETTER)
-        draw.rectangle((12 * FINE, y - LETTER // 1.4, 12 * FINE + LETTER // 1.4, y), fill=colour)
+    for i, (colour, meaning, _) in enumerate(reversed(_setting(scene, "set_legend", {"items": []})["items"])):
+        y = image.height - 12 * FINE - round(1.4 * i * LETTER)
+        draw.rectangle((12 * FINE, y - LETTER / 1.4, 12 * FINE + LETTER / 1.4, y), fill=colour)
         draw.text((12 * FINE + 1.1 * LETTER, y), meaning, font=font(), fill=ink, anchor="ls")
 
 

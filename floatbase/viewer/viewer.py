@@ -18,7 +18,7 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import film, marks, page, recording, shapes, walks, wire
+from floatbase.viewer import film, marks, page, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
@@ -373,12 +373,15 @@ class Viewer:
             import ipywidgets
 
             return ipywidgets.HTML(self._frame(), layout=ipywidgets.Layout(width="auto"))
-        return self.window.widget(self.robot.name, self.height)
+        return self.window.widget(self.robot.name, self.height, still.png(self.canvas.picture, self.window.scene, self.height))
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        """The live picture, and an image of it for wherever no widget can be."""
         if self._is_still:
-            return {"text/html": self._frame(), "text/plain": repr(self)}
-        return self.widget()._repr_mimebundle_(**kwargs)
+            return {"text/html": self._frame()}
+        picture = self.widget()
+        data, metadata = still.with_image(picture._repr_mimebundle_(**kwargs), picture)
+        return {**data, "text/plain": repr(self)}, metadata
 
     @property
     def _is_still(self) -> bool:

@@ -18,7 +18,7 @@ import floatbase as fb
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.panels import live
 from floatbase.simulation import Live, Rollout, advice
-from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, shapes
+from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, shapes, with_image
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
@@ -144,7 +144,7 @@ class PushTogether(widgets.VBox):
         """The pictures are put in only here, as those of a slider panel."""
         for title, picture in self._pictures.items():
             picture.children = [self.views[title].widget()]
-        return super()._repr_mimebundle_(**kwargs)
+        return with_image(super()._repr_mimebundle_(**kwargs), *(picture.children[0] for picture in self._pictures.values()))
 
 
 def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:
