@@ -1,8 +1,8 @@
 """The picture in a notebook: a widget whose frames travel over the kernel's own connection, as a slider's values do.
 
 So it works wherever sliders work, with no port of its own: JupyterLab, Notebook, VS Code, Colab, a hub, Voilà. The widget is
-`anywidget`'s, which brings what each of these needs in one package and leaves the rest to us: widget.js, which holds the page in
-a frame. The page's code is sent once for each page of the notebook that asks for it.
+`anywidget`'s, which brings what each of these needs in one package and leaves the rest to us: widget.js, which holds the page
+in a frame. The page's code is sent once to each page of the notebook that asks for it.
 """
 
 from __future__ import annotations
@@ -153,4 +153,5 @@ class _Way(Line):
 def _packed() -> tuple[str, tuple[bytes, bytes]]:
     """A name of this version of the page, and its HTML and the viewer's code, each packed by gzip."""
     parts = page.notebook_page().encode(), page.viewer_code()
-    return hashlib.sha256(b"".join(parts)).hexdigest()[:16], tuple(gzip.compress(part, 9, mtime=0) for part in parts)
+    packed = gzip.compress(parts[0], 9, mtime=0), gzip.compress(parts[1], 9, mtime=0)
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:16], packed

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ FINE = 2  # pixels drawn for each of the image, across and down
 NEAR = 0.05  # m from the camera: what is nearer is not drawn
 _WIDE, _SMALLER = 1.7, 0.8  # width over height, and the size of the image over that of the picture in the page
 _COLOURS = 256
-_AMBIENT, _LIGHT = 0.5, 0.55
+_AMBIENT, _LIGHT = 0.62, 0.42
 _SUN = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
 _AT_ONCE = 1 << 20  # samples, so that many triangles take no more memory than few
 _PIECE = 32  # pixels: a box around a longer triangle has much that is not in the triangle
@@ -79,12 +79,9 @@ class _Samples(NamedTuple):
 
 def png(picture: Picture, scene: Scene, height: int) -> bytes:
     """A picture as a PNG file, with the settings of its scene: camera, background, title and legend. height: in the page."""
-    size = round(_WIDE * _SMALLER * height), round(_SMALLER * height)
+    size = FINE * round(_WIDE * _SMALLER * height), FINE * round(_SMALLER * height)
     background = BACKGROUNDS[_setting(scene, "set_theme", {"name": "light"})["name"]]
-    canvas, camera = (
-        _paper((FINE * size[0], FINE * size[1]), background),
-        _camera(picture, scene, (FINE * size[0], FINE * size[1])),
-    )
+    canvas, camera = _paper(size, background), _camera(picture, scene, size)
     kinds: dict[str, list[Item]] = {"LineSegments": [], "Mesh": [], "Sprite": []}
     for item in picture.values():
         kinds[item.shape.lowered["object"]["type"]].append(item)
@@ -119,7 +116,7 @@ def with_image(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, A
 
 def _file(image: Image.Image) -> bytes:
     file = io.BytesIO()
-    image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, "png")
+    image.quantize(_COLOURS, Image.Quantize.FASTOCTREE).save(file, "png")
     return file.getvalue()
 
 
@@ -171,11 +168,8 @@ def _draw_meshes(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
             _cover(samples, pixels, depth)
     others = [item for item in items if _opacity(item) < 1.0 and not _is_on_top(item)]
     for item in sorted(others, key=lambda item: -float(np.linalg.norm(item.matrix[:3, 3] - camera.eye))):
-        found = list(_samples(item, camera))
-        samples = _Samples(*(np.concatenate(part) for part in zip(*found, strict=True))) if found else None
-        if samples is not None:
-            before = samples.depth < depth[samples.at]
-            _tint(_Samples(*(part[before] for part in samples)), _opacity(item), _hides_back(item), pixels)
+        for samples in _together(_samples(item, camera)):
+            _tint(samples, depth, item, pixels)
     for item in (item for item in items if _is_on_top(item)):
         over = np.zeros_like(depth)
         for samples in _samples(item, camera):
@@ -189,12 +183,20 @@ def _cover(samples: _Samples, pixels: Pixels, depth: Pixels) -> None:
     pixels[samples.at[seen]] = samples.colour[seen]
 
 
-def _tint(samples: _Samples, opacity: float, only_nearest: bool, pixels: Pixels) -> None:
-    """Lay translucent samples over what is there; those of one pixel count as layers of their mean colour."""
-    where, which, layers = np.unique(samples.at, return_inverse=True, return_counts=True)
-    rest = (1.0 - opacity) ** (np.ones_like(layers) if only_nearest else layers)
-    mean = np.stack([np.bincount(which, samples.colour[:, i], len(where)) for i in range(3)], axis=1) / layers[:, None]
-    pixels[where] = rest[:, None] * pixels[where] + (1.0 - rest[:, None]) * mean
+def _together(parts: Iterable[_Samples]) -> list[_Samples]:
+    """The parts as one, or none."""
+    all_of = list(parts)
+    at, depth, colour = ([part[i] for part in all_of] for i in range(3))
+    return [_Samples(np.concatenate(at), np.concatenate(depth), np.concatenate(colour))] if all_of else []
+
+
+def _tint(samples: _Samples, depth: Pixels, item: Item, pixels: Pixels) -> None:
+    """Lay what a translucent mesh covers over what is there; samples of one pixel count as layers of their mean colour."""
+    seen = samples.depth < depth[samples.at]
+    where, which, layers = np.unique(samples.at[seen], return_inverse=True, return_counts=True)
+    sums = [np.bincount(which, samples.colour[seen, i], len(where)) for i in range(3)]
+    rest = (1.0 - _opacity(item)) ** (np.ones_like(layers) if _hides_back(item) else layers)[:, None]
+    pixels[where] = rest * pixels[where] + (1.0 - rest) * np.stack(sums, axis=1) / layers[:, None]
 
 
 def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
@@ -221,7 +223,7 @@ def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
 
 
 def _split(corners: Pixels, size: tuple[int, int]) -> tuple[Pixels, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The triangles in the image, long ones in pieces, and of a box around each its first pixel and its sides, powers of two."""
+    """The triangles in the image, long ones in pieces, and of a box around each its first pixel and its sides."""
     while True:
         a, b, c = (corners[:, i, :2] for i in range(3))
         low = np.floor(np.maximum(np.minimum(np.minimum(a, b), c), 0.0)).astype(np.int64)
@@ -291,19 +293,19 @@ def _draw_caption(scene: Scene, text: RGB, image: Image.Image) -> None:
 def _mesh(shape: Shape) -> _Mesh:
     """The triangles of a shape, as `lowering.mesh` packed them."""
     data, material = shape.lowered["geometries"][0]["data"], shape.lowered["materials"][0]
-    vertices = _array(data["attributes"]["position"]) * shape.lowered["object"]["matrix"][0]
+    vertices: Array = _array(data["attributes"]["position"]) * shape.lowered["object"]["matrix"][0]
     faces = _array(data["index"]).reshape(-1, 3).astype(np.int64)
     colours = np.broadcast_to(np.array(_parts(material["color"])) / 255.0, vertices.shape)
     if material["vertexColors"]:
         colours = colours * _array(data["attributes"]["color"]) / 255.0
     if material.get("flatShading"):
-        vertices, colours, faces = vertices[faces].reshape(-1, 3), colours[faces].reshape(-1, 3), np.arange(faces.size)
-        faces = faces.reshape(-1, 3)
+        vertices, colours = vertices[faces].reshape(-1, 3), colours[faces].reshape(-1, 3)
+        faces = np.arange(faces.size, dtype=np.int64).reshape(-1, 3)
     a, b, c = (vertices[faces[:, i]] for i in range(3))
-    normals = np.tile(np.cross(b - a, c - a), (3, 1))
+    normals: Array = np.tile(np.cross(b - a, c - a), (3, 1))
     at = faces.T.ravel()
     summed = np.stack([np.bincount(at, normals[:, i], len(vertices)) for i in range(3)], axis=1)
-    return _Mesh(vertices, summed, faces, colours)
+    return _Mesh(vertices, np.asarray(summed, dtype=np.float64), faces, colours)
 
 
 _TYPES = {"Uint8Array": "u1", "Int16Array": "<i2", "Uint16Array": "<u2", "Uint32Array": "<u4", "Float32Array": "<f4"}
