@@ -1,4 +1,4 @@
-"""Notebooks without Jupyter: pages of a widget that a test plays itself, and a web page that shows widgets as a notebook does."""
+"""Notebooks without Jupyter: pages of a widget that a test plays itself, and a web page that shows widgets as notebooks do."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 import queue
 import threading
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import tornado.httpserver
 import tornado.netutil
@@ -15,11 +16,10 @@ import tornado.web
 import tornado.websocket
 from waiting import PATIENCE
 
-from floatbase.viewer.notebook import NotebookPicture
-
 from .test_window import commands_in
 
 SILENCE = 0.3  # s without a message
+_CLIENTS: WeakKeyDictionary[Any, list[Client]] = WeakKeyDictionary()  # of each widget
 
 
 class Client:
@@ -28,12 +28,10 @@ class Client:
     name: of the page. in_cell: whether what it says is heard by the kernel's main thread, and so only between cells.
     """
 
-    _heard: dict[NotebookPicture, list[Client]] = {}
-
-    def __init__(self, widget: NotebookPicture, name: str = "page", in_cell: bool = False, hello: bool = True):
+    def __init__(self, widget: Any, name: str = "page", in_cell: bool = False, hello: bool = True):
         self.widget, self.name, self.in_cell = widget, name, in_cell
         self.messages: queue.Queue[tuple[dict[str, Any], list[bytes]]] = queue.Queue()
-        clients = self._heard.setdefault(widget, [])
+        clients: list[Client] = _CLIENTS.setdefault(widget, [])
         clients[:] = [client for client in clients if client.name != name] + [self]
         widget.send = lambda content, buffers=None: [client._take(content, buffers or []) for client in clients]
         if hello:
@@ -82,8 +80,8 @@ class Client:
         return False
 
 
-_PAGE = """<!DOCTYPE html><html><head><link rel="icon" href="data:,"><style>.output { margin: 4px 0; }</style></head><body><script type="module">
-import widget from "/widget.js";
+_PAGE = """<!DOCTYPE html><html><head><link rel="icon" href="data:,"><style>.output { margin: 4px 0; }</style>
+</head><body><script type="module">
 const outputs = document.body;
 // A widget's model as anywidget gives it, with a websocket in place of a comm.
 window.show = async (id, state) => {
@@ -108,6 +106,7 @@ window.show = async (id, state) => {
     fire("comm_live_update");
   };
   await new Promise((done) => { socket.onopen = done; });
+  const {default: widget} = await import("/widget.js");
   const gone = await widget.render({model, el});
   el.remove_output = () => { gone(); el.remove(); };
 };
@@ -122,7 +121,7 @@ class Notebook:
     """
 
     def __init__(self) -> None:
-        self.widgets: dict[str, NotebookPicture] = {}
+        self.widgets: dict[str, Any] = {}
         self.sizes: list[int] = []
         self._sockets: dict[str, list[_Comm]] = {}
         self._loop = asyncio.new_event_loop()
@@ -135,13 +134,13 @@ class Notebook:
         asyncio.set_event_loop(self._loop)
         own = {"notebook": self}
         pages = [(r"/", _Text, {"text": _PAGE, "kind": "text/html"}), (r"/comm", _Comm, own)]
-        pages += [(r"/widget.js", _Text, {"text": NotebookPicture._esm, "kind": "text/javascript"})]
+        pages += [(r"/widget.js", _Code, own)]
         server = tornado.httpserver.HTTPServer(tornado.web.Application(pages, websocket_max_message_size=64 << 20))
         server.add_sockets(self._listening)
         self._loop.run_forever()
         server.stop()
 
-    def show(self, page: Any, widget: NotebookPicture) -> Any:
+    def show(self, page: Any, widget: Any) -> Any:
         """Put an output below the others; its frame."""
         self.widgets[widget.model_id] = widget
         widget.send = lambda content, buffers=None: self._send(widget.model_id, content, buffers or [])
@@ -171,6 +170,16 @@ class _Text(tornado.web.RequestHandler):
     def get(self) -> None:
         self.set_header("Content-Type", self.kind)
         self.finish(self.text)
+
+
+class _Code(tornado.web.RequestHandler):
+    def initialize(self, notebook: Notebook) -> None:
+        self.notebook = notebook
+
+    def get(self) -> None:
+        """The widget's own, which is the same for all; the page asks for it when the first one is shown."""
+        self.set_header("Content-Type", "text/javascript")
+        self.finish(next(iter(self.notebook.widgets.values()))._esm)
 
 
 class _Comm(tornado.websocket.WebSocketHandler):

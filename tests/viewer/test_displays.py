@@ -181,7 +181,9 @@ def test_later_cells_leave_the_pictures_of_earlier_ones_alone(shell: Interactive
         stands_at(frame, 0.35)
 
 
-def test_an_animation_stays_one_when_the_next_cell_shows_something_else(shell: InteractiveShell, notebook: Notebook, page) -> None:
+def test_an_animation_stays_one_when_the_next_cell_shows_something_else(
+    shell: InteractiveShell, notebook: Notebook, page
+) -> None:
     run(shell, "[view.painter.picture(at(z)) for z in (0.3, 0.4)]")
     one = add(notebook, page, run(shell, "view.play_pictures([0.0, 1.0], answer, paused=True).widget()"))
     two = add(notebook, page, run(shell, "view.show(at(0.50)).widget()"))
