@@ -22,6 +22,11 @@ SILENCE = 0.3  # s without a message
 _CLIENTS: WeakKeyDictionary[Any, list[Client]] = WeakKeyDictionary()  # of each widget
 
 
+def hear(widget: Any, content: Any) -> None:
+    """Let a widget have a message of its page."""
+    widget.comm.handle_msg({"content": {"data": {"method": "custom", "content": content}}, "buffers": []})
+
+
 class Client:
     """A page of a widget, as the kernel hears it. It answers only when it is told to.
 
@@ -33,13 +38,13 @@ class Client:
         self.messages: queue.Queue[tuple[dict[str, Any], list[bytes]]] = queue.Queue()
         clients: list[Client] = _CLIENTS.setdefault(widget, [])
         clients[:] = [client for client in clients if client.name != name] + [self]
-        widget.send = lambda content, buffers=None: [client._take(content, buffers or []) for client in clients]
+        widget.send = lambda content, buffers=None: [client.take(content, buffers or []) for client in clients]
         if hello:
             self.say("hello")
 
     def say(self, words: str) -> None:
         def speak() -> None:
-            self.widget._handle_custom_msg({"page": self.name, "say": words}, [])
+            hear(self.widget, {"page": self.name, "say": words})
 
         if self.in_cell:
             speak()  # tests run in the main thread
@@ -48,7 +53,7 @@ class Client:
             thread.start()
             thread.join()
 
-    def _take(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+    def take(self, content: dict[str, Any], buffers: list[bytes]) -> None:
         if content.get("page", self.name) == self.name:
             self.messages.put((content, buffers))
 
@@ -117,13 +122,14 @@ window.started = true;
 class Notebook:
     """A web server with a page that shows widgets. What pages say is heard in the server's thread, as in a subshell.
 
-    sizes: bytes of the buffers of all messages to pages.
+    sizes: bytes of the buffers of all messages to pages. lose: how many frames from now on do not arrive.
     """
 
     def __init__(self) -> None:
         self.widgets: dict[str, Any] = {}
         self.sizes: list[int] = []
-        self._sockets: dict[str, list[_Comm]] = {}
+        self.lose = 0
+        self.sockets: dict[str, list[_Comm]] = {}
         self._loop = asyncio.new_event_loop()
         self._listening = tornado.netutil.bind_sockets(0, "127.0.0.1")
         self.url = f"http://127.0.0.1:{self._listening[0].getsockname()[1]}/"
@@ -151,12 +157,15 @@ class Notebook:
 
     def _send(self, name: str, content: dict[str, Any], buffers: list[bytes]) -> None:
         self.sizes += map(len, buffers)
+        if "frame" in content and self.lose:
+            self.lose -= 1
+            return
         text = json.dumps({"content": content, "buffers": [base64.b64encode(data).decode() for data in buffers]})
-        self._loop.call_soon_threadsafe(lambda: [socket.write_message(text) for socket in self._sockets.get(name, [])])
+        self._loop.call_soon_threadsafe(lambda: [socket.write_message(text) for socket in self.sockets.get(name, [])])
 
     def end(self) -> None:
         """End the connections, as a kernel that has gone."""
-        self._loop.call_soon_threadsafe(lambda: [one.close() for some in self._sockets.values() for one in some])
+        self._loop.call_soon_threadsafe(lambda: [one.close() for some in self.sockets.values() for one in some])
 
     def close(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
@@ -179,7 +188,7 @@ class _Code(tornado.web.RequestHandler):
     def get(self) -> None:
         """The widget's own, which is the same for all; the page asks for it when the first one is shown."""
         self.set_header("Content-Type", "text/javascript")
-        self.finish(next(iter(self.notebook.widgets.values()))._esm)
+        self.finish(next(iter(self.notebook.widgets.values())).get_state()["_esm"])
 
 
 class _Comm(tornado.websocket.WebSocketHandler):
@@ -188,10 +197,10 @@ class _Comm(tornado.websocket.WebSocketHandler):
 
     def open(self, *_: str, **__: str) -> None:
         self.name = self.get_query_argument("id")
-        self.notebook._sockets.setdefault(self.name, []).append(self)
+        self.notebook.sockets.setdefault(self.name, []).append(self)
 
     def on_message(self, message: str | bytes) -> None:
-        self.notebook.widgets[self.name]._handle_custom_msg(json.loads(message), [])
+        hear(self.notebook.widgets[self.name], json.loads(message))
 
     def on_close(self) -> None:
-        self.notebook._sockets[self.name].remove(self)
+        self.notebook.sockets[self.name].remove(self)

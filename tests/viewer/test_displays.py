@@ -12,7 +12,6 @@ from waiting import until
 
 from floatbase.robots import Robot, State
 from floatbase.viewer import COM, Viewer, Window, wire
-from floatbase.viewer.notebook import NotebookPicture
 
 from .looks import CONTEXTS, DRAWN, EYE, hue_pixels, picture
 from .notebook import Client, Notebook
@@ -37,11 +36,11 @@ def is_kept(commands: list[dict]) -> bool:
     return commands[-1] == {"type": "set_kept", "path": "", "kept": True}
 
 
-def display(window: Window) -> NotebookPicture:
+def display(window: Window) -> Any:
     return window.widget("a", 170)
 
 
-def shown(widget: NotebookPicture) -> tuple[float, bool]:
+def shown(widget: Any) -> tuple[float, bool]:
     """The number that a display shows, and whether it keeps an earlier picture."""
     frame = Client(widget).commands()
     return number_in(frame), is_kept(frame)
@@ -132,7 +131,7 @@ def run(shell: InteractiveShell, code: str) -> Any:
     return shell.user_ns["answer"]
 
 
-def add(notebook: Notebook, page, widget: NotebookPicture) -> Any:
+def add(notebook: Notebook, page, widget: Any) -> Any:
     """Put an output below the others, and return its frame once it has drawn."""
     frame = notebook.show(page, widget)
     frame.wait_for_function(DRAWN)

@@ -1,4 +1,4 @@
-"""The picture in a notebook: how many frames a page gets, busy kernels, pages that are slow, lost or strange, and what is saved."""
+"""The picture in a notebook: how many frames pages get, busy kernels, pages that are slow, lost or strange, what is saved."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +16,22 @@ import nbformat
 import numpy as np
 import psutil
 import pytest
+from IPython.core.interactiveshell import InteractiveShell
+from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_notebook
 from waiting import until
 
 from floatbase.robots import State
 from floatbase.viewer import Viewer, Window, wire
 from floatbase.viewer import page as pages
-from floatbase.viewer.connection import BLIND
-from floatbase.viewer.notebook import PACE
 
 from .looks import DRAWN, picture
-from .notebook import Client, Notebook
+from .notebook import Client, Notebook, hear
 from .test_window import STRANGE
 
 MB = 1 << 20
+PACE = 1.0 / 30.0  # s from frame to frame, at least
+BLIND = 0.05  # s, while the page cannot answer
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 
 
@@ -102,24 +105,33 @@ def test_a_hundred_thousand_updates_for_a_stalled_page_take_no_memory(window: Wi
     assert len(window.scene) == 10
 
 
-class _Busy:
-    """A cell that runs, as the server is told of it."""
-
-    def __init__(self, window: Window):
-        self.cells = window._server.cells
-
-    def __enter__(self) -> None:
-        self.cells._begin(None)
-
-    def __exit__(self, *_: object) -> None:
-        self.cells._end(None)
+@pytest.fixture
+def shell() -> Iterator[InteractiveShell]:
+    yield InteractiveShell.instance()
+    InteractiveShell.clear_instance()
 
 
-def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(window: Window) -> None:
+@pytest.fixture
+def window_of_shell(shell: InteractiveShell) -> Iterator[Window]:
+    with Window() as opened:
+        shell.events.trigger("post_run_cell", None)  # the cell that opened it
+        yield opened
+
+
+@contextmanager
+def busy(shell: InteractiveShell) -> Iterator[None]:
+    """A cell that runs."""
+    shell.events.trigger("pre_run_cell", None)
+    yield
+    shell.events.trigger("post_run_cell", None)
+
+
+def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(shell: InteractiveShell, window_of_shell: Window) -> None:
+    window = window_of_shell
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=True)
     client.commands()
-    with _Busy(window):
+    with busy(shell):
         draw_for(window, 1.0)
         frames = frames_of(client)
         assert 4 <= frames <= 1.1 / BLIND + 2
@@ -129,31 +141,40 @@ def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(window: Window) ->
     assert newest(client.commands()) == -1
 
 
-def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(window: Window) -> None:
+def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(
+    shell: InteractiveShell, window_of_shell: Window
+) -> None:
+    window = window_of_shell
     put(window, 0)
     client = Client(window.widget("a", 100))
     client.commands()
-    with _Busy(window):
+    with busy(shell):
         draw_for(window, 0.5)
         assert frames_of(client) == 2
 
 
-def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(
+    shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window = window_of_shell
     monkeypatch.setattr("floatbase.viewer.connection.MOST_BLIND", 1000)
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=True)
     client.commands()
-    with _Busy(window):
+    with busy(shell):
         draw_for(window, 1.0)
         assert 2 <= frames_of(client) <= 10  # of 119 bytes each
 
 
-def test_a_long_cell_does_not_make_a_page_look_lost(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_cell_does_not_make_a_page_look_lost(
+    shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window = window_of_shell
     monkeypatch.setattr("floatbase.viewer.connection.PATIENCE", 0.4)
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=True)
     client.commands()
-    with _Busy(window):
+    with busy(shell):
         draw_for(window, 1.0)
     put(window, -1)
     frames = frames_of(client)
@@ -198,7 +219,7 @@ def test_what_no_page_of_a_notebook_says_is_ignored(window: Window, caplog: pyte
     client = Client(widget)
     client.commands()
     for content in (None, 3, "x", [], {}, {"page": "page"}, {"page": 3, "say": "hello"}, {"page": "page", "say": {}}):
-        widget._handle_custom_msg(content, [])
+        hear(widget, content)
     for words in STRANGE:
         if isinstance(words, str) and words != "hello":
             client.say(words)
@@ -248,10 +269,11 @@ def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_
         frame.wait_for_function(DRAWN)
     code = len(gzip.compress(pages.viewer_code(), 9, mtime=0))
     assert notebook.sizes.count(code) == 1
-    until(lambda: not viewer.window._server.clients[0]._under_way)
-    viewer.window._server.clients[0]._frames += 1  # as if one had been sent that never came
     frames[0].evaluate("window.old = true")
+    notebook.lose = 1
     viewer.show(standing, com=False)
+    until(lambda: notebook.lose == 0)
+    viewer.show(standing, com=False, title="the next one")
     frames[0].wait_for_function("!window.old")
     frames[0].wait_for_function(DRAWN)
     assert frames[0].evaluate("!viewer.scene_tree.find(['meshcat']).children.com?.children.ball")
@@ -305,9 +327,7 @@ push_panel(live(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(s
 
 
 def test_a_saved_notebook_shows_every_picture_as_html(tmp_path: Path) -> None:
-    from floatbase.lessons.publish.notebooks import execute
-
-    saved = execute(new_notebook(cells=[new_code_cell(source) for source in SAVED]), tmp_path)
+    saved = NotebookClient(new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120).execute()
     saved.metadata.pop("widgets")  # JupyterLab saves no widgets by default
     nbformat.write(saved, tmp_path / "saved.ipynb")
     assert (tmp_path / "saved.ipynb").stat().st_size < 0.3 * MB
