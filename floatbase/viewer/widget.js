@@ -107,10 +107,11 @@ async function render({model, el}) {
     if (port) port.postMessage({notice: GONE});
     else before.say(GONE);
   }
+  // The connections of all widgets end together. A model hides its own, but that of its layout is there to see.
   function live() {
-    setTimeout(() => {  // the mark that the kernel has gone may be set after this event
+    setTimeout(() => {
       const was = gone;
-      gone = el.closest(".jupyter-widgets-disconnected") !== null;
+      gone = model.get("layout")?.comm_live === false;
       if (gone) leave();
       else if (was) again();
     });

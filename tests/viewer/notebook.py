@@ -94,8 +94,9 @@ window.show = async (id, state) => {
   const socket = new WebSocket(`ws://${location.host}/comm?id=${id}`);
   const bytes = (text) => new DataView(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
   const fire = (name, ...args) => [...(heard.get(name) || [])].forEach((call) => call(...args));
+  const layout = {comm_live: true};
   const model = {
-    get: (name) => name == "still" ? bytes(state.still) : state[name],
+    get: (name) => name == "still" ? bytes(state.still) : name == "layout" ? layout : state[name],
     send: (content) => socket.send(JSON.stringify(content)),
     on: (name, call) => heard.set(name, [...(heard.get(name) || []), call]),
     off: (name, call) => heard.set(name, (heard.get(name) || []).filter((other) => other !== call)),
@@ -107,7 +108,7 @@ window.show = async (id, state) => {
     fire("msg:custom", content, buffers.map(bytes));
   };
   socket.onclose = () => {
-    el.classList.add("jupyter-widgets-disconnected");
+    layout.comm_live = false;
     fire("comm_live_update");
   };
   await new Promise((done) => { socket.onopen = done; });
