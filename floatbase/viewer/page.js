@@ -304,20 +304,20 @@ function startWhenSeen(start) {
   });
 }
 
-// What a page that follows a window does with a message of the window's. tell: says something to the window.
-function listener(rest, tell) {
-  viewer.connection = {send: tell};
-  part("kept").querySelector("button").onclick = () => tell('{"type": "live"}');
+// What a page that follows a window does with a message of the window's. connection: its send says something to the window.
+function listener(rest, connection) {
+  viewer.connection = connection;
+  part("kept").querySelector("button").onclick = () => connection.send('{"type": "live"}');
   return async (message) => {
     if (typeof message == "string") {
       const request = JSON.parse(message);
       await rest.awake();
       viewer.set_3d_pane_size();
-      tell(JSON.stringify({type: "image", id: request.id, data: viewer.capture_image()}));
+      connection.send(JSON.stringify({type: "image", id: request.id, data: viewer.capture_image()}));
     } else {
       apply(message);
       viewer.num_messages_received++;
-      tell('{"type": "done"}');
+      connection.send('{"type": "done"}');
     }
   };
 }
@@ -326,7 +326,7 @@ function listener(rest, tell) {
 function follow(rest) {
   const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket`);
   socket.binaryType = "arraybuffer";
-  const hear = listener(rest, (words) => socket.send(words));
+  const hear = listener(rest, socket);
   socket.onmessage = ({data}) => hear(data);
   socket.onclose = () => {
     part("notice").style.display = "block";
@@ -342,7 +342,7 @@ function waitForPort() {
     let hear = () => {};
     port.onmessage = ({data: message}) => message.notice ? say(message.notice) : hear(message);
     startWhenSeen((rest) => {
-      hear = listener(rest, (words) => port.postMessage(words));
+      hear = listener(rest, {send: (words) => port.postMessage(words)});
       port.postMessage("hello");
     });
   };
