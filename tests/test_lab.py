@@ -17,6 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -198,6 +199,8 @@ def _only(page: Any, address: str) -> list[str]:
 
 def _push_until_it_falls(page: Any) -> None:
     """Push the robot of the first lesson as hard as the panel can, until the picture shows it on the ground."""
+    from playwright.sync_api import Error
+
     panel = page.locator(".jp-Cell", has=page.get_by_role("button", name="push", exact=True)).first
     panel.scroll_into_view_if_needed()
     frame = panel.locator("iframe").first.element_handle().content_frame()
@@ -205,10 +208,12 @@ def _push_until_it_falls(page: Any) -> None:
     standing = frame.evaluate(HEIGHT)
     panel.locator(".widget-slider .noUi-handle").first.focus()
     page.keyboard.press("End")
-    until = time.monotonic() + LONG
-    while frame.evaluate(HEIGHT) > 0.6 * standing:
+    fallen, until = f"({HEIGHT})() < {0.6 * standing}", time.monotonic() + LONG
+    while not frame.evaluate(fallen):
         assert time.monotonic() < until, f"it does not fall: {frame.evaluate(HEIGHT)} m, {panel.inner_text()}"
-        time.sleep(2.0)
+        with suppress(Error):  # it stood that push
+            frame.wait_for_function(fallen, timeout=8000)
+            break
         panel.get_by_role("button", name="push", exact=True).click()
     _picture(page, "00", "fallen")
 
