@@ -24,6 +24,7 @@ import pytest
 from values import CONTACTS, CONTROLLER, EOM, HYDRAULIC, RECORD, ROBOT, STATE, UP, VALUES
 
 import floatbase as fb
+from floatbase.actuators import Delay, FirstOrderLag
 from floatbase.behaviours import Gains, Gait, Stand, Walk
 from floatbase.control import AnalyticController, Belief
 from floatbase.errors import FloatbaseError
@@ -114,7 +115,7 @@ ACCEPTED: dict[str, set[str]] = {
     "PostureTask.velocity": ANY_LENGTH, "PostureTask.acceleration": ANY_LENGTH,
     "Ground.offset": {"column"}, "Robot.standing.offset": {"column"},
     "time": {"one too many"}, "times": {"one too many"},
-    "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
+    "Live.use.actuators": {"None"}, "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
 }  # fmt: skip
 
 ZERO = np.zeros(12)
@@ -125,7 +126,8 @@ EXAMPLES: dict[str, Any] = {
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
     "axes": "world", "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
     "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
-    "plot_roses.axis": POLAR, "rolling": True, "azimuth": 10.0, "b": ZERO, "background": "dark", "base": 0.32,
+    "plot_roses.axis": POLAR, "rolling": True, "azimuth": 10.0, "b": ZERO, "background": "dark", "bandwidth": 10.0,
+    "base": 0.32,
     "beta": np.zeros(SPACE.dimension), "bias_weight": 1e-3, "block": "tau", "blocks": {"tau": slice(0, 1)}, "bore": 0.016,
     "bulk_modulus": 1.3e9,
     "column": "force", "C": np.zeros((18, 18)), "c": 1.0, "Foot.centre": UP, "PointContact.centre": UP, "centre": ZERO,
@@ -134,7 +136,8 @@ EXAMPLES: dict[str, Any] = {
     "control_period": 0.002, "controller": CONTROLLER, "corners": TALOS.feet[0].corners,
     "cost": fb.Quadratic.zero(SPACE.dimension), "cost_on_qdd": fb.Quadratic.zero(18), "crank": 0.045, "curvature": (1.0, 2.0),
     "digits": 3, "force_weight": 1.0, "kinds": QP.inequality_names[0].kind, "moment_weight": 1.0,
-    "damping": 10.0, "dead_volume": 8e-6, "direction": np.ones(6), "distance": 1.0, "dt": 1e-3, "duration": 0.002,
+    "damping": 10.0, "dead_volume": 8e-6, "delay": 0.01,
+    "direction": np.ones(6), "distance": 1.0, "dt": 1e-3, "duration": 0.002,
     "dv": np.zeros(18), "elevation": 10.0, "eom": EOM, "equality_names": tuple("abcdefghijkl"), "extra": {},
     "f": fb.Affine(np.eye(12), ZERO), "facets": 4, "View.feet": True, "feet": ["FL_foot"], "load_urdf.feet": ["tool0"],
     "floor": 1e-6,
@@ -191,8 +194,9 @@ EXAMPLES: dict[str, Any] = {
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
     "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02,
     "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
-    "contact_weight": 1e4,
-    "AlteredSimulation.ground": 0.7, "mass": 1.2, "friction": 0.5, 
+    "contact_weight": 1e4, "section": "stance", "slider.column": "", "choice.value": 0, "choices": ["a", "b"], "symbol": "M",
+    "part": "shown", "words": "text", "code": True, "strip.unit": "N", "Viewer.term.value": True,
+    "AlteredSimulation.ground": 0.7, "mass": 1.2, "friction": 0.5,
     "untouched": ["FL_foot"], "magnets": 20.0, "world": World(mass=1.2),
     "gravity": False, "velocity_forces": False, "drift": False,
     "unfelt": ["FL_foot"], "underactuated": False, "Belief.cones": False, "belief": Belief(mass=1.2),
@@ -213,7 +217,8 @@ LEFT_OUT = {
         "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
-        "Simulation.advance", "AlteredSimulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
+        "Simulation.advance", "AlteredSimulation.advance",
+        "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
         "vertices", "conflicting_rows", "linear_program", "motion_of", "below_the_body", "target_shapes", "targets_at",
         "QP.objective", "Belief.program", "Belief.check",
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
@@ -228,15 +233,17 @@ LEFT_OUT = {
             for kind in ("PointContact", "FlatFootContact", "RollingWheel", "LinearConstraint")
             for method in ("positions", "jacobian", "constraint", "generators", "slip")),
     ),
+    "moves a control that is there, with tests of its own": ("Viewer.move",),
     "ends what other calls need": ("Viewer.close", "Live.close"),
     "starts processes, with tests of its own": ("sweep", "push_rose", "Table.read"),
-    "starts a thread": ("Live.push", "Live.start", "Live.reset"),
+    "starts a thread": ("Live.push", "Live.soon", "Live.start", "Live.reset"),
 }  # fmt: skip
 ALONE = {name for names in LEFT_OUT.values() for name in names}
 SELVES: dict[str, Any] = {
     "Simulation": SIM, "AlteredSimulation": AlteredSimulation(ROBOT),
     "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
     "AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "HydraulicActuators": HYDRAULIC,
+    "Delay": Delay(ROBOT, 0.01), "FirstOrderLag": FirstOrderLag(ROBOT, 10.0),
     "Walk": WALK, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)),
     "Cylinders": HYDRAULIC.cylinders, "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": COST,
     "ConstantTorques": ConstantTorques(ZERO),

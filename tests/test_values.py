@@ -17,7 +17,7 @@ import pytest
 from values import COMMAND, CONTACTS, CONTROLLER, RECORD, ROBOT, STATE, UP, VALUES
 
 import floatbase as fb
-from floatbase.actuators import HydraulicActuators
+from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
 from floatbase.control import AnalyticController
 from floatbase.dynamics import PointContact
 
@@ -29,6 +29,7 @@ NO_VALUES = {
     "memory of a thread or a window": "Live SliderPanel Viewer Window",
     "an answer that rollout copies": "Torques",
     "with a memory of what they do": "Stand Step Walk",
+    "with a memory of torques, copied below": "Delay FirstOrderLag",
     "views of a MuJoCo model": "Conversion",
     "shapes of a picture": "Item Piece View",
     "made of functions of a lesson": "ConstantTorques Exercise LeastCost Numeric Shaped Verdict",
@@ -114,6 +115,17 @@ def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
     analytic = AnalyticController(ROBOT, CONTACTS, STATE)
     np.testing.assert_array_equal(copied(analytic)(STATE.q, STATE.v).tau, analytic(STATE.q, STATE.v).tau)
     assert not copied(analytic).com.flags.writeable
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied: Any) -> None:
+    still, first, second = np.zeros(12), np.arange(12.0), -np.arange(12.0)
+    for late in (Delay(ROBOT, 2e-3), FirstOrderLag(ROBOT, 10.0)):
+        late.step(first, still, still, 1e-3)
+        other = copied(late)
+        steps = [[one.step(second, still, still, 1e-3) for _ in range(3)] for one in (late, other)]
+        np.testing.assert_array_equal(*steps)
+        assert np.ptp(steps[0], axis=0).max() > 0.5
 
 
 def test_values_come_back_from_another_process() -> None:

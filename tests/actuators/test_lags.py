@@ -1,0 +1,137 @@
+"""App. B: the pure delay is a shift, the first-order lag its closed form; both take their place in a rollout."""
+
+from __future__ import annotations
+
+import judges
+import numpy as np
+import pytest
+from waiting import until
+
+import floatbase as fb
+from floatbase.actuators import Delay, FirstOrderLag
+from floatbase.simulation import Live
+
+ROBOT = judges.load("go2")
+STILL = np.zeros(12)
+ROUNDING = 1e-12  # of torques near 1 N·m: sums and powers of a few hundred numbers
+WANTED = np.random.default_rng(4).normal(size=(40, 12))  # N·m, other torques in every step
+
+
+def got(late: Delay | FirstOrderLag, wanted: np.ndarray, dt: float = 1e-3) -> np.ndarray:
+    """The torques of each step, shape (n, 12), N·m."""
+    return np.array([late.step(tau, STILL, STILL, dt) for tau in wanted])
+
+
+# delay
+
+
+@pytest.mark.parametrize("steps", [0, 1, 7, 40])
+def test_a_delay_of_whole_steps_shifts_the_torques_and_changes_no_digit(steps: int) -> None:
+    late = Delay(ROBOT, steps * 1e-3)
+    assert np.array_equal(got(late, WANTED), np.vstack([np.zeros((steps, 12)), WANTED])[:40])
+
+
+def test_a_delay_of_a_quarter_step_mixes_the_last_torques_with_the_new_ones() -> None:
+    old = np.vstack([np.zeros(12), WANTED[:-1]])
+    assert np.allclose(got(Delay(ROBOT, 0.25e-3), WANTED), 0.25 * old + 0.75 * WANTED, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("delay", [0.7e-3, 3e-3, 1e-2 / 3.0])
+def test_the_length_of_the_steps_changes_nothing_but_the_grid(delay: float) -> None:
+    """Four steps of 0.25 ms have the mean of one of 1 ms, with as many different torques under way."""
+    fine = got(Delay(ROBOT, delay), np.repeat(WANTED, 4, axis=0), 0.25e-3)
+    assert np.allclose(fine.reshape(40, 4, 12).mean(axis=1), got(Delay(ROBOT, delay), WANTED), atol=ROUNDING)
+
+
+def test_a_delay_stays_as_long_as_it_was_after_a_hundred_thousand_steps() -> None:
+    late, dt = Delay(ROBOT, 0.02), 1e-3 / 3.0
+    for _ in range(100_000):
+        late.step(STILL, STILL, STILL, dt)
+    came = got(late, np.ones((100, 12)), dt)[:, 0]
+    assert np.sum(1.0 - came) * dt == pytest.approx(0.02, abs=1e-7)  # s: missing under a step of 1; 1 ns a step
+
+
+# first-order lag
+
+
+@pytest.mark.parametrize("bandwidth", [0.5, 3.0, 50.0])
+def test_a_lags_step_response_is_its_closed_form(bandwidth: float) -> None:
+    times = 1e-3 * np.arange(1, 301)
+    closed = 12.0 * (1.0 - np.exp(-2.0 * np.pi * bandwidth * times))
+    assert np.allclose(got(FirstOrderLag(ROBOT, bandwidth), np.full((300, 12), 12.0)).T, closed, atol=12.0 * ROUNDING)
+
+
+def test_a_lag_takes_three_decibels_and_45_degrees_off_a_sine_of_its_bandwidth() -> None:
+    dt = 1e-4
+    phase = 2.0 * np.pi * 3.0 * dt * np.arange(20_000)  # 6 periods of 3 Hz
+    answer = got(FirstOrderLag(ROBOT, 3.0), np.sin(phase)[:, None] * np.ones(12), dt)[-10_000:, 0]
+    spectrum = 2.0 * np.mean(answer * np.exp(-1j * phase[-10_000:])) * 1j
+    assert abs(spectrum) == pytest.approx(np.sqrt(0.5), abs=2e-3)  # half a step is 0.05°
+    assert np.degrees(np.angle(spectrum)) == pytest.approx(-45.0, abs=0.2)
+
+
+# both
+
+
+@pytest.mark.parametrize("late", [Delay(ROBOT, 5e-3), FirstOrderLag(ROBOT, 5.0)])
+def test_a_reset_puts_torques_under_way_or_none(late: Delay | FirstOrderLag) -> None:
+    held = np.linspace(-20.0, 20.0, 12)
+    got(late, WANTED)
+    late.reset(held, STILL)
+    assert np.allclose(got(late, np.tile(held, (10, 1))), held, atol=ROUNDING)
+    late.reset()
+    assert not np.any(got(late, np.zeros((10, 12))))
+
+
+def test_nobody_can_change_torques_under_way_from_outside() -> None:
+    late, wanted = Delay(ROBOT, 1e-3), np.ones(12)
+    late.step(wanted, STILL, STILL, 1e-3)
+    wanted[:] = 9.0
+    assert np.array_equal(late.step(STILL, STILL, STILL, 1e-3), np.ones(12))
+    lag = FirstOrderLag(ROBOT, 1.0)
+    lag.step(wanted, STILL, STILL, 1e-3)
+    assert not lag.tau.flags.writeable
+
+
+def test_a_rollout_through_a_delay_gets_the_torques_of_earlier_ticks() -> None:
+    sim, controller = fb.Simulation(ROBOT), judges.controller_of("go2")
+    late = Delay(ROBOT, 4e-3)
+    late.reset(controller(sim.q, sim.v).tau, sim.q[7:])
+    rollout = fb.rollout(sim, controller, 0.05, actuators=late)
+    assert rollout.outcome == "completed"
+    assert np.array_equal(rollout.tau[4:], rollout.tau_desired[:-4])
+    assert np.array_equal(rollout.tau[:4], np.tile(rollout.tau_desired[0], (4, 1)))
+
+
+def test_go2_stands_live_through_a_lag() -> None:
+    sim, controller, lag = fb.Simulation(ROBOT), judges.controller_of("go2"), FirstOrderLag(ROBOT, 20.0)
+    lag.reset(controller(sim.q, sim.v).tau)
+    records: list[fb.Rollout] = []
+    live = Live(sim, controller, records.append, actuators=lag)
+    live.start()
+    until(lambda: bool(records))
+    live.close()
+    assert records and not np.array_equal(records[0].tau, records[0].tau_desired)
+
+
+def test_what_makes_no_actuator_and_no_step_is_refused() -> None:
+    for delay, text in ((-0.01, "delay is -0.01"), (np.nan, "delay is nan"), (11.0, "delay is 11"), ("late", "not 'late'")):
+        with pytest.raises(fb.FloatbaseError, match=text):
+            Delay(ROBOT, delay)  # type: ignore[arg-type]
+    with pytest.raises(fb.FloatbaseError, match="bandwidth is 0"):
+        FirstOrderLag(ROBOT, 0.0)
+    for late in (Delay(ROBOT, 0.01), FirstOrderLag(ROBOT, 5.0)):
+        for i, text in enumerate(("tau_desired", "q_joints", "v_joints")):
+            given = [STILL, STILL, STILL]
+            given[i] = np.zeros(11)
+            with pytest.raises(fb.FloatbaseError, match=f"{text} has shape"):
+                late.step(*given, dt=1e-3)  # type: ignore[call-arg, misc]
+        with pytest.raises(fb.FloatbaseError, match="dt is 0"):
+            late.step(STILL, STILL, STILL, 0.0)
+        with pytest.raises(fb.FloatbaseError, match="tau has shape"):
+            late.reset(np.zeros(3))
+
+
+def test_actuators_of_another_robot_are_refused() -> None:
+    with pytest.raises(fb.FloatbaseError, match="actuators are for"):
+        fb.rollout(fb.Simulation(ROBOT), judges.controller_of("go2"), 0.01, actuators=Delay(judges.load("solo12"), 0.0))
