@@ -1,5 +1,6 @@
 """JupyterLab in a real browser: two lessons run without an error, and each of their pictures answers to its sliders.
 
+The browser reaches JupyterLab's own address and nothing else, as that of a reader whose kernel is on another machine.
 What JupyterLab saves of a lesson that was only run and looked at does not count as a learner's writing.
 
 What the lessons compute is test_notebooks' business, what all other sliders do is tests/lessons': both need no browser.
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +27,7 @@ from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 
 from floatbase.lessons.publish import FOLDER, MINE, prepare, read
 
-LESSONS = ("00_start_here", "02_equations_of_motion")  # a robot that is simulated under the page; panels of many sliders
+LESSONS = ("00_start_here", "03_feasible_space")  # a robot that is simulated under the page; panels of many sliders
 IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push
 LONG = 90.0  # s that a busy machine may take for anything; nothing is taken for absent earlier
 
@@ -62,6 +64,8 @@ SCENE = """() => {
 }"""
 
 
+# m, of the robot's base
+HEIGHT = "() => viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.z"
 # what a reader may press; none of it is writing
 LOOKS = (
     "notebook:hide-all-cell-code", "notebook:hide-all-cell-outputs", "notebook:enable-output-scrolling",
@@ -126,6 +130,7 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
 ) -> None:
     page = browser.new_page(viewport={"width": 1100, "height": 800})
     page.set_default_timeout(1000 * LONG)
+    strangers = _only(page, lab)
     try:
         page.goto(f"{lab}/lab/workspaces/{name}/tree/{MINE}/{name}.ipynb?token=a-test")
         page.wait_for_selector(".jp-Notebook .jp-CodeCell")
@@ -138,6 +143,9 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
         idle = {slider for cell, sliders in panels.items() for slider in _idle_sliders(page, name, cell, sliders)}
         assert not idle, f"{name}: these sliders change nothing: {sorted(idle)}"
         assert panels
+        if name == LESSONS[0]:
+            _push_until_it_falls(page)
+        assert strangers == []
         page.evaluate(SAVE)
         _change(course / f"{name}.ipynb")
         assert prepare(course) == [f"{name}.ipynb: updated"]
@@ -166,6 +174,48 @@ def _idle_sliders(page: Any, name: str, number: str, sliders: list[str]) -> list
     _picture(page, name, f"panel_{number}")
     assert moved, f"{name}, cell {number}: no slider moves the picture"
     return idle
+
+
+def _only(page: Any, address: str) -> list[str]:
+    """Let a page reach this address alone; what else it asks for, as it does so."""
+    strangers: list[str] = []
+
+    def judge(route: Any) -> None:
+        url = route.request.url
+        if url.startswith(address):
+            route.continue_()
+        else:
+            strangers.append(url)
+            route.abort()
+
+    def told(socket: Any) -> None:
+        if not socket.url.startswith(address.replace("http", "ws")):
+            strangers.append(socket.url)
+
+    page.route(lambda url: url.startswith(("http:", "https:")), judge)
+    page.on("websocket", told)
+    return strangers
+
+
+def _push_until_it_falls(page: Any) -> None:
+    """Push the robot of the first lesson as hard as the panel can, until the picture shows it on the ground."""
+    from playwright.sync_api import Error
+
+    panel = page.locator(".jp-Cell", has=page.get_by_role("button", name="push", exact=True)).first
+    panel.scroll_into_view_if_needed()
+    frame = panel.locator("iframe").first.element_handle().content_frame()
+    frame.wait_for_function("() => window.viewer?.num_messages_received > 0", timeout=1000 * LONG)
+    standing = frame.evaluate(HEIGHT)
+    panel.locator(".widget-slider .noUi-handle").first.focus()
+    page.keyboard.press("End")
+    fallen, until = f"({HEIGHT})() < {0.6 * standing}", time.monotonic() + LONG
+    while not frame.evaluate(fallen):
+        assert time.monotonic() < until, f"it does not fall: {frame.evaluate(HEIGHT)} m, {panel.inner_text()}"
+        with suppress(Error):  # it stood that push
+            frame.wait_for_function(fallen, timeout=8000)
+            break
+        panel.get_by_role("button", name="push", exact=True).click()
+    _picture(page, "00", "fallen")
 
 
 def _move(page: Any, handle: Any) -> None:

@@ -14,7 +14,7 @@ import ipywidgets as widgets
 
 from floatbase.errors import FloatbaseError
 from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
-from floatbase.viewer import Viewer, push_at
+from floatbase.viewer import Viewer, push_at, with_image
 
 # sliders ----------------------------------------------------------------------------------------------------------------
 
@@ -27,8 +27,8 @@ class SliderPanel(widgets.VBox):
     """
 
     def __init__(self, view: Viewer | None, sliders: dict[str, widgets.FloatSlider], beside: bool):
-        wide = widgets.Layout(width="62%", flex="0 0 auto") if beside else widgets.Layout(width="auto")
-        self._picture = widgets.HTML(layout=wide)  # a long note beside it wraps, and takes nothing of it
+        width, flex = ("62%", "0 0 auto") if beside else ("auto", None)  # a long note beside it wraps, and takes nothing of it
+        self._picture = widgets.VBox(layout=widgets.Layout(width=width, flex=flex))
         note = widgets.HTML()
         top = [note] if view is None else [widgets.HBox([self._picture, note])] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])
@@ -36,8 +36,8 @@ class SliderPanel(widgets.VBox):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The picture is put in only here: by now the camera has been placed, and a still picture keeps that view."""
-        self._picture.value = self.view._repr_html_() if self.view else ""
-        return super()._repr_mimebundle_(**kwargs)
+        self._picture.children = [self.view.widget()] if self.view else []
+        return with_image(super()._repr_mimebundle_(**kwargs), *self._picture.children)
 
 
 def slider_panel(
@@ -167,8 +167,14 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
     run.on_status(lambda _: line.tell())
     force.observe(let_go, names="value")
     buttons = [button("run", run.start), button("pause", run.pause), button("reset", reset)]
-    picture = widgets.HTML(view._repr_html_(), layout=widgets.Layout(width="auto"))
-    return widgets.VBox([picture, force, widgets.HBox([towards, _button("push", push)]), widgets.HBox([*buttons, line])])
+    return _PushPanel([view.widget(), force, widgets.HBox([towards, _button("push", push)]), widgets.HBox([*buttons, line])])
+
+
+class _PushPanel(widgets.VBox):
+    """A live picture with what pushes its robot, as `push_panel` makes it."""
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        return with_image(super()._repr_mimebundle_(**kwargs), self.children[0])
 
 
 class _Line(widgets.Label):

@@ -353,8 +353,8 @@ class Playground:
         walk = self.session.walk
         return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
 
-    def _repr_html_(self) -> str:
-        return self.start().view._repr_html_()
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
         return f"Playground({self.robot.name}, {self.url})"

@@ -29,6 +29,7 @@ from floatbase.viewer.meshes import appearance, robot_meshes
 from floatbase.viewer.painter import below
 from floatbase.viewer.recording import push_at
 from floatbase.viewer.shapes import Item, Picture
+from floatbase.viewer.still import with_image
 from floatbase.viewer.viewer import Viewer
 from floatbase.viewer.visuals import Piece, urdf_visuals
 from floatbase.viewer.window import Window
@@ -73,4 +74,5 @@ __all__ = [
     "urdf_visuals",
     "walks",
     "wire",
+    "with_image",
 ]

@@ -288,28 +288,49 @@ function startWhenSeen(start) {
   });
 }
 
-// The live page: follow a window. When the window closes, wait for one at the same address.
-function follow(rest) {
-  const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket${location.search}`);
-  socket.binaryType = "arraybuffer";
-  viewer.connection = socket;
-  part("kept").querySelector("button").onclick = () => socket.send('{"type": "live"}');
-  socket.onmessage = async (message) => {
-    if (typeof message.data == "string") {
-      const request = JSON.parse(message.data);
+// What a page that follows a window does with a message of the window's. connection: its send says something to the window.
+function listener(rest, connection) {
+  viewer.connection = connection;
+  part("kept").querySelector("button").onclick = () => connection.send('{"type": "live"}');
+  return async (message) => {
+    if (typeof message == "string") {
+      const request = JSON.parse(message);
       await rest.awake();
       viewer.set_3d_pane_size();
-      socket.send(JSON.stringify({type: "image", id: request.id, data: viewer.capture_image()}));
+      connection.send(JSON.stringify({type: "image", id: request.id, data: viewer.capture_image()}));
     } else {
-      apply(message.data);
+      apply(message);
       viewer.num_messages_received++;
-      socket.send('{"type": "done"}');
+      connection.send('{"type": "done"}');
     }
   };
+}
+
+// The live page: follow a window. When the window closes, wait for one at the same address.
+function follow(rest) {
+  const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket`);
+  socket.binaryType = "arraybuffer";
+  const hear = listener(rest, socket);
+  socket.onmessage = ({data}) => hear(data);
   socket.onclose = () => {
     part("notice").style.display = "block";
     comeBack();
   };
+}
+
+// The page in a notebook: it says that it is ready, receives {code} and a port, and follows the window by the port.
+function waitForPort() {
+  window.onmessage = ({data, ports: [port]}) => {
+    window.onmessage = null;  // the viewer takes it
+    load(data.code);
+    let hear = () => {};
+    port.onmessage = ({data: message}) => message.notice ? say(message.notice) : hear(message);
+    startWhenSeen((rest) => {
+      hear = listener(rest, {send: (words) => port.postMessage(words)});
+      port.postMessage("hello");
+    });
+  };
+  parent.postMessage({ready: true}, "*");
 }
 
 async function comeBack() {

@@ -1,7 +1,8 @@
-"""The three pages: the live page, the file, and the inner page.
+"""The four pages: the live page, the notebook's page, the file, and the inner page.
 
-The live page follows a window. The file contains a scene and needs no server. The inner page shows one scene in a frame of a
-page with several scenes. All load meshcat's viewer and give it the same messages (see `wire.frame`); page.js holds the rest.
+The live page and that in a notebook follow a window. The file contains a scene and needs no server. The inner page shows one
+scene in a frame of a page with several scenes. All load meshcat's viewer and give it the same messages (see `wire.frame`);
+page.js holds the rest.
 """
 
 from __future__ import annotations
@@ -73,6 +74,12 @@ def scene_in(text: str) -> list[bytes]:
 def inner_page() -> str:
     """A page for a frame inside another page, which gives it the viewer's code and a scene (see page.js)."""
     return _page(f"<script>{_scripts()}waitForScene();</script>", "floatbase")
+
+
+@cache
+def notebook_page() -> str:
+    """A page for a frame in a notebook, which gives it the viewer's code and a port to the kernel (see page.js)."""
+    return _page(f"<script>{_scripts()}waitForPort();</script>", "floatbase")
 
 
 @cache

@@ -41,11 +41,10 @@ class Scene:
         page: a name of that page, which the command has, so that the page knows its own report.
         Raises `ViewerError` where there is no such control, or when it cannot have such a value.
         """
-        with self._lock:
-            entry = self._entries.get(("/", "set_control", name)) if isinstance(name, str) else None
-        if entry is None:
+        control = self.command(("/", "set_control", name)) if isinstance(name, str) else None
+        if control is None:
             raise ViewerError(f"there is no control {name!r}.")
-        value = reported(umsgpack.unpackb(entry[1]), value)
+        value = reported(control, value)
         if value is not None:
             self.put([encode({"type": "move_control", "name": name, "value": value, "by": page})])
         return value
@@ -80,6 +79,12 @@ class Scene:
             if not (is_setting and key in old and old[key][1] == command):
                 commands.append(command)
         return commands
+
+    def command(self, key: Key) -> dict[str, Any] | None:
+        """The command of a key, decoded; None where there is none."""
+        with self._lock:
+            entry = self._entries.get(key)
+        return None if entry is None else umsgpack.unpackb(entry[1])
 
     def commands(self) -> dict[Key, dict[str, Any]]:
         """The scene as decoded commands."""

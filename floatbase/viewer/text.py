@@ -24,7 +24,7 @@ def text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
     """
     # re.split with a group returns text and subscripts in turn
     parts = [(part, i % 2 == 1) for i, part in enumerate(re.split(r"\{([^}]*)\}", text)) if part]
-    widths = [_font(lowered).getlength(part) for part, lowered in parts]
+    widths = [font(lowered).getlength(part) for part, lowered in parts]
     margin = LETTER // 3
     size = (round(sum(widths)) + 2 * margin, round(1.3 * LETTER) + 2 * margin)
     picture = Image.new("LA", size, (255, 0))
@@ -35,13 +35,13 @@ def text_picture(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
     x = float(margin)
     for (part, lowered), width in zip(parts, widths, strict=True):
         base = margin + LETTER + (0.25 * LETTER if lowered else 0.0)
-        draw.text((x, base), part, font=_font(lowered), fill=(grey, 255), anchor="ls")
+        draw.text((x, base), part, font=font(lowered), fill=(grey, 255), anchor="ls")
         x += width
     return np.asarray(picture)
 
 
 @cache
-def _font(lowered: bool) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font(lowered: bool = False) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     """matplotlib's DejaVu Sans, which has Greek letters and mathematical signs; without it, Pillow's font."""
     size = LETTER * (_LOWERED if lowered else 1.0)
     spec = find_spec("matplotlib")

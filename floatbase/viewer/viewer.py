@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import html
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,30 +18,25 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import film, marks, page, recording, shapes, walks, wire
+from floatbase.viewer import film, marks, page, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
 from floatbase.viewer.controls import Controls
 from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, below, kinds
-from floatbase.viewer.place import kernel_is_remote
 from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.window import Window
 
 if TYPE_CHECKING:
+    from ipywidgets import Widget
+
     from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
 ROBOT, FOLLOWED = "robot", "followed"  # in the picture: the robot, and where it is on average of a stride
 _MOST_PIXELS = 10_000  # of a picture's height
-# The browser tests whether it reaches the live page: `kernel_is_remote` may be wrong.
-_PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
-  const frame = document.querySelector('iframe[src="URL"]');
-  if (frame) frame.srcdoc = "<p style='font-family: sans-serif'>The viewer that drew this is gone: its kernel was restarted " +
-    "or has stopped. Run the notebook again. If this is a fresh picture, the kernel runs on another machine: for still ones, " +
-    "import os; os.environ['FLOATBASE_VIEWER'] = 'static', and run this cell again.</p>";
-});</script>"""
+_ASKED = "FLOATBASE_VIEWER"  # =static in the environment asks for scenes that need no kernel, as for pages to publish
 
 
 class Viewer(Controls):
@@ -59,9 +55,9 @@ class Viewer(Controls):
     port: port of the page; 0 takes a free one.
     Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
 
-    In a notebook, a viewer as the last line of a cell displays itself. Elsewhere, open `viewer.url` in a browser.
-    The newest display in a notebook is live; earlier ones keep their pictures. So give each interactive part its own
-    `Viewer`. Where the kernel runs on another machine whose page cannot be reached, the display is a still copy of the scene.
+    In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs: its frames come as a slider's
+    values do. Elsewhere, open `viewer.url` in a browser. The newest display in a notebook is live; earlier ones keep their
+    pictures. So give each interactive part its own `Viewer`.
     """
 
     def __init__(
@@ -351,13 +347,34 @@ class Viewer(Controls):
         """Close the page: its thread ends and its port is free."""
         self.window.close()
 
-    def _repr_html_(self) -> str:
+    def widget(self) -> Widget:
+        """A widget that shows the picture, for panels: live, until the viewer is displayed again; then it keeps its picture.
+
+        Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a still copy of the scene.
+        """
+        if self._is_still:
+            import ipywidgets
+
+            return ipywidgets.HTML(self._frame(), layout=ipywidgets.Layout(width="auto"))
+        return self.window.widget(self.robot.name, self.height, still.png(self.canvas.picture, self.window.scene, self.height))
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        """The live picture, and an image of it for wherever no widget can be."""
+        if self._is_still:
+            return {"text/html": self._frame()}
+        picture = self.widget()
+        data, metadata = still.with_image(picture._repr_mimebundle_(**kwargs), picture)
+        return {**data, "text/plain": repr(self)}, metadata
+
+    @property
+    def _is_still(self) -> bool:
+        """Whether a display is a copy of the scene and no more."""
+        return os.environ.get(_ASKED) == "static" or not self.window.is_open
+
+    def _frame(self) -> str:
+        """HTML of the scene as it is now, which needs no kernel."""
         name, style = html.escape(self.robot.name), f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px"
-        frame = f'title="{name}" style="{style}"'
-        if kernel_is_remote() or not self.window.is_open:
-            return f'<iframe srcdoc="{html.escape(self.static_html())}" {frame}></iframe>'
-        address = self.window.open_display()
-        return f'<iframe src="{address}" {frame}></iframe>' + _PROBE.replace("URL", address)
+        return f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" style="{style}"></iframe>'
 
     def __repr__(self) -> str:
         return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"

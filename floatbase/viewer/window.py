@@ -1,4 +1,4 @@
-"""The meshcat window: a thread of this process serves meshcat's viewer, to this machine only.
+"""The meshcat window: a thread of this process serves meshcat's viewer, to this machine and to its own notebook only.
 
 meshcat's own server is another process, which listens on all interfaces, outlives the kernel, and waits for a browser.
 `Window` has the interface of meshcat's `ViewerWindow`, so `meshcat.Visualizer(window=Window())` draws into it.
@@ -20,12 +20,13 @@ import tornado.netutil
 
 from floatbase.errors import ViewerError
 from floatbase.viewer import page, wire
-from floatbase.viewer.place import before_each_cell
 from floatbase.viewer.scene import Scene
 from floatbase.viewer.server import Server
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+
+    from floatbase.viewer.notebook import NotebookPicture
 
 ADDRESS = "127.0.0.1"
 
@@ -50,7 +51,7 @@ class Window:
     def __init__(self, port: int = 0):
         self.scene = Scene()
         self._server = Server(self.scene, _listen(port))
-        self._closer = weakref.finalize(self, _both, self._server.stop, before_each_cell(self._server.displays.begin_cell))
+        self._closer = weakref.finalize(self, self._server.stop)
 
     @property
     def port(self) -> int:
@@ -62,11 +63,16 @@ class Window:
         """Address of the page."""
         return f"http://{ADDRESS}:{self.port}/"
 
-    def open_display(self) -> str:
-        """Address of a page for a notebook's output. The page is live until the next one opens; then it keeps its picture."""
+    def widget(self, name: str, height: int, still: bytes = b"") -> NotebookPicture:
+        """A display in a notebook, which needs no port. It is live until the next one opens; then it keeps its picture.
+
+        name: what it shows. height: pixels. still: a PNG of the same, for the time before the page has drawn.
+        """
+        from floatbase.viewer.notebook import NotebookPicture  # loads ipywidgets, which no script needs
+
         number = self._server.displays.open()
         self._server.keep()
-        return f"{self.web_url}?display={number}"
+        return NotebookPicture(self._server, number, name, height, still)
 
     @property
     def browsers(self) -> int:
@@ -145,11 +151,6 @@ class Window:
 
     def __repr__(self) -> str:
         return f"Window({self.web_url}, {'open' if self.is_open else 'closed'})"
-
-
-def _both(first: Callable[[], None], second: Callable[[], None]) -> None:
-    first()
-    second()
 
 
 def _listen(port: int) -> list[socket.socket]:

@@ -107,7 +107,7 @@ def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(w
 
 
 def test_a_page_that_never_reads_is_dropped(window: Window, sleeper: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("floatbase.viewer.server.PATIENCE", 0.2)
+    monkeypatch.setattr("floatbase.viewer.connection.PATIENCE", 0.2)
     files = len(os.listdir("/proc/self/fd"))
 
     def drawn_and_gone() -> bool:

@@ -86,7 +86,7 @@ def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, fi
 def test_in_a_notebook_it_shows_itself_and_runs() -> None:
     shown = playground("solo12")
     try:
-        assert "<iframe" in shown._repr_html_()
+        assert "image/png" in shown._repr_mimebundle_()[0]
         until(lambda: shown.session.last is not None)
         assert shown.robot.name == "solo12" and isinstance(shown.session.last, fb.Rollout)
     finally:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import re
 from pathlib import Path
 
@@ -188,21 +187,6 @@ def test_wrong_records_and_file_names_are_explained(viewer: Viewer, go2: Robot, 
         viewer.save(tmp_path / "x.svg")
     with pytest.raises(ViewerError, match="cannot write .* choose a folder that exists"):
         viewer.save(tmp_path / "nowhere" / "x.html")
-
-
-@pytest.mark.parametrize("sign", ["JUPYTERHUB_USER", "CODESPACES", "COLAB_RELEASE_TAG", "SSH_CONNECTION"])
-def test_a_remote_kernel_shows_the_scene_itself(
-    viewer: Viewer, standing: State, monkeypatch: pytest.MonkeyPatch, sign: str
-) -> None:
-    for name in os.environ:
-        monkeypatch.delenv(name)
-    viewer.show(standing)
-    assert f'src="{viewer.url}?display=' in viewer._repr_html_()
-    monkeypatch.setenv(sign, "yes")
-    shown = viewer._repr_html_()
-    assert "srcdoc=" in shown and viewer.url not in shown
-    monkeypatch.setenv("FLOATBASE_VIEWER", "live")
-    assert f'src="{viewer.url}?display=' in viewer._repr_html_()
 
 
 def test_a_saved_animation_plays_from_disk_without_network(page, viewer: Viewer, go2: Robot, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ import floatbase as fb
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.panels import live
 from floatbase.simulation import Live, Rollout, advice
-from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, shapes
+from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, shapes, with_image
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
@@ -110,7 +110,7 @@ class PushTogether(widgets.VBox):
         self.button, self.reset = widgets.Button(description="push both"), widgets.Button(description="reset")
         self.button.on_click(lambda _: self.push())
         self.reset.on_click(lambda _: self.begin_anew())
-        self._pictures = {title: widgets.HTML() for title in controllers}
+        self._pictures = {title: widgets.VBox() for title in controllers}
         columns = [
             widgets.VBox([widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]], layout=_HALF)
             for title in controllers
@@ -143,8 +143,8 @@ class PushTogether(widgets.VBox):
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The pictures are put in only here, as those of a slider panel."""
         for title, picture in self._pictures.items():
-            picture.value = self.views[title]._repr_html_()
-        return super()._repr_mimebundle_(**kwargs)
+            picture.children = [self.views[title].widget()]
+        return with_image(super()._repr_mimebundle_(**kwargs), *(picture.children[0] for picture in self._pictures.values()))
 
 
 def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:

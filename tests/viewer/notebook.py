@@ -1,0 +1,207 @@
+"""Notebooks without Jupyter: pages of a widget that a test plays itself, and a web page that shows widgets as notebooks do."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import queue
+import threading
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import tornado.httpserver
+import tornado.netutil
+import tornado.web
+import tornado.websocket
+from waiting import PATIENCE
+
+from .test_window import commands_in
+
+SILENCE = 0.3  # s without a message
+_CLIENTS: WeakKeyDictionary[Any, list[Client]] = WeakKeyDictionary()  # of each widget
+
+
+def hear(widget: Any, content: Any) -> None:
+    """Let a widget have a message of its page."""
+    widget.comm.handle_msg({"content": {"data": {"method": "custom", "content": content}}, "buffers": []})
+
+
+class Client:
+    """A page of a widget, as the kernel hears it. It answers only when it is told to.
+
+    name: of the page. in_cell: whether what it says is heard by the kernel's main thread, and so only between cells.
+    """
+
+    def __init__(self, widget: Any, name: str = "page", in_cell: bool = False, hello: bool = True):
+        self.widget, self.name, self.in_cell = widget, name, in_cell
+        self.messages: queue.Queue[tuple[dict[str, Any], list[bytes]]] = queue.Queue()
+        clients: list[Client] = _CLIENTS.setdefault(widget, [])
+        clients[:] = [client for client in clients if client.name != name] + [self]
+        widget.send = lambda content, buffers=None: [client.take(content, buffers or []) for client in clients]
+        if hello:
+            self.say("hello")
+
+    def say(self, words: str) -> None:
+        def speak() -> None:
+            hear(self.widget, {"page": self.name, "say": words})
+
+        if self.in_cell:
+            speak()  # tests run in the main thread
+        else:
+            thread = threading.Thread(target=speak)
+            thread.start()
+            thread.join()
+
+    def take(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+        if content.get("page", self.name) == self.name:
+            self.messages.put((content, buffers))
+
+    def message(self) -> tuple[dict[str, Any], list[bytes]]:
+        return self.messages.get(timeout=PATIENCE)
+
+    def frame(self) -> tuple[int, list[dict]]:
+        """Number and commands of the next frame, which is not answered."""
+        content, (data,) = self.message()
+        return content["frame"], commands_in(data)
+
+    def commands(self) -> list[dict]:
+        """The commands of the next frame, which is taken as drawn."""
+        number, commands = self.frame()
+        self.drawn(number)
+        return commands
+
+    def drawn(self, number: int) -> None:
+        self.say(json.dumps({"type": "done", "number": number}))
+
+    def make_live(self) -> None:
+        self.say('{"type": "live"}')
+
+    def hears_nothing(self) -> bool:
+        try:
+            self.messages.get(timeout=SILENCE)
+        except queue.Empty:
+            return True
+        return False
+
+
+_PAGE = """<!DOCTYPE html><html><head><link rel="icon" href="data:,"><style>.output { margin: 4px 0; }</style>
+</head><body><script type="module">
+const outputs = document.body;
+// A widget's model as anywidget gives it, with a websocket in place of a comm.
+window.show = async (id, state) => {
+  const heard = new Map(), el = document.createElement("div");
+  const socket = new WebSocket(`ws://${location.host}/comm?id=${id}`);
+  const bytes = (text) => new DataView(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
+  const fire = (name, ...args) => [...(heard.get(name) || [])].forEach((call) => call(...args));
+  const layout = {comm_live: true};
+  const model = {
+    get: (name) => name == "still" ? bytes(state.still) : name == "layout" ? layout : state[name],
+    send: (content) => socket.send(JSON.stringify(content)),
+    on: (name, call) => heard.set(name, [...(heard.get(name) || []), call]),
+    off: (name, call) => heard.set(name, (heard.get(name) || []).filter((other) => other !== call)),
+  };
+  el.className = "output";
+  outputs.append(el);
+  socket.onmessage = ({data}) => {
+    const {content, buffers} = JSON.parse(data);
+    fire("msg:custom", content, buffers.map(bytes));
+  };
+  socket.onclose = () => {
+    layout.comm_live = false;
+    fire("comm_live_update");
+  };
+  await new Promise((done) => { socket.onopen = done; });
+  const {default: widget} = await import("/widget.js");
+  const gone = await widget.render({model, el});
+  el.remove_output = () => { gone(); el.remove(); };
+};
+window.started = true;
+</script></body></html>"""
+
+
+class Notebook:
+    """A web server with a page that shows widgets. What pages say is heard in the server's thread, as in a subshell.
+
+    sizes: bytes of the buffers of all messages to pages. lose: how many frames from now on do not arrive.
+    """
+
+    def __init__(self) -> None:
+        self.widgets: dict[str, Any] = {}
+        self.sizes: list[int] = []
+        self.lose = 0
+        self.sockets: dict[str, list[_Comm]] = {}
+        self._loop = asyncio.new_event_loop()
+        self._listening = tornado.netutil.bind_sockets(0, "127.0.0.1")
+        self.url = f"http://127.0.0.1:{self._listening[0].getsockname()[1]}/"
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        own = {"notebook": self}
+        pages = [(r"/", _Text, {"text": _PAGE, "kind": "text/html"}), (r"/comm", _Comm, own)]
+        pages += [(r"/widget.js", _Code, own)]
+        server = tornado.httpserver.HTTPServer(tornado.web.Application(pages, websocket_max_message_size=64 << 20))
+        server.add_sockets(self._listening)
+        self._loop.run_forever()
+        server.stop()
+
+    def show(self, page: Any, widget: Any) -> Any:
+        """Put an output below the others; its frame."""
+        self.widgets[widget.model_id] = widget
+        widget.send = lambda content, buffers=None: self._send(widget.model_id, content, buffers or [])
+        state = {name: getattr(widget, name) for name in ("version", "name", "height")}
+        still = base64.b64encode(widget.still).decode()
+        page.evaluate("([id, state]) => show(id, state)", [widget.model_id, {**state, "still": still}])
+        return page.locator(".output").last.locator("iframe").element_handle().content_frame()
+
+    def _send(self, name: str, content: dict[str, Any], buffers: list[bytes]) -> None:
+        self.sizes += map(len, buffers)
+        if "frame" in content and self.lose:
+            self.lose -= 1
+            return
+        text = json.dumps({"content": content, "buffers": [base64.b64encode(data).decode() for data in buffers]})
+        self._loop.call_soon_threadsafe(lambda: [socket.write_message(text) for socket in self.sockets.get(name, [])])
+
+    def end(self) -> None:
+        """End the connections, as a kernel that has gone."""
+        self._loop.call_soon_threadsafe(lambda: [one.close() for some in self.sockets.values() for one in some])
+
+    def close(self) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(PATIENCE)
+
+
+class _Text(tornado.web.RequestHandler):
+    def initialize(self, text: str, kind: str) -> None:
+        self.text, self.kind = text, kind
+
+    def get(self) -> None:
+        self.set_header("Content-Type", self.kind)
+        self.finish(self.text)
+
+
+class _Code(tornado.web.RequestHandler):
+    def initialize(self, notebook: Notebook) -> None:
+        self.notebook = notebook
+
+    def get(self) -> None:
+        """The widget's own, which is the same for all; the page asks for it when the first one is shown."""
+        self.set_header("Content-Type", "text/javascript")
+        self.finish(next(iter(self.notebook.widgets.values())).get_state()["_esm"])
+
+
+class _Comm(tornado.websocket.WebSocketHandler):
+    def initialize(self, notebook: Notebook) -> None:
+        self.notebook = notebook
+
+    def open(self, *_: str, **__: str) -> None:
+        self.name = self.get_query_argument("id")
+        self.notebook.sockets.setdefault(self.name, []).append(self)
+
+    def on_message(self, message: str | bytes) -> None:
+        hear(self.notebook.widgets[self.name], json.loads(message))
+
+    def on_close(self) -> None:
+        self.notebook.sockets[self.name].remove(self)

@@ -1,0 +1,338 @@
+"""The picture in a notebook: how many frames pages get, busy kernels, pages that are slow, lost or strange, what is saved."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import numpy as np
+import psutil
+import pytest
+from IPython.core.interactiveshell import InteractiveShell
+from nbclient import NotebookClient
+from nbformat.v4 import new_code_cell, new_notebook
+from waiting import until
+
+from floatbase.robots import State
+from floatbase.viewer import Viewer, Window, wire
+from floatbase.viewer import page as pages
+
+from .looks import DRAWN, picture
+from .notebook import Client, Notebook, hear
+from .test_window import STRANGE
+
+MB = 1 << 20
+PACE = 1.0 / 30.0  # s from frame to frame, at least
+BLIND = 0.05  # s, while the page cannot answer
+NOTICE = "getComputedStyle(document.getElementById('notice')).display"
+
+
+def put(window: Window, number: float) -> None:
+    window.put([wire.set_transform("/meshcat/a", np.eye(4) * number)])
+
+
+def newest(commands: list[dict]) -> float:
+    return float(commands[-1]["matrix"][0])
+
+
+def draw_for(window: Window, seconds: float) -> int:
+    """Draw something new again and again; how often."""
+    drawn, until_then = 0, time.monotonic() + seconds
+    while time.monotonic() < until_then:
+        drawn += 1
+        put(window, drawn)
+        time.sleep(0.002)
+    return drawn
+
+
+def frames_of(client: Client) -> int:
+    """How many frames have come by now."""
+    time.sleep(2 * BLIND)
+    return sum("frame" in client.messages.get()[0] for _ in range(client.messages.qsize()))
+
+
+def test_a_page_that_does_not_answer_gets_two_frames_and_then_the_newest(window: Window) -> None:
+    put(window, 0)
+    client = Client(window.widget("a", 100))
+    assert client.frame()[0] == 1
+    drawn = draw_for(window, 1.0)
+    second = client.frame()
+    assert second[0] == 2 and newest(second[1]) < drawn
+    assert client.hears_nothing()
+    client.drawn(2)
+    third = client.frame()
+    assert third[0] == 3 and newest(third[1]) == drawn
+
+
+def test_a_page_that_answers_gets_the_pace_and_no_more(window: Window) -> None:
+    put(window, 0)
+    client = Client(window.widget("a", 100))
+    client.commands()
+    until_then, drawn, times = time.monotonic() + 1.0, 0, []
+    while time.monotonic() < until_then:
+        drawn += 1
+        put(window, drawn)
+        time.sleep(0.002)
+        while not client.messages.empty():
+            client.commands()
+            times.append(time.monotonic())
+    assert 5 <= len(times) <= 1.0 / PACE + 2
+
+
+def test_a_hundred_thousand_updates_for_a_stalled_page_take_no_memory(window: Window) -> None:
+    (_, command) = wire.set_object("/meshcat/a", wire.umsgpack.packb({"data": "x" * 20_000}))
+
+    def draw(n: int) -> None:
+        for i in range(n):
+            path = f"/meshcat/{i % 5}"
+            window.put([((path, "set_object", ""), command), wire.set_transform(path, np.eye(4))])
+
+    draw(5)
+    client = Client(window.widget("a", 100))
+    draw(5_000)
+    before = psutil.Process().memory_info().rss
+    draw(45_000)
+    assert psutil.Process().memory_info().rss - before < 20 * MB
+    assert frames_of(client) == 2
+    assert len(window.scene) == 10
+
+
+@pytest.fixture
+def shell() -> Iterator[InteractiveShell]:
+    yield InteractiveShell.instance()
+    InteractiveShell.clear_instance()
+
+
+@pytest.fixture
+def window_of_shell(shell: InteractiveShell) -> Iterator[Window]:
+    with Window() as opened:
+        shell.events.trigger("post_run_cell", None)  # the cell that opened it
+        yield opened
+
+
+@contextmanager
+def busy(shell: InteractiveShell) -> Iterator[None]:
+    """A cell that runs."""
+    shell.events.trigger("pre_run_cell", None)
+    yield
+    shell.events.trigger("post_run_cell", None)
+
+
+def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(shell: InteractiveShell, window_of_shell: Window) -> None:
+    window = window_of_shell
+    put(window, 0)
+    client = Client(window.widget("a", 100), in_cell=True)
+    client.commands()
+    with busy(shell):
+        draw_for(window, 1.0)
+        frames = frames_of(client)
+        assert 4 <= frames <= 1.1 / BLIND + 2
+    put(window, -1)
+    assert client.hears_nothing()  # what is under way has not been answered yet, now that it can be
+    client.drawn(1 + frames)
+    assert newest(client.commands()) == -1
+
+
+def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(
+    shell: InteractiveShell, window_of_shell: Window
+) -> None:
+    window = window_of_shell
+    put(window, 0)
+    client = Client(window.widget("a", 100))
+    client.commands()
+    with busy(shell):
+        draw_for(window, 0.5)
+        assert frames_of(client) == 2
+
+
+def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(
+    shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window = window_of_shell
+    monkeypatch.setattr("floatbase.viewer.connection.MOST_BLIND", 1000)
+    put(window, 0)
+    client = Client(window.widget("a", 100), in_cell=True)
+    client.commands()
+    with busy(shell):
+        draw_for(window, 1.0)
+        assert 2 <= frames_of(client) <= 10  # of 119 bytes each
+
+
+def test_a_long_cell_does_not_make_a_page_look_lost(
+    shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window = window_of_shell
+    monkeypatch.setattr("floatbase.viewer.connection.PATIENCE", 0.4)
+    put(window, 0)
+    client = Client(window.widget("a", 100), in_cell=True)
+    client.commands()
+    with busy(shell):
+        draw_for(window, 1.0)
+    put(window, -1)
+    frames = frames_of(client)
+    client.drawn(1 + frames)
+    assert newest(client.commands()) == -1 and window.browsers == 1
+
+
+def test_a_page_that_is_let_go_is_told_and_comes_back(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("floatbase.viewer.connection.PATIENCE", 0.2)
+    put(window, 0)
+    client = Client(window.widget("a", 100))
+    client.frame()
+
+    def let_go() -> bool:
+        put(window, 1)
+        return window.browsers == 0
+
+    until(let_go)
+    while "lost" not in client.message()[0]:
+        pass
+    client.drawn(1)  # it has not heard yet
+    assert "lost" in client.message()[0]
+    client.say("hello")
+    assert client.frame()[0] == 1 and window.browsers == 1
+    client.say("bye")
+    until(lambda: window.browsers == 0)
+
+
+def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window: Window) -> None:
+    client = Client(window.widget("a", 100), hello=False)
+    client.say("code")
+    content, (html, viewer) = client.message()
+    assert content["code"] and gzip.decompress(viewer) == pages.viewer_code()
+    assert gzip.decompress(html).decode() == pages.notebook_page()
+    assert len(html) + len(viewer) < 300_000
+    assert window.browsers == 0
+
+
+def test_what_no_page_of_a_notebook_says_is_ignored(window: Window, caplog: pytest.LogCaptureFixture) -> None:
+    put(window, 1)
+    widget = window.widget("a", 100)
+    client = Client(widget)
+    client.commands()
+    for content in (None, 3, "x", [], {}, {"page": "page"}, {"page": 3, "say": "hello"}, {"page": "page", "say": {}}):
+        hear(widget, content)
+    for words in STRANGE:
+        if isinstance(words, str) and words != "hello":
+            client.say(words)
+    client.say(json.dumps({"type": "done", "number": "many"}))
+    client.say(json.dumps({"type": "done", "number": 10**400}))
+    put(window, 2)
+    assert newest(client.commands()) == 2.0
+    assert not [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")]
+
+
+def test_pages_that_leave_without_a_word_are_forgotten_in_the_end(window: Window) -> None:
+    widget = window.widget("a", 100)
+    for i in range(60):
+        Client(widget, f"page {i}")
+    until(lambda: window.browsers == 50)
+
+
+def test_a_closed_window_says_so_to_its_pages_once_and_to_those_that_ask(window: Window) -> None:
+    widget = window.widget("a", 100)
+    put(window, 1)
+    client = Client(widget)
+    client.commands()
+    window.close()
+    assert client.message()[0] == {"closed": True} and client.hears_nothing()
+    client.say("hello")
+    assert client.message()[0] == {"closed": True}
+
+
+@pytest.fixture
+def notebook(page) -> Iterator[Notebook]:
+    page.set_viewport_size({"width": 450, "height": 400})
+    opened = Notebook()
+    page.goto(opened.url)
+    page.wait_for_function("window.started")
+    yield opened
+    page.goto("about:blank")
+    opened.close()
+
+
+def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_again(
+    notebook: Notebook, page: Any, standing: State
+) -> None:
+    viewer, *others = (Viewer(standing.robot, height=100) for _ in range(3))
+    viewer.show(standing)
+    frames = [notebook.show(page, view.widget()) for view in (viewer, *others)]
+    for frame in frames:
+        frame.wait_for_function(DRAWN)
+    code = len(gzip.compress(pages.viewer_code(), 9, mtime=0))
+    assert notebook.sizes.count(code) == 1
+    frames[0].evaluate("window.old = true")
+    notebook.lose = 1
+    viewer.show(standing, com=False)
+    until(lambda: notebook.lose == 0)
+    viewer.show(standing, com=False, title="the next one")
+    frames[0].wait_for_function("!window.old")
+    frames[0].wait_for_function(DRAWN)
+    assert frames[0].evaluate("!viewer.scene_tree.find(['meshcat']).children.com?.children.ball")
+    for view in (viewer, *others):
+        view.close()
+
+
+@pytest.mark.parametrize("how", ["kernel", "window"])
+def test_a_picture_stays_when_its_kernel_or_its_window_has_gone_and_says_so(
+    notebook: Notebook, page: Any, viewer: Viewer, standing: State, how: str
+) -> None:
+    viewer.show(standing)
+    frame = notebook.show(page, viewer.widget())
+    frame.wait_for_function(DRAWN)
+    assert frame.evaluate(NOTICE) == "none"
+    notebook.end() if how == "kernel" else viewer.close()
+    frame.wait_for_function(f"{NOTICE} == 'block'")
+    assert "run its cell again" in frame.evaluate("document.getElementById('notice').textContent")
+    assert frame.evaluate("viewer.scene_tree.find(['meshcat', 'robot']).object.visible")
+    picture(page, f"notebook_without_{how}")
+
+
+def test_an_output_has_the_widget_and_an_image_or_when_asked_the_scene(
+    viewer: Viewer, standing: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer.show(standing)
+    data, _ = viewer._repr_mimebundle_()
+    assert set(data) == {"application/vnd.jupyter.widget-view+json", "image/png", "text/plain"}
+    assert data["text/plain"] == repr(viewer)
+    monkeypatch.setenv("FLOATBASE_VIEWER", "static")
+    shown = viewer._repr_mimebundle_()
+    assert set(shown) == {"text/html"} and "srcdoc=" in shown["text/html"] and viewer.url not in shown["text/html"]
+    monkeypatch.delenv("FLOATBASE_VIEWER")
+    viewer.close()
+    assert set(viewer._repr_mimebundle_()) == {"text/html"}
+
+
+SAVED = (
+    """import floatbase as fb
+from floatbase.lessons import slider_panel, live, push_panel
+robot = fb.load("go2")
+view = fb.Viewer(robot, height=300)
+view.show(robot.standing())""",
+    """other = fb.Viewer(robot, height=300)
+slider_panel(other, lambda z: other.show(robot.standing(), com=z > 0.5) and None, z=(0.0, 0.5, 1.0))""",
+    """sim = fb.Simulation(robot)
+third = fb.Viewer(robot, height=300)
+third.show(sim.state)
+push_panel(live(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), third), third)""",
+)
+
+
+def test_a_saved_notebook_shows_every_picture_as_html(tmp_path: Path) -> None:
+    saved = NotebookClient(new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120).execute()
+    saved.metadata.pop("widgets")  # JupyterLab saves no widgets by default
+    nbformat.write(saved, tmp_path / "saved.ipynb")
+    assert (tmp_path / "saved.ipynb").stat().st_size < 0.3 * MB
+    command = [sys.executable, "-m", "nbconvert", "--to", "html", str(tmp_path / "saved.ipynb")]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    html = (tmp_path / "saved.html").read_text()
+    assert html.count("<img") == html.count('src="data:image/png;base64,') == 3
+    assert "127.0.0.1" not in html and "widget-view" not in html

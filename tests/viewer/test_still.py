@@ -1,0 +1,86 @@
+"""The image of a picture that a notebook keeps: drawn without a browser, it shows what the page shows."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from floatbase.dynamics import Contacts
+from floatbase.robots import Robot, State, load
+from floatbase.viewer import ALARM, CALM, COM, MEASURED, Viewer, shapes, with_image
+
+from .looks import hue_pixels
+
+KB = 1000
+
+
+def image(viewer: Viewer) -> np.ndarray:
+    """The image of a display, (height, width, 3)."""
+    data, _ = viewer._repr_mimebundle_()
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(data["image/png"]))).convert("RGB")).astype(int)
+
+
+def differing(one: np.ndarray, other: np.ndarray) -> int:
+    """How many pixels differ to the eye."""
+    return int((np.abs(one - other).max(axis=2) > 24).sum())
+
+
+def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    empty = image(viewer)
+    robot = image(viewer.show(standing, com=False))
+    assert differing(empty, robot) > 0.05 * robot[..., 0].size
+    full = image(viewer.show(standing, contacts, forces, support=True, labels=True, title="a title"))
+    for colour in (COM, MEASURED, CALM, ALARM):
+        assert hue_pixels(full, colour) > hue_pixels(robot, colour) + 50
+    lower_left = np.s_[full.shape[0] // 2 :, : full.shape[1] // 4]
+    assert differing(full[lower_left], image(viewer.show(standing, com=False))[lower_left]) > 500
+
+
+def test_what_is_nearer_hides_what_is_behind_and_translucent_things_do_not(viewer: Viewer) -> None:
+    viewer.show(viewer.robot.standing(), com=False)
+    viewer.camera("front")
+
+    def post(x: float, colour: tuple[float, float, float], radius: float = 0.08) -> shapes.Item:
+        return shapes.rod([x, 0.0, 0.2], np.eye(3), 0.2, radius, colour)
+
+    red, blue = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9)
+    viewer.draw({"far": post(-0.5, red), "near": post(0.5, blue)})
+    hidden = image(viewer)
+    viewer.draw({"far": post(-0.5, red, 0.4), "near": post(0.5, blue)})
+    beside = image(viewer)
+    assert hue_pixels(hidden, red) < 0.05 * hue_pixels(beside, red)
+    assert hue_pixels(hidden, blue) > 500
+
+
+@pytest.mark.parametrize("name", ["talos", "ur5", "solo8"])
+def test_the_image_of_any_robot_is_small(name: str) -> None:
+    viewer = Viewer(load(name))
+    viewer.show(viewer.robot.standing())
+    data, _ = viewer._repr_mimebundle_()
+    assert 5 * KB < len(data["image/png"]) < 80 * KB
+    viewer.close()
+
+
+def test_the_image_goes_with_a_robot_that_is_followed(go2: Robot, standing: State) -> None:
+    viewer = Viewer(go2, follow=True)
+    at_home = image(viewer.show(standing))
+    q = standing.q.copy()
+    q[:2] += [2.5, 0.0]  # a whole jump of the grid
+    away = image(viewer.show(State(go2, q)))
+    assert differing(at_home, away) < 0.02 * away[..., 0].size
+    viewer.close()
+
+
+def test_several_pictures_of_a_panel_are_one_image(viewer: Viewer, standing: State) -> None:
+    viewer.show(standing)
+    one, two = viewer.widget(), viewer.widget()
+    data, _ = with_image({}, one, two)
+    both = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
+    assert both.width == 2 * Image.open(io.BytesIO(one.still)).width
+    assert with_image({"text/plain": "x"}) == ({"text/plain": "x"}, {})
