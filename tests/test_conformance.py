@@ -26,7 +26,7 @@ from values import CONTACTS, CONTROLLER, EOM, HYDRAULIC, RECORD, ROBOT, STATE, U
 import floatbase as fb
 from floatbase.actuators import Delay, FirstOrderLag
 from floatbase.behaviours import Gains, Gait, Stand, Walk
-from floatbase.control import AnalyticController
+from floatbase.control import AnalyticController, Belief
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import ConstantTorques
 from floatbase.qp import table_top
@@ -194,7 +194,8 @@ EXAMPLES: dict[str, Any] = {
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
     "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02,
     "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
-    "contact_weight": 1e4,
+    "contact_weight": 1e4, "Belief.mass": 1.2, "gravity": False, "velocity_forces": False, "drift": False,
+    "unfelt": ["FL_foot"], "underactuated": False, "Belief.cones": False, "belief": Belief(mass=1.2),
 }  # fmt: skip
 
 # what only the package makes, and by what
@@ -214,7 +215,7 @@ LEFT_OUT = {
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
         "vertices", "conflicting_rows", "linear_program", "motion_of", "below_the_body", "target_shapes", "targets_at",
-        "QP.objective",
+        "QP.objective", "Belief.program", "Belief.check",
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",

@@ -8,7 +8,7 @@ import numpy as np
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.behaviours import LIPM, Gains, Gait, Swing
-from floatbase.control import AnalyticController, Rows
+from floatbase.control import AnalyticController, Belief, Rows
 from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_frame, moving_frame, seen_from_turning_frame
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torque_for_forces
@@ -48,5 +48,6 @@ VALUES = {
     "Rows": Rows("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
     "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", STATE, CONTACTS),
     "Gait": Gait.trot(ROBOT), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": PLAN, "Gains": Gains(),
+    "Belief": Belief(mass=1.2),
     "turning view": seen_from_turning_frame([0.0, 0.1], UP, UP),
 }  # fmt: skip

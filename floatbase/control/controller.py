@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal, TypeAlias, get_args
 import numpy.typing as npt
 
 from floatbase._arrays import LARGEST, Array, Fixed, checked, number, of_kind, plain_numbers, read_only
+from floatbase.control.belief import TRUTH, Belief
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, NormalForces, Rows
 from floatbase.control.problem import Problem, rehearsal
@@ -33,6 +34,7 @@ _OPTIONS = (
     "torque_limits",
     "rows",
     "contact_weight",
+    "belief",
     "solver",
     "path",
 )
@@ -55,6 +57,7 @@ class WholeBodyController(Fixed):
     contact_weight: None holds the contacts by rows, (5). A number, such as 1e4, puts ½ contact_weight ‖A q̈ - b‖² into the
         objective instead: contacts give way where torques and friction do not suffice to hold them, and only rows of one's own
         and bounds of normal forces can make a tick infeasible.
+    belief: what is taken for (7), the truth by default, see `floatbase.control.Belief`; any other takes the readable path.
     solver: one of `floatbase.qp.solvers()`.
     path: "readable" assembles and solves the QP as it is written. "compiled" solves the same problem many times faster
         (`floatbase.control.tick`), with tasks, constraints and rows of one's own too. "auto" takes compiled where it can.
@@ -92,15 +95,17 @@ class WholeBodyController(Fixed):
         torque_limits: npt.ArrayLike | None = None,
         rows: Sequence[Rows] = (),
         contact_weight: float | None = None,
+        belief: Belief = TRUTH,
         solver: str = "daqp",
         path: Path = "auto",
     ):
         of_kind("robot", robot, Robot)
         limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
         bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows, turn)
-        problem = Problem(robot, contacts, tasks, bounds)
+        problem = Problem(robot, contacts, tasks, bounds, belief)
         if contact_weight is not None:
-            problem = Problem(robot, *softened(contacts, problem.tasks, contact_weight), bounds)
+            problem = Problem(robot, *softened(contacts, problem.tasks, contact_weight), bounds, belief)
+        belief.check(contacts)
         bounds.check_names(contacts.names, _feet(robot))
         with rehearsal():
             problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
@@ -112,7 +117,7 @@ class WholeBodyController(Fixed):
         check_solver(solver)
         if not isinstance(path, str) or path not in get_args(Path):
             raise unknown_name("path", path, get_args(Path))
-        reason = "it was requested" if path == "readable" else obstacle(problem, solver)
+        reason = "it was requested" if path == "readable" else _obstacle(problem, solver)
         compiled = None if reason else Compiled(problem)
         if compiled is not None and warm_up:
             reason = compiled.warm_up()
@@ -213,6 +218,11 @@ class WholeBodyController(Fixed):
 
     def __repr__(self) -> str:
         return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"
+
+
+def _obstacle(problem: Problem, solver: str) -> str:
+    """Why a problem cannot run compiled, or ""."""
+    return obstacle(problem, solver) if problem.belief.is_true else "its belief is not the truth"
 
 
 def _feet(robot: Robot) -> list[str]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from floatbase._arrays import Array, Value, function, of_kind, positive, said
 from floatbase.affine import Affine
+from floatbase.control.belief import TRUTH, Belief
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
 from floatbase.dynamics import MOTION_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
@@ -35,9 +36,10 @@ class Problem(Value):
     contacts: Contacts
     tasks: Sequence[Task]
     limits: Limits
+    belief: Belief = TRUTH
 
     def __post_init__(self) -> None:
-        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits)):
+        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits), ("belief", Belief)):
             of_kind(name, getattr(self, name), kind)
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         torque_limits_of(self.robot.d, self.limits.torque_limits)
@@ -46,7 +48,7 @@ class Problem(Value):
         """The QP at a state and a time t in s."""
         if isinstance(state, State) and state.robot != self.robot:
             raise InputError(f"the state belongs to another robot, {state.robot!r}, than the problem, {self.robot!r}.")
-        return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t)
+        return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t, self.belief)
 
     def check(self, tasks: Sequence[Task] | None = None) -> None:
         """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and make no QP.
@@ -62,7 +64,9 @@ class Problem(Value):
                 rows.labels(len(rows.at(eom)[0]))
 
 
-def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
+def build_qp(
+    eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0, belief: Belief = TRUTH
+) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
     Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: those of
@@ -72,6 +76,7 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is missing).
     limits: the inequalities.
     t: s, the time that tasks with moving targets are evaluated at.
+    belief: what is taken for (7) instead of eom; tasks and rows of one's own see eom.
 
     Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a measured velocity that the
     contacts do not quite allow makes them inconsistent. The rows therefore count along the directions that A resolves well
@@ -79,10 +84,13 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     """
     of_kind("eom", eom, EquationsOfMotion)
     of_kind("limits", limits, Limits)
+    of_kind("belief", belief, Belief)
     if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
-    return assemble_qp(eom, costs, limits, limits.normal_forces(eom.contacts, t), [rows.at(eom, t) for rows in limits.rows])
+    rows = [each.at(eom, t) for each in limits.rows]
+    qp = assemble_qp(belief.equations(eom), costs, limits, limits.normal_forces(eom.contacts, t), rows)
+    return belief.program(qp, eom)
 
 
 def assemble_qp(

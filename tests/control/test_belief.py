@@ -1,0 +1,110 @@
+"""What a controller believes of (7), judged by Pinocchio's own dynamics of another model and by what the plan does."""
+
+from __future__ import annotations
+
+import judges
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import floatbase as fb
+from floatbase.control import Belief, build_qp
+from floatbase.errors import UnknownNameError
+from floatbase.qp import solve
+
+ROUNDING = 1e-9  # relative, of sums of forces of some 100 N
+
+
+def moving(seed: int = 3) -> fb.State:
+    state = judges.load("go2").random_state(seed, 0.1)
+    return state.replace(v=np.random.default_rng(seed).normal(size=state.robot.nv))
+
+
+def solved(belief: Belief, state: fb.State, **options: object) -> tuple[fb.EquationsOfMotion, dict[str, np.ndarray]]:
+    robot, contacts = state.robot, judges.stance(state.robot)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), belief=belief, **options)
+    command = controller(state.q, state.v)
+    assert command.path == "readable"
+    return fb.equations_of_motion(state, contacts), {"qdd": command.qdd, "tau": command.tau, "forces": command.forces.ravel()}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mass_and_the_parts_of_h_are_those_of_another_model(seed: int) -> None:
+    state = moving(seed)
+    eom = fb.equations_of_motion(state, judges.stance(state.robot))
+    heavy, data = state.robot.model.copy(), state.robot.model.createData()
+    for i, inertia in enumerate(state.robot.model.inertias):
+        heavy.inertias[i] = pin.Inertia(1.3 * inertia.mass, inertia.lever, 1.3 * inertia.inertia)
+    believed = Belief(mass=1.3).equations(eom)
+    M = pin.crba(heavy, data, state.q)
+    M = np.triu(M) + np.triu(M, 1).T
+    h = pin.nonLinearEffects(heavy, heavy.createData(), state.q, state.v)
+    assert np.allclose(believed.M, M, rtol=0.0, atol=ROUNDING * np.abs(M).max())
+    assert np.allclose(believed.h, h, rtol=0.0, atol=ROUNDING * np.abs(h).max())
+    weightless = state.robot.model.copy()
+    weightless.gravity = pin.Motion.Zero()
+    velocity = pin.nonLinearEffects(weightless, weightless.createData(), state.q, state.v)
+    assert np.allclose(Belief(gravity=False).equations(eom).h, velocity, rtol=0.0, atol=ROUNDING * np.abs(h).max())
+    still = pin.computeGeneralizedGravity(state.robot.model, state.robot.model.createData(), state.q)
+    assert np.allclose(Belief(velocity_forces=False).equations(eom).h, still, rtol=0.0, atol=ROUNDING * np.abs(h).max())
+
+
+def test_the_truth_is_the_default_and_changes_nothing() -> None:
+    state = moving()
+    controller = judges.controller_of("go2")
+    assert controller.problem.belief.is_true
+    qp = controller.qp(state)
+    again = build_qp(fb.equations_of_motion(state, controller.contacts), controller.tasks, controller.limits)
+    assert all(np.array_equal(getattr(qp, part), getattr(again, part)) for part in ("H", "g", "A", "b", "G", "h"))
+    assert controller.path == "compiled" and not Belief(drift=False).is_true
+
+
+def test_a_forgotten_drift_plans_contacts_that_accelerate_by_it() -> None:
+    eom, x = solved(Belief(drift=False), moving())
+    assert np.allclose(eom.A @ x["qdd"], 0.0, atol=1e-8)
+    assert np.abs(eom.b).max() > 0.1  # m/s²: there was something to forget
+
+
+def test_an_unfelt_contact_pushes_nobody_in_the_plan() -> None:
+    eom, x = solved(Belief(unfelt=["FR_foot"]), moving())
+    part = eom.contacts.force_slice("FR_foot")
+    others = np.array(x["forces"])
+    others[part] = 0.0
+    assert np.allclose(eom.M @ x["qdd"] + eom.h - eom.S @ x["tau"] - eom.J.T @ others, 0.0, atol=1e-6)
+
+
+def test_without_the_zeros_of_s_the_joints_obey_and_the_base_need_not() -> None:
+    eom, x = solved(Belief(underactuated=False), moving())
+    missing, _ = eom.residual(x["qdd"], x["tau"], x["forces"])
+    assert np.allclose(missing[6:], 0.0, atol=1e-6)
+    assert np.linalg.norm(missing[:3]) > 0.5 * eom.robot.weight, "motors of the base should carry it: torques cost"
+
+
+def test_without_cones_feet_pull() -> None:
+    robot, down = judges.load("go2"), np.array([0.0, 0.0, -30.0])
+    state, contacts = robot.standing(), judges.stance(robot)
+    tasks = [fb.CoMTask(state.com, acceleration=down), *fb.standing_tasks(state)[1:]]
+    normals = {
+        cones: fb.WholeBodyController(robot, contacts, tasks, belief=Belief(cones=cones))(state.q, state.v).forces.reshape(-1, 3)
+        for cones in (True, False)
+    }
+    assert normals[True][:, 2].min() > -1e-6
+    assert normals[False][:, 2].sum() == pytest.approx(robot.mass * (9.81 - 30.0), rel=0.2)
+
+
+def test_a_belief_survives_a_change_of_stance_and_a_walk() -> None:
+    robot, belief = judges.load("go2"), Belief(mass=1.1)
+    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), belief=belief)
+    lifted = controller.replace(contacts=controller.contacts.without("FL_foot"))
+    assert lifted.problem.belief is belief and lifted.path == "readable" and "belief" in lifted.path_reason
+    state = robot.standing()
+    qp = lifted.qp(state)
+    tau, forces = solve(qp)["tau"], solve(qp)["forces"]
+    carried = forces.reshape(-1, 3)[:, 2].sum()
+    assert np.all(np.isfinite(tau)) and carried == pytest.approx(1.1 * robot.weight, rel=0.05)
+
+
+def test_an_unknown_contact_is_an_error() -> None:
+    robot = judges.load("go2")
+    with pytest.raises(UnknownNameError, match="FL_foot"):
+        fb.WholeBodyController(robot, judges.stance(robot), [], belief=Belief(unfelt=["FL_fot"]))
