@@ -21,8 +21,9 @@ from floatbase.simulation import Actuators, Rollout
 MU = 1.2  # friction that controllers are told: rubber on a rough mat
 KP_COM, KP_BASE, FACETS = 6.0, 30.0, 8  # a gentle robot: what the equations get wrong, gains hardly mend
 PERIOD, SECONDS = 2e-3, 3.0  # s: of a tick, and of a record
+EARLY = 0.5  # s, in which forgotten drift is measured: nothing has slid far yet
 LOOPS = 10  # of the twist: more than a record has
-LARGEST_SEED = 10**9
+LARGEST_SEED, TRIES = 10**9, 4
 SOFT = 1e4  # weight of contacts that must give way, as of `Walk`
 
 Fault: TypeAlias = Literal["friction", "normal", "mass", "drift", "slow motors", "swapped motors"]
@@ -37,8 +38,8 @@ class Twist:
     tilt: degrees of the ground. heading: rad, where it rises least: the horizontal direction of its normal.
     """
 
-    pitch: float = 0.25
-    yaw: float = 0.42
+    pitch: float = 0.22
+    yaw: float = 0.45
     rate: float = 2.3
     way: int = 1
     tilt: float = 0.0
@@ -48,7 +49,8 @@ class Twist:
     def drawn(rng: np.random.Generator) -> Twist:
         """One by chance."""
         pitch, way = rng.uniform(0.2, 0.25), int(rng.choice([-1, 1]))
-        return Twist(pitch, 0.42 + 0.6 * (0.25 - pitch), rng.uniform(2.28, 2.32), way, rng.uniform(0.0, 4.0), rng.uniform(0.0, 6.28))
+        yaw, rate = 0.44 + 0.6 * (0.25 - pitch), rng.uniform(2.28, 2.32)  # about as fast as friction allows
+        return Twist(pitch, yaw, rate, way, rng.uniform(0.0, 4.0), rng.uniform(0.0, 2.0 * np.pi))
 
     @property
     def normal(self) -> Array:
@@ -121,7 +123,7 @@ class Mistake:
         """One of this kind by chance."""
         low, high = {
             "friction": (0.4, 0.7),
-            "normal": (14.0, 20.0),
+            "normal": (16.0, 22.0),
             "mass": (0.15, 0.25),
             "slow motors": (30.0, 70.0),
         }.get(fault, (0.0, 0.0))
@@ -182,29 +184,46 @@ def boxed(name: str, record: Rollout, qdd: Array) -> BlackBox:
 
 @dataclass(frozen=True)
 class Case:
-    """One case as it was drawn: what the investigation does not know."""
+    """One case as it was drawn: what the investigation does not know.
+
+    name: of the box. twists: by chance; the first that ends as it `falls` counts. mistake: the fault. pushes: kicks.
+    """
 
     name: str
-    twist: Twist
+    twists: tuple[Twist, ...]
     mistake: Mistake
     pushes: tuple[fb.Push, ...] = ()
 
+    @property
+    def falls(self) -> bool:
+        """Whether the robot is to fall."""
+        return bool(self.mistake.fault or self.pushes)
+
     def record(self) -> BlackBox:
-        """What it leaves to the investigation."""
-        return recorded(self.name, self.twist, self.mistake, self.pushes)
+        """What it leaves to the investigation. One forgotten drift in twenty is survived by good luck, and is tried again."""
+        for twist in self.twists:
+            box = recorded(self.name, twist, self.mistake, self.pushes)
+            if box.fell == self.falls:
+                break
+        return box
 
 
 def drawn_cases(seed: int) -> tuple[Case, ...]:
     """Six cases by chance, one of each fault, in an order by chance. The same for the same seed, a whole number."""
     rng = np.random.default_rng([whole("seed", seed, 0, LARGEST_SEED), 6])
     order = [FAULTS[i] for i in rng.permutation(len(FAULTS))]
-    return tuple(Case(name, Twist.drawn(rng), Mistake.drawn(fault, rng)) for name, fault in zip("ABCDEF", order, strict=True))
+    return tuple(Case(name, twists(rng), Mistake.drawn(fault, rng)) for name, fault in zip("ABCDEF", order, strict=True))
 
 
 def innocent_cases(seed: int) -> tuple[Case, ...]:
     """Two cases by chance without a fault: in the second somebody kicks the robot over."""
     rng = np.random.default_rng([whole("seed", seed, 0, LARGEST_SEED), 2])
-    return Case("N", Twist.drawn(rng), Mistake()), Case("K", Twist.drawn(rng), Mistake(), (drawn_kick(rng),))
+    return Case("N", twists(rng), Mistake()), Case("K", twists(rng), Mistake(), (drawn_kick(rng),))
+
+
+def twists(rng: np.random.Generator) -> tuple[Twist, ...]:
+    """Some by chance."""
+    return tuple(Twist.drawn(rng) for _ in range(TRIES))
 
 
 def drawn_kick(rng: np.random.Generator) -> fb.Push:
