@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -50,12 +51,12 @@ class BlackBox(Value):
     def __len__(self) -> int:
         return int(self.time.size)
 
-    def state(self, i: int) -> fb.State:
+    def state(self, i: int | np.integer[Any]) -> fb.State:
         """The state at row i."""
-        i = whole("row", i, -len(self), len(self) - 1)
-        return fb.State(self.robot, self.q[i], self.v[i])
+        row = whole("row", i, -len(self), len(self) - 1)
+        return fb.State(self.robot, self.q[row], self.v[row])
 
-    def equations(self, i: int) -> fb.EquationsOfMotion:
+    def equations(self, i: int | np.integer[Any]) -> fb.EquationsOfMotion:
         """(7) at row i by the data sheet, with the contacts as the controller was told them."""
         return fb.equations_of_motion(self.state(i), self.contacts)
 

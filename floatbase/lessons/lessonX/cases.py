@@ -16,6 +16,7 @@ from floatbase.errors import InfeasibleError, unknown_name
 from floatbase.lessons.lesson06 import with_feet
 from floatbase.lessons.lessonA import circling
 from floatbase.lessons.lessonX.box import BlackBox
+from floatbase.objectives import Task
 from floatbase.simulation import Actuators, Rollout
 
 MU = 1.2  # friction that controllers are told: rubber on a rough mat
@@ -71,7 +72,7 @@ class Pilot:
 
     def __init__(self, state: fb.State, contacts: fb.Contacts, twist: Twist, belief: Belief):
         path = circling(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.way)
-        tasks = [
+        tasks: list[Task] = [
             fb.CoMTask(state.com, kp=KP_COM),
             fb.OrientationTask("base", path, kp=KP_BASE),
             fb.PostureTask(state.q),

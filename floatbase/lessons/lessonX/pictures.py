@@ -78,4 +78,5 @@ def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
         f"thick: needed; thin: ordered, {ms:.0f} ms late; all joints differ by {off:.2f} N·m in the median",
     )
     text = "".join(f'<text x="{EDGE}" y="{HEIGHT + 14 + 18 * i}" font-size="13">{line}</text>' for i, line in enumerate(words))
-    return f'<svg viewBox="0 0 {WIDTH} {HEIGHT + 40}" style="max-width: 100%; width: {WIDTH}px" fill="currentColor">{drawn}{text}</svg>'
+    size = f'viewBox="0 0 {WIDTH} {HEIGHT + 40}" style="max-width: 100%; width: {WIDTH}px"'
+    return f'<svg {size} fill="currentColor">{drawn}{text}</svg>'

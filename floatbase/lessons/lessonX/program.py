@@ -34,7 +34,7 @@ def of_motors(box: BlackBox) -> str:
     off = np.median(abs(told - got), axis=0)
     if off.max() < 0.5:  # N·m
         return ""
-    constants = np.arange(0, 120, 2)  # ms
+    constants = range(0, 120, 2)  # ms
     period = box.time[1] - box.time[0]
     late = [np.median(abs(lagged(told, period, ms) - got)) for ms in constants]
     if min(late) < 0.3 * late[0]:

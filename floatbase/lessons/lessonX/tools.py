@@ -33,7 +33,10 @@ def needed(box: BlackBox) -> Array:
 
 
 def lagged(orders: npt.ArrayLike, period: float, ms: float) -> Array:
-    """Orders, (n, d), after a first-order lag that begins with the first of them. period: s, of a row. ms: its time constant."""
+    """Orders, (n, d), after a first-order lag that begins with the first of them.
+
+    period: s, of a row. ms: its time constant.
+    """
     given = np.asarray(orders, dtype=np.float64)
     out, share = np.array(given), -np.expm1(-period / (1e-3 * ms)) if ms > 0 else 1.0
     for i in range(1, len(out)):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from floatbase.lessons.lessonX.box import BlackBox
-from floatbase.lessons.lessonX.cases import EARLY, FAULTS, MU, Case, Fault
+from floatbase.lessons.lessonX.cases import EARLY, FAULTS, MU, Case
 from floatbase.lessons.lessonX.tools import ground_normal
 
 NOTHING = "nothing"
