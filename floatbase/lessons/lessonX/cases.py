@@ -136,8 +136,14 @@ class Mistake:
         return Mistake(fault, size, heading, (names[first], names[second]))
 
 
-def recorded(name: str, twist: Twist, mistake: Mistake, pushes: tuple[fb.Push, ...] = ()) -> BlackBox:
-    """The record of go2 that twists while something is wrong."""
+def recorded(
+    name: str,
+    twist: Twist,
+    mistake: Mistake,
+    pushes: tuple[fb.Push, ...] = (),
+    seconds: float = SECONDS,
+) -> BlackBox:
+    """The record of go2 that twists while something is wrong, until it falls or so many seconds are over."""
     robot, fault = fb.load("go2"), mistake.fault
     mu = mistake.size if fault == "friction" else MU
     told = tilted(twist.normal, mistake.size, mistake.heading) if fault == "normal" else twist.normal
@@ -149,7 +155,7 @@ def recorded(name: str, twist: Twist, mistake: Mistake, pushes: tuple[fb.Push, .
     pilot.planned.clear()
     sim = fb.Simulation(robot, fb.Ground(mu, normal=twist.normal))
     sim.reset(state)
-    record = fb.rollout(sim, pilot, SECONDS, pushes, PERIOD, actuators)
+    record = fb.rollout(sim, pilot, seconds, pushes, PERIOD, actuators)
     return boxed(name, record, np.array(pilot.planned[: len(record)]))
 
 
@@ -248,15 +254,21 @@ def innocent_boxes(seed: int) -> tuple[BlackBox, ...]:
     return tuple(case.record() for case in innocent_cases(seed))
 
 
-def crash_test(fault: Fault | None = None, size: float = 0.0, joints: tuple[str, str] = ("", "")) -> BlackBox:
+def crash_test(
+    fault: Fault | None = None,
+    size: float = 0.0,
+    joints: tuple[str, str] = ("", ""),
+    seconds: float = SECONDS,
+) -> BlackBox:
     """A crash of our own, whose fault we know, to try instruments on.
 
     fault: one of `FAULTS`; None for a robot without.
     size, joints: of the fault, see `Mistake`.
+    seconds: of the record, unless it ends in a fall before.
     """
     if fault is not None and fault not in FAULTS:
         raise unknown_name("fault", fault, FAULTS)
-    return recorded("our own", Twist(), Mistake(fault, size, 0.0, joints))
+    return recorded("our own", Twist(), Mistake(fault, size, 0.0, joints), seconds=seconds)
 
 
 def case_zero() -> BlackBox:
