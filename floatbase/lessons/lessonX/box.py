@@ -67,4 +67,4 @@ class BlackBox(Value):
         return bool(1.0 - 2.0 * (x**2 + y**2) < np.cos(np.pi / 4) or self.q[-1, 2] < 0.5 * self.q[0, 2])
 
     def __repr__(self) -> str:
-        return f"BlackBox({self.name}: {self.robot.name}, {len(self)} rows to {self.time[-1]:.3f} s)"
+        return f"BlackBox({self.name}: {self.robot.name}, {self.time[-1]:.1f} s{', fell' if self.fell else ''})"
