@@ -71,7 +71,7 @@ def _kicks() -> dict[str, Callable[[], Any]]:
         "The blows of the fall are in it, too: take the time of the kick alone.": lambda: (
             0.002 * np.sum([_turned(i, row) for i, row in enumerate(needed(kicked_box())[:, :3])], axis=0)
         ),
-        "That is the force, N. How long did it last?": lambda: _residual()[1].mean(axis=0),
+        "That is the force, N. How long did it last?": lambda: _impulse() / innocent_cases(VISITED)[1].pushes[0].duration,
         "That is what the robot's momentum gained. The ground has its part in that.": _momentum,
     }
 

@@ -51,13 +51,17 @@ def feet(box: BlackBox, i: int | np.integer[Any]) -> Array:
 
 
 def ground_normal(box: BlackBox) -> Array:
-    """The normal of the plane in which the feet stand, (3,): the mean over the rows in the first 0.1 s where all four bear."""
+    """The normal of the plane in which the feet stand, (3,): the mean over the rows in the first 0.1 s where all four bear.
+
+    Where a foot lifts at once, of the first row.
+    """
+    rows = np.flatnonzero(box.time - box.time[0] < 0.1)
+    bears = [i for i in rows if np.linalg.norm(box.measured[i].reshape(-1, 3), axis=1).min() > _STANDS]
     found = []
-    for i in np.flatnonzero(box.time - box.time[0] < 0.1):
-        if np.linalg.norm(box.measured[i].reshape(-1, 3), axis=1).min() > _STANDS:
-            places = feet(box, i)
-            normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
-            found.append(normal * np.sign(normal[2]))
+    for i in bears or rows[:1]:
+        places = feet(box, i)
+        normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
+        found.append(normal * np.sign(normal[2]))
     mean = np.mean(found, axis=0)
     return np.asarray(mean / np.linalg.norm(mean))
 
