@@ -30,7 +30,7 @@ from floatbase.control import AnalyticController, Belief
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import ConstantTorques
 from floatbase.qp import table_top
-from floatbase.simulation import Live
+from floatbase.simulation import AlteredSimulation, Live, World
 from floatbase.viewer import plots, programs, recording
 
 ROOMS = (
@@ -115,7 +115,7 @@ ACCEPTED: dict[str, set[str]] = {
     "PostureTask.velocity": ANY_LENGTH, "PostureTask.acceleration": ANY_LENGTH,
     "Ground.offset": {"column"}, "Robot.standing.offset": {"column"},
     "time": {"one too many"}, "times": {"one too many"},
-    "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
+    "Live.use.actuators": {"None"}, "about.x": {"NaN", "inf", "NaN inside", "1e300", "1e308"},
 }  # fmt: skip
 
 ZERO = np.zeros(12)
@@ -194,7 +194,11 @@ EXAMPLES: dict[str, Any] = {
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
     "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02,
     "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
-    "contact_weight": 1e4, "Belief.mass": 1.2, "gravity": False, "velocity_forces": False, "drift": False,
+    "contact_weight": 1e4, "section": "stance", "slider.column": "", "choice.value": 0, "choices": ["a", "b"], "symbol": "M",
+    "part": "shown", "words": "text", "code": True, "strip.unit": "N", "Viewer.term.value": True,
+    "AlteredSimulation.ground": 0.7, "mass": 1.2, "friction": 0.5,
+    "untouched": ["FL_foot"], "magnets": 20.0, "world": World(mass=1.2),
+    "gravity": False, "velocity_forces": False, "drift": False,
     "unfelt": ["FL_foot"], "underactuated": False, "Belief.cones": False, "belief": Belief(mass=1.2),
 }  # fmt: skip
 
@@ -213,7 +217,8 @@ LEFT_OUT = {
         "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
-        "Simulation.advance", "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
+        "Simulation.advance", "AlteredSimulation.advance",
+        "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
         "vertices", "conflicting_rows", "linear_program", "motion_of", "below_the_body", "target_shapes", "targets_at",
         "QP.objective", "Belief.program", "Belief.check",
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
@@ -228,13 +233,15 @@ LEFT_OUT = {
             for kind in ("PointContact", "FlatFootContact", "RollingWheel", "LinearConstraint")
             for method in ("positions", "jacobian", "constraint", "generators", "slip")),
     ),
+    "moves a control that is there, with tests of its own": ("Viewer.move",),
     "ends what other calls need": ("Viewer.close", "Live.close"),
     "starts processes, with tests of its own": ("sweep", "push_rose", "Table.read"),
-    "starts a thread": ("Live.push", "Live.start", "Live.reset"),
+    "starts a thread": ("Live.push", "Live.soon", "Live.start", "Live.reset"),
 }  # fmt: skip
 ALONE = {name for names in LEFT_OUT.values() for name in names}
 SELVES: dict[str, Any] = {
-    "Simulation": SIM, "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
+    "Simulation": SIM, "AlteredSimulation": AlteredSimulation(ROBOT),
+    "Viewer": VIEW, "WholeBodyController": CONTROLLER, "Live": LIVE,
     "AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "HydraulicActuators": HYDRAULIC,
     "Delay": Delay(ROBOT, 0.01), "FirstOrderLag": FirstOrderLag(ROBOT, 10.0),
     "Walk": WALK, "Stand": Stand(ROBOT, fb.Contacts.feet(ROBOT)),

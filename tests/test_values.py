@@ -21,8 +21,9 @@ from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
 from floatbase.control import AnalyticController
 from floatbase.dynamics import PointContact
 
-WITHOUT_ARRAYS = ("ActiveSetRun", "FeasibleSpace", "Gains", "Gait", "Problem", "Residuals", "Rows", "Table")
+WITHOUT_ARRAYS = ("ActiveSetRun", "Belief", "FeasibleSpace", "Gains", "Gait", "Problem", "Residuals", "Rows", "Table", "World")
 NO_VALUES = {
+    "physics that changes": "AlteredSimulation",
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators Simulation WholeBodyController",
     "a text": "RowLabel",
     "memory of a thread or a window": "Live SliderPanel Viewer Window",

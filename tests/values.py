@@ -13,7 +13,7 @@ from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_f
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torque_for_forces
 from floatbase.qp import active_set, table_top
-from floatbase.simulation import PushRose, Table
+from floatbase.simulation import PushRose, Table, World
 
 UP = np.array([0.0, 0.0, 1.0])
 ROBOT = judges.load("go2")
@@ -48,6 +48,6 @@ VALUES = {
     "Rows": Rows("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
     "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", STATE, CONTACTS),
     "Gait": Gait.trot(ROBOT), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": PLAN, "Gains": Gains(),
-    "Belief": Belief(mass=1.2),
+    "Belief": Belief(mass=1.2), "World": World(mass=1.2),
     "turning view": seen_from_turning_frame([0.0, 0.1], UP, UP),
 }  # fmt: skip

@@ -64,9 +64,7 @@ class Problem(Value):
                 rows.labels(len(rows.at(eom)[0]))
 
 
-def build_qp(
-    eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0, belief: Belief = TRUTH
-) -> QP:
+def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0, belief: Belief = TRUTH) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
     Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: those of

@@ -73,13 +73,13 @@ class Contacts(Value):
         return Contacts([_contact(*one) for one in each])
 
     @staticmethod
-    def feet(robot: Robot, mu: PerFoot = DEFAULT_MU) -> Contacts:
+    def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
         """All feet of the robot as they are, flat ones with their corners, the others as points; none where it has none.
 
-        mu: as for `points`.
+        mu, normals: as for `points`.
         """
         return Contacts(
-            [_contact(*each) for each in _feet(robot, None, mu, None)] if of_kind("robot", robot, Robot).feet else []
+            [_contact(*each) for each in _feet(robot, None, mu, normals)] if of_kind("robot", robot, Robot).feet else []
         )
 
     @cached_property

@@ -1,5 +1,6 @@
 """Physics that shares no code with the controller: MuJoCo, built from the same URDF."""
 
+from floatbase.simulation.altered import AlteredSimulation, World
 from floatbase.simulation.build import Ground
 from floatbase.simulation.conversion import Conversion
 from floatbase.simulation.live import SEEN, Live, advice
@@ -11,6 +12,6 @@ from floatbase.simulation.sweep import sweep
 from floatbase.simulation.table import Table
 
 __all__ = [
-    "SEEN", "Actuators", "Controller", "Conversion", "Ground", "Live", "Push", "PushRose", "Rollout", "Simulation", "Table",
-    "advice", "push_rose", "rollout", "sweep",
+    "SEEN", "Actuators", "AlteredSimulation", "Controller", "Conversion", "Ground", "Live", "Push", "PushRose", "Rollout",
+    "Simulation", "Table", "World", "advice", "push_rose", "rollout", "sweep",
 ]  # fmt: skip

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from types import EllipsisType
 
 import numpy.typing as npt
 
@@ -59,13 +60,14 @@ class Live:
         self.error: Exception | None = None
         self._controller, self._show, self._actuators, self._after_reset = controller, show, actuators, after_reset
         self._period = positive("control_period", control_period, "s")
-        self._duration = max(1, round(_SLICE / self._period)) * self._period  # s, of a slice: a whole number of ticks
+        self._duration = _slice_of(self._period)  # s
         self._idle = positive("idle", idle, "s")
         self._speed = 1.0
         self._lock = threading.Lock()  # over all that follows
         self._pushes: tuple[Push, ...] = ()  # of the last slice
         self._requested: list[Push] = []  # for the next one
         self._reset_requested = False
+        self._calls: list[Callable[[], None]] = []
         self._status = "paused"
         self._listener: Callable[[str], None] | None = None
         self._last_call = time.monotonic()
@@ -101,11 +103,38 @@ class Live:
         """Push now, and run: as `Push`. A fallen robot is put back on its feet first, and the push begins with it, at 0 s."""
         self._run(push=Push(force, 0.0, duration, frame))  # type: ignore[arg-type]
 
-    def use(self, controller: Controller) -> None:
-        """Go on under another controller from the next slice."""
+    def use(
+        self,
+        controller: Controller,
+        *,
+        sim: Simulation | None = None,
+        actuators: Actuators | EllipsisType | None = ...,
+        control_period: float | None = None,
+    ) -> None:
+        """Go on under another controller from the next slice, and where they are given with other things.
+
+        controller, sim, actuators: as for `rollout`; actuators stay where none are given, and None takes them away.
+        control_period: s.
+        """  # fmt: skip
         function("the controller", controller, "controller(q, v, t)")
+        if actuators is not ...:
+            check_actuators(actuators)
+        period = self._period if control_period is None else positive("control_period", control_period, "s")
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
+            self.sim = self.sim if sim is None else of_kind("sim", sim, Simulation)
+            self._actuators = self._actuators if actuators is ... else actuators
+            self._period, self._duration = period, _slice_of(period)
+
+    def soon(self, call: Callable[[], None]) -> None:
+        """Call `call()` in the run's thread before its next slice, where nothing else touches the simulation.
+
+        An exception of it ends the run, as one of the controller does.
+        """
+        function("call", call, "call()")
+        with self._lock:
+            self._last_call = time.monotonic()
+            self._calls.append(call)
 
     def slow_motion(self, speed: float) -> None:
         """Simulated time per real time, 1 by default."""
@@ -160,19 +189,26 @@ class Live:
     def _slice(self, stop: threading.Event) -> None:
         """One slice of physics, shown; then go on, or stop because of its outcome or because nobody has called for long."""
         with self._lock:
-            controller, requested, reset = self._controller, self._requested, self._reset_requested
-            self._requested, self._reset_requested = [], False
+            calls, self._calls = self._calls, []
         try:
+            for call in calls:
+                call()
+            with self._lock:
+                requested, reset = self._requested, self._reset_requested
+                self._requested, self._reset_requested = [], False
             if reset:
                 self.sim.reset()
                 self._pushes = ()
                 if self._after_reset is not None:
                     self._after_reset()
-            now = self.sim.time
+            with self._lock:
+                sim, controller, actuators = self.sim, self._controller, self._actuators
+                period, duration = self._period, self._duration
+            now = sim.time
             self._pushes = tuple(p for p in self._pushes if now < p.start + p.duration + SEEN)
             self._pushes += tuple(replace(push, start=now) for push in requested)
-            present = acting(self._pushes, now, now + self._duration)  # the others are only listed, to be seen
-            record = rollout(self.sim, controller, self._duration, present, self._period, self._actuators)
+            present = acting(self._pushes, now, now + duration)  # the others are only listed, to be seen
+            record = rollout(sim, controller, duration, present, period, actuators)
             record = replace(record, pushes=self._pushes)
             if len(record):
                 self._show(record)
@@ -192,3 +228,8 @@ class Live:
             stop.set()
             changed = self._become(outcome)
         self._tell(changed)
+
+
+def _slice_of(period: float) -> float:
+    """s of a slice: a whole number of ticks, each of `period` s."""
+    return max(1, round(_SLICE / period)) * period

@@ -98,7 +98,7 @@ class Rollout(Value):
         rolling: whether the way that a ball rolls counts, too: its lowest point moves with it, and nothing slides.
         """
         self._check_not_empty()
-        places = self.foot_positions if flag("rolling", rolling) else self.foot_positions - self._rolled()
+        places = self.foot_positions if flag("rolling", rolling) else self.foot_positions - self.rolled()
         farthest, first = np.zeros(places.shape[1]), 0
         for contact in self.contacts:
             points = slice(first, first := first + len(contact.point_names))
@@ -116,7 +116,7 @@ class Rollout(Value):
         edges = np.flatnonzero(stands[1:] != stands[:-1])
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
-    def _rolled(self) -> Array:
+    def rolled(self) -> Array:
         """How far each point's ball has rolled, shape (n, points, 3), m, world: the integral of ω × radius · normal."""
         arms = [
             (contact.name, getattr(contact, "radius", 0.0) * contact.normal)

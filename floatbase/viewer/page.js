@@ -5,21 +5,28 @@ const part = (id) => document.getElementById(id);
 
 function startViewer() {
   const viewer = new MeshCat.Viewer(part("meshcat-pane"));
-  viewer.gui.__folders.Scene.close();
+  viewer.gui.domElement.style.display = "none";  // meshcat's own list of all objects
   const player = startPlayer(viewer);
-  const camera = startCamera(viewer);
   const panel = startPanel(viewer);
+  const camera = startCamera(viewer, panel);
   const legend = startLegend(viewer, camera);
+  const manners = startManners(viewer, camera);
   const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
-    set_title: (command) => { part("title").textContent = command.text; },
+    set_views: manners.views,
+    set_title: (command) => {
+      part("title").textContent = command.text;
+      manners.describe(command.text);
+    },
     set_legend: (command) => { legend.show(command.items); },
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
     set_theme: (command) => { document.body.className = command.name; },
     set_animation: (command) => { meshcat(command); player.load(command); },
-    set_control: (command) => { panel.add(command); camera.makeRoom(); },
+    set_control: panel.add,
     move_control: panel.move,
+    set_text: panel.text,
+    set_strip: panel.strip,
   };
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
@@ -77,7 +84,7 @@ function startLegend(viewer, camera) {
   button.onblur = () => open(kept);
   button.onclick = () => keep(!kept);
   const sizes = new ResizeObserver(fold);
-  for (const one of [part("meshcat-pane"), part("player"), viewer.gui.domElement]) sizes.observe(one);
+  for (const one of [part("meshcat-pane"), part("player"), part("panel")]) sizes.observe(one);
   return {
     show(items) {
       lines.replaceChildren(...items.map(([colour, text, symbol]) => {
@@ -101,18 +108,19 @@ function spot(colour, symbol = "patch") {
 
 const LAG = 0.3;  // s by which the camera is behind what it follows, so that it does not shake with every step
 const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
+const WIDE = 1.2;  // width over height of a picture into which the robot fits; a narrower one shows it smaller
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
-function startCamera(viewer) {
+function startCamera(viewer, panel) {
   const {Vector3} = MeshCat.THREE;
   // how far the camera has gone with what it follows, and how far that was from its place at home when the camera was set
   const gone = new Vector3(), begin = new Vector3();
-  let path = [], from = new Vector3(), smooth = false, anew = true, room = false, clock = 0;
+  let path = [], from = new Vector3(), smooth = false, anew = true, clock = 0;
   // searched each time, because another picture has another object there, or none
   const node = (names) => names.reduce((at, name) => at && at.children[name], viewer.scene_tree);
   // while the panel is open, the middle of the picture is left of it by so many pixels
-  const aside = () => room && !viewer.gui.closed ? viewer.gui.width / 2 : 0;
+  const aside = () => panel.width() / 2;
   // and above it where the player would hide the feet
   const above = () => part("player").offsetHeight / 2;
 
@@ -136,6 +144,11 @@ function startCamera(viewer) {
   viewer.render = () => {
     const moving = path.length > 0 && go();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
+    const zoom = Math.min(1, (w - 2 * aside()) / h / WIDE);
+    if (zoom != viewer.camera.zoom) {
+      viewer.camera.zoom = zoom;
+      viewer.camera.updateProjectionMatrix();
+    }
     if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
     else viewer.camera.clearViewOffset();
     render();
@@ -143,7 +156,6 @@ function startCamera(viewer) {
   };
   return {
     aside,
-    makeRoom() { room = true; },
     look(command) {
       viewer.camera.fov = command.fov;
       viewer.camera.position.fromArray(command.position);
@@ -156,34 +168,6 @@ function startCamera(viewer) {
       from.fromArray(command.from);
       begin.fromArray(command.begin);
       smooth = command.smooth;
-    },
-  };
-}
-
-// The panel: sliders, check boxes and buttons that report to the window. meshcat's own would read their names as HTML.
-function startPanel(viewer) {
-  const me = String(Math.random()), reported = new Map();
-  const report = (name, value) => {
-    reported.set(name, value);
-    viewer.connection.send(JSON.stringify({type: "control", name, value, by: me}));
-  };
-  const controls = viewer.gui_controllers = Object.create(null);  // in it no name has a meaning, not even "constructor"
-  return {
-    add({name, value, min, max, step}) {
-      if (controls[name]) viewer.gui.remove(controls[name]);
-      const made = viewer.gui.add({value: value ?? (() => report(name, null))}, "value", min, max, step);
-      const label = made.domElement.parentElement.querySelector(".property-name");
-      label.textContent = name;
-      if (value === undefined) label.style.width = "100%";
-      else made.onChange((now) => report(name, now));
-      controls[name] = made;
-      viewer.gui.open();
-    },
-    move({name, value, by}) {
-      // of this page's own reports that come back only the last one is news: the reader may be moving the control
-      if (!controls[name] || (by == me && value !== reported.get(name))) return;
-      controls[name].object.value = value;
-      controls[name].updateDisplay();
     },
   };
 }
@@ -218,7 +202,7 @@ function startPlayer(viewer) {
       if (![...speed.options].some((option) => option.value == requested)) speed.add(new Option(`${requested}×`, requested));
       speed.value = requested;
       animator().mixer.timeScale = command.options.speed;
-      if (command.options.paused) {
+      if (command.options.paused || calm()) {
         animator().pause();
         animator().seek(0);  // the first picture: before this, items that come later are seen, too
       }

@@ -20,6 +20,10 @@ from floatbase.viewer import wire
 
 _BODY = """
 <div><div id="meshcat-pane"></div></div>
+<div id="tools"><button type="button" aria-label="first view" title="back to the first view (key: h)">⌂</button>
+<details><summary title="other views, and what is shown">view</summary><div></div></details></div>
+<div id="board" role="group" aria-label="terms of the equation of motion"></div>
+<button id="fold" type="button" aria-label="panel" aria-expanded="true" title="fold the panel"></button><div id="panel"></div>
 <div id="title"></div>
 <div id="legend"><div id="lines"></div><button aria-controls="lines" aria-expanded="false"><span></span>legend</button></div>
 <div id="notice">The viewer is closed, or its kernel was restarted: run its cell again. A page with the same address comes back
@@ -45,7 +49,7 @@ def viewer_code() -> bytes:
 def live_page() -> str:
     """The page that a window serves."""
     start = "window.MeshCat ? startWhenSeen(follow) : comeBack();"  # the window may close while the page loads
-    return _page(f'<script src="main.min.js"></script><script>{_own("page.js")}{start}</script>', "floatbase")
+    return _page(f'<script src="main.min.js"></script><script>{_scripts()}{start}</script>', "floatbase")
 
 
 def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
@@ -54,7 +58,7 @@ def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
     commands: of the scene, as `Scene.file_commands` gives them.
     """
     text = held_viewer_code() + held("scene", wire.frame(commands))
-    return _page(f"{text}<script>{_own('page.js')}open();</script>", title)
+    return _page(f"{text}<script>{_scripts()}open();</script>", title)
 
 
 def scene_in(text: str) -> list[bytes]:
@@ -68,7 +72,7 @@ def scene_in(text: str) -> list[bytes]:
 @cache
 def inner_page() -> str:
     """A page for a frame inside another page, which gives it the viewer's code and a scene (see page.js)."""
-    return _page(f"<script>{_own('page.js')}waitForScene();</script>", "floatbase")
+    return _page(f"<script>{_scripts()}waitForScene();</script>", "floatbase")
 
 
 @cache
@@ -88,8 +92,12 @@ def _own(name: str) -> str:
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
+def _scripts() -> str:
+    return _own("page.js") + _own("panel.js") + _own("manners.js")
+
+
 def _page(scripts: str, title: str) -> str:
     return (
-        f'<!DOCTYPE html><html><head><meta charset="utf-8"><link rel="icon" href="data:,"><title>{html.escape(title)}'
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><link rel="icon" href="data:,"><title>{html.escape(title)}'
         f"</title><style>{_own('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
     )

@@ -86,8 +86,8 @@ class Scene:
         return {key: umsgpack.unpackb(command) for key, command in self._sorted_entries()}
 
     def file_commands(self) -> list[bytes]:
-        """The commands that a file can hold: all but the controls, which need a program that answers them."""
-        return [command for key, command in self._sorted_entries() if not key[1].endswith("_control")]
+        """The commands that a file can hold: all but those of the panel, which needs a program that answers it."""
+        return [command for key, command in self._sorted_entries() if not key[1].endswith(("_control", "_text", "_strip"))]
 
     def __len__(self) -> int:
         return len(self._entries)

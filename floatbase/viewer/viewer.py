@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, flag, function, number, of_kind, positive, said, text, unit_vector, whole
+from floatbase._arrays import Array, flag, of_kind, positive, said, text, unit_vector, whole
 from floatbase.behaviours import Step, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
@@ -21,6 +21,7 @@ from floatbase.viewer import film, marks, page, recording, shapes, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
+from floatbase.viewer.controls import Controls
 from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, below, kinds
 from floatbase.viewer.place import kernel_is_remote
@@ -42,7 +43,7 @@ _PROBE = """<script>fetch("URL", {mode: "no-cors"}).catch(() => {
 });</script>"""
 
 
-class Viewer:
+class Viewer(Controls):
     """Draws a robot in a web page that this process serves.
 
     robot: the robot to draw.
@@ -90,7 +91,7 @@ class Viewer:
         self.canvas = Canvas(self.window)
         self._moving, self._follow = False, flag("follow", follow)
         self._last: State | None = None
-        self._controls: dict[str, Callable[[Any], None]] = {}
+        super().__init__()
         self._set_stage(background)
 
     @property
@@ -292,11 +293,16 @@ class Viewer:
         self.canvas.set_again(*self._looking(view, FOLLOWED if self._moving else ROBOT))
         return self
 
-    def _looking(self, view: View, followed: str = ROBOT) -> tuple[wire.Update, wire.Update]:
-        """The commands that set the camera to a view of the robot where it is now, and what it follows from there."""
+    def _looking(self, view: View, followed: str = ROBOT) -> tuple[wire.Update, ...]:
+        """The commands for a view of the robot where it is now, for what the camera follows from there, and for the presets."""
+        presets = wire.set_views({name: self._from(preset) for name, preset in PRESETS.items()})
+        return wire.set_camera(*self._from(view)), self._following(followed), presets
+
+    def _from(self, view: View) -> tuple[Array, Array, float]:
+        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a view of the robot now."""
         low, high = self.painter.feet_box if view.feet else self.painter.box
         target, eye = target_and_eye(view, low + self._moved, high + self._moved)
-        return wire.set_camera(eye, target, view.angle), self._following(followed)
+        return eye, target, view.angle
 
     def _following(self, followed: str) -> wire.Update:
         """The command that lets the camera follow the robot, or what stands for it in a recording, if it is to follow."""
@@ -341,29 +347,6 @@ class Viewer:
         _check_texts(title=title)
         return page.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
-    def slider(
-        self, name: str, changed: Callable[[float], None], value: float, low: float, high: float, step: float = 0.01
-    ) -> None:
-        """Add a slider to the panel in the page.
-
-        name: its label.
-        changed: called with the new value when the reader moves it, in the window's thread.
-        value: where it stands at first.
-        low, high, step: its range and its smallest step.
-        """
-        low, high = number("low", low), number("high", high, least=number("low", low))
-        value, step = number("value", value, "", low, high), positive("step", step)
-        self._control(name, function("changed", changed, "changed(value)"), value=value, min=low, max=high, step=step)
-
-    def button(self, name: str, pressed: Callable[[], None]) -> None:
-        """Add a button to the panel in the page; `pressed()` is called in the window's thread."""
-        function("pressed", pressed, "pressed()")
-        self._control(name, lambda _: pressed())
-
-    def checkbox(self, name: str, changed: Callable[[bool], None], value: bool) -> None:
-        """Add a check box to the panel in the page; `changed(value)` is called in the window's thread."""
-        self._control(name, function("changed", changed, "changed(value)"), value=flag("value", value))
-
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
         self.window.close()
@@ -378,12 +361,6 @@ class Viewer:
 
     def __repr__(self) -> str:
         return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"
-
-    def _control(self, name: str, callback: Callable[[Any], None], **range_of_values: float) -> None:
-        self._controls[text("name", name)] = callback
-        controls = self._controls  # not self, so that the window does not keep its viewer alive
-        self.window.on_control(lambda which, value: controls[which](value) if which in controls else None)
-        self.window.put([wire.set_control(name, **range_of_values)])
 
     def _set_stage(self, background: str) -> None:
         """Set the background, and hide meshcat's own grid and axes."""

@@ -25,6 +25,7 @@ Update = tuple[Key, bytes]
 TYPES = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "delete_control",
     "set_control", "move_control", "set_camera", "set_follow", "set_title", "set_legend", "set_theme", "set_kept",
+    "set_text", "set_strip", "set_views",
 )  # fmt: skip
 
 ANIMATION: Key = ("/", "set_animation", "")
@@ -96,6 +97,12 @@ def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bo
     return encode({"type": "set_follow", "path": "", "node": node, "from": at, "begin": moved, "smooth": smooth})
 
 
+def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:
+    """The views that the page offers by name, each as position, target and angle of `set_camera`."""
+    named = {name: {"position": _upright(eye), "target": _upright(at), "fov": fov} for name, (eye, at, fov) in views.items()}
+    return encode({"type": "set_views", "path": "", "views": named})
+
+
 def page_command(kind: str, **values: Any) -> Update:
     """A command of page.js that belongs to no object: set_title, set_legend, set_theme or set_kept."""
     return encode({"type": kind, "path": "", **values})
@@ -117,10 +124,10 @@ def end_animation() -> list[Update]:
     return [(key, command), ((key[0], key[1], "end"), command)]
 
 
-def set_control(name: str, **range_of_values: float) -> Update:
-    """A control in the page's panel that reports to the window: a slider with value, min, max and step, a check box with a
-    truth value, else a button. The command is ours, because meshcat's reads the name as HTML."""
-    return encode({"type": "set_control", "name": name, **range_of_values})
+def set_control(name: str, **kind: Any) -> Update:
+    """A control in the page's panel that reports to the window, see panel.js: a slider with value, min, max and step, a choice
+    of texts with the number of the chosen one, a check box with a truth value, else a button."""
+    return encode({"type": "set_control", "name": name, **kind})
 
 
 def reported(command: dict[str, Any], value: Any) -> Any:
@@ -133,6 +140,8 @@ def reported(command: dict[str, Any], value: Any) -> Any:
     is_switch = isinstance(command["value"], bool)
     if isinstance(value, bool) != is_switch or not isinstance(value, int | float) or not abs(value) < _LARGEST:
         raise ViewerError(f"the control {command['name']!r} cannot be {value!r}.")
+    if "choices" in command:
+        return min(max(round(value), 0), len(command["choices"]) - 1)
     return value if is_switch else min(max(value, command.get("min", value)), command.get("max", value))
 
 

@@ -282,3 +282,31 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
     run.reset()
     until(lambda: delay.resets == 1)
     run.close()
+
+
+def test_another_world_controller_and_period_are_taken_between_slices(run: Live, slices: list[fb.Rollout]) -> None:
+    run.start()
+    until(lambda: len(slices) > 2)
+    ice, seen = fb.Simulation(ROBOT, 0.3), list[threading.Thread]()
+
+    def change() -> None:
+        seen.append(threading.current_thread())
+        run.use(CONTROLLER, sim=ice, control_period=5e-3)
+
+    run.soon(change)
+    until(lambda: run.sim is ice and len(slices[-1]) > 1 and slices[-1].time[0] < 1.0)
+    until(lambda: slices[-1].time[-1] > 0.1)
+    assert np.allclose(np.diff(slices[-1].time), 5e-3)
+    assert seen[0] is not threading.main_thread()
+
+
+def test_a_change_that_fails_is_said(run: Live, slices: list[fb.Rollout]) -> None:
+    def fail() -> None:
+        raise ValueError("no such world")
+
+    run.start()
+    run.soon(fail)
+    until(lambda: run.status != "running")
+    assert "no such world" in run.status
+    run.reset()
+    until(lambda: run.status == "running" and len(slices) > 1)

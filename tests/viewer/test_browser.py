@@ -242,7 +242,7 @@ def test_a_folded_legend_leaves_room_for_the_player_of_a_recording(browser, view
 
 
 NAMES = ('<img src=x onerror="hit = true">', "x<y & z > w", "&amp;", "__proto__", 'it\'s \\ "so" τ')
-LABELS = "[...document.querySelectorAll('.dg .cr .property-name')].map((label) => label.textContent)"
+LABELS = "[...document.querySelectorAll('#panel .row > span, #panel .buttons button')].map((label) => label.textContent)"
 VALUES = "Object.values(viewer.gui_controllers).map((one) => one.getValue()).filter((value) => typeof value != 'function')"
 
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +31,22 @@ def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys: pytest.Captur
     assert "floatbase: unknown robot 'go3'; near names: go2" in capsys.readouterr().err
     assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
     assert "port is 99999" in capsys.readouterr().err
+
+
+def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, solo = tmp_path / "mine.urdf", load("solo12")
+    file.write_text(solo.urdf)
+    assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2
+    assert "FL_FOTT" in capsys.readouterr().err
+    assert main(["view", str(tmp_path / "none.urdf"), "--no-browser"]) == 2
+    assert "none.urdf" in capsys.readouterr().err
+    options = ["--feet", *(foot.frame for foot in solo.feet), "--foot-radius", "0.01"]
+    command = [sys.executable, "-m", "floatbase", "view", str(file), "--no-browser", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert "mine at http://127.0.0.1" in process.stdout.readline()
+        process.terminate()
+        assert process.wait(timeout=20) == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -62,22 +79,22 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
     def drawn() -> set[str]:
         return {path for path in playground.view.canvas.picture if path.startswith("measured/")}
 
-    page.goto(playground.view.url)
+    page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     control("CoM x [m]", "setValue(0.04)")
-    until(lambda: abs(playground.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work)
+    until(lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work)
     control("facets", "setValue(6)")
     control("friction believed", "setValue(0.3)")
-    until(lambda: abs(playground.mu - 0.3) < 1e-9, work)
-    assert (playground.facets, playground.view.painter.facets) == (6, 6)
+    until(lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9, work)
+    until(lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work)
     picture(page, "bare_page")
     control("pause", "fire()")
     until(lambda: playground.run.status == "paused", work)
     playground.run.close()  # waits for the last slice
-    stopped = playground.sim.time
+    stopped = playground.session.sim.time
     control("on FL_foot", "setValue(false)")
     control("run", "fire()")
-    until(lambda: playground.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
+    until(lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
     assert "measured/FR_foot" in drawn()
 
 
@@ -89,22 +106,22 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground:
         page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
 
     def place() -> np.ndarray:
-        return playground.last.final.com if playground.last else np.zeros(3)
+        return playground.session.last.final.com if playground.session.last else np.zeros(3)
 
-    page.goto(playground.view.url)
-    page.wait_for_function("window.viewer && viewer.gui_controllers['trot']")
+    page.goto(playground.url)
+    page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
     control("forwards [m/s]", "setValue(0.5)")
     control("turn [rad/s]", "setValue(0.5)")
-    control("trot", "setValue(true)")
+    control("gait", "setValue(2)")
     until(lambda: place()[0] > 0.3, work)
     picture(page, "bare_page_walking")
-    control("trot", "setValue(false)")
-    until(lambda: playground.last.contacts_at(-1).names == tuple(playground.stance), work)
+    control("gait", "setValue(0)")
+    until(lambda: playground.session.last.contacts_at(-1).names == tuple(foot.frame for foot in playground.robot.feet), work)
     stopped = place()
     control("CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
     until(lambda: place()[2] < stopped[2] - 0.01, work)
     assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
-    control("step when pushed", "setValue(true)")
+    control("gait", "setValue(1)")
     control("reset", "fire()")
     until(lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05, work)
 
@@ -112,9 +129,9 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground:
 def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
-    page.goto(playground.view.url)
+    page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    page.evaluate("viewer.gui_controllers['push towards [°]'].setValue(-90)")
+    page.evaluate("viewer.gui_controllers['towards [°]'].setValue(-90)")
     page.evaluate("viewer.gui_controllers['push [N]'].setValue(40)")
     drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
     arrow = None
@@ -139,7 +156,7 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
 
 @pytest.mark.filterwarnings("error")  # as an exception in the run's thread would be
 def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> None:
-    until(lambda: playground.last is not None)
+    until(lambda: playground.session.last is not None)
     playground.view.close()
     until(lambda: playground.run.status != "running")
     assert "window is closed" in playground.run.status
@@ -174,6 +191,6 @@ def test_the_control_period_leaves_room_and_the_robot_where_it_stood(go2: Robot)
 def test_robots_without_point_feet_run_too(name: str) -> None:
     playground = Playground(load(name))
     playground.start()
-    until(lambda: playground.sim.time >= 0.05)
+    until(lambda: playground.session.sim.time >= 0.05)
     assert playground.run.status == "running"
     playground.close()

@@ -1,0 +1,253 @@
+"""Ten challenges, each with a start, what may not be changed, and a judge that watches the run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.friction import FrictionPolyhedron
+from floatbase.playground.session import Session
+from floatbase.playground.settings import Settings
+
+_LOADED = 5.0  # N: a foot with more carries something
+_AIR = 0.02  # m over the ground, and higher is lifted
+_ON_FACET = 1e-4  # of the normal force: closer to a facet is on it
+_SLIDES = 0.3  # m, twice as far as it comes with what it believes at first
+_ROLLED = 0.012  # m that every foot of the seventh card is to travel
+_SLIP = 0.004  # m, that creeps under a foot which rolls
+_STAY = 2.0  # s that a robot must stay on its feet after a push
+_PLENTY = 19.2  # N·s: forwards it takes 19.5, sideways 18.5, backwards 22.5
+
+
+class Judge:
+    """Watches a run: `see` gets every slice, `pushed` every push, `ended` why a run stopped. `says` tells the state of play."""
+
+    def __init__(self, card: Card):
+        self.card = card
+        self.won = False
+        self.says = ""
+        self.memory: dict[str, Any] = {}
+
+    def pushed(self, push: fb.Push) -> None:
+        """A push is requested."""
+        self.memory["push"] = push
+
+    def see(self, record: fb.Rollout, session: Session) -> None:
+        """A slice has been run."""
+        self._take(self.card.watch(self, record, session), session)
+
+    def ended(self, status: str, session: Session) -> None:
+        """The run has stopped by itself."""
+        if self.card.end is not None:
+            self._take(self.card.end(self, status, session), session)
+
+    def _take(self, verdict: bool | str, session: Session) -> None:
+        """True wins, a text tells the state of the play. Who has won has won."""
+        if self.won:
+            return
+        touched = [name for name in self.card.fixed if getattr(session.settings, name) != getattr(self.card.start, name)]
+        if touched:
+            self.says = f"{' and '.join(touched)} may not be changed in this challenge: reset to begin anew."
+        elif verdict is True:
+            self.won, self.says = True, f"Solved. {self.memory.get('score', '')}".strip()
+        elif isinstance(verdict, str):
+            self.says = verdict
+
+
+Watch = Callable[[Judge, fb.Rollout, Session], bool | str]
+
+
+@dataclass(frozen=True)
+class Card:
+    """A challenge.
+
+    title, text: what the reader sees.
+    watch: looks at each slice; True when it is solved, else the state of the play.
+    start: settings to begin with.
+    fixed: names of settings that may not be changed.
+    end: looks at why a run stopped, where that may solve it.
+    """
+
+    robot: ClassVar[str] = "go2"
+    title: str
+    text: str
+    watch: Watch
+    start: Settings = field(default_factory=Settings)
+    fixed: tuple[str, ...] = ()
+    end: Callable[[Judge, str, Session], bool | str] | None = None
+
+    def judge(self) -> Judge:
+        """A new judge."""
+        return Judge(self)
+
+
+def _normals(record: fb.Rollout) -> dict[str, Array]:
+    """Measured normal force of each foot through a record, N, on level ground."""
+    return {name: record.force(name)[:, 2] for name in record.contacts.names}
+
+
+def _heights(session: Session) -> dict[str, float]:
+    """How far each foot is over the ground now, m."""
+    clearances = session.sim.ground.clearances(session.sim.contact_positions()).min(axis=1)
+    return dict(zip(session.sim.point_names, clearances.tolist(), strict=True))
+
+
+def _seconds(judge: Judge, record: fb.Rollout, holds: bool) -> float:
+    """s for which something has held without a break."""
+    span = len(record) * float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
+    judge.memory["held"] = judge.memory.get("held", 0.0) + span if holds else 0.0
+    return float(judge.memory["held"])
+
+
+def _two_feet(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    lifted = {name for name, height in _heights(session).items() if height > _AIR / 2}
+    held = _seconds(judge, record, lifted == {"FR_foot", "RL_foot"})
+    return held >= 1.0 or f"{held:.1f} s on FL and RR, the others in the air."
+
+
+def _survive(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    if (push := judge.memory.get("push")) is None:
+        return "Push it with 300 N, in any direction."
+    size = float(np.linalg.norm(push.force))
+    if size < 300.0:
+        return f"{size:.0f} N is not enough."
+    held = _seconds(judge, record, True)
+    return held >= _STAY or f"On its feet for {held:.1f} s."
+
+
+def _slide(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    start = judge.memory.setdefault("start", np.array(session.sim.state.com))
+    way = float(np.linalg.norm(session.sim.state.com - start))
+    return way >= _SLIDES or f"{100 * way:.0f} of {100 * _SLIDES:.0f} cm."
+
+
+def _edge(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    found = {}
+    contacts = record.contacts_at(-1)
+    for i, name in enumerate(contacts.names):
+        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], session.settings.facets)
+        force = record.force(name, "planned")[-1]
+        if np.isfinite(force).all() and force @ contacts.normals[i] > _LOADED:
+            found[name] = int(np.sum(cone.rows @ force > -_ON_FACET * float(force @ contacts.normals[i])))
+    most = max(found.values(), default=0)
+    return most >= 2 or f"{most} active facet{'s' if most != 1 else ''} at a foot."
+
+
+def _no_answer(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    return "The quadratic program has an answer at every tick."
+
+
+def _infeasible(judge: Judge, status: str, session: Session) -> bool | str:
+    return True if "infeasible" in status or "conflict" in status else f"Not that: {status.splitlines()[0][:80]}"
+
+
+def _quick(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """From the last time that all four carry to a front foot in the air."""
+    normals, heights = _normals(record), _heights(session)
+    front = max(heights["FL_foot"], heights["FR_foot"])
+    if "up" not in judge.memory:
+        if len(normals) == len(heights) and min(float(force[-1]) for force in normals.values()) > _LOADED:
+            judge.memory["all"] = float(record.time[-1])
+        if front <= _AIR or "all" not in judge.memory:
+            return "Lift a front foot 2 cm, and stay on the other three for a second."
+        judge.memory["up"] = float(record.time[-1]) - judge.memory["all"]
+    held = _seconds(judge, record, front > _AIR)
+    if held == 0.0:
+        del judge.memory["up"]
+        return "It came down again."
+    if judge.memory["up"] >= 0.5:
+        return f"It took {judge.memory['up']:.2f} s: reset, and lean first."
+    judge.memory["score"] = f"{judge.memory['up']:.2f} s."
+    return held >= 1.0 or f"Up in {judge.memory['up']:.2f} s, for {held:.1f} s."
+
+
+def _travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    if min(float(force.min()) for force in _normals(record).values()) < _LOADED:
+        judge.memory.clear()
+        return "A foot was lifted: it begins anew."
+    places, rolled = record.foot_positions, record.rolled()
+    slid = judge.memory.get("slid", np.zeros(places.shape[1:])) + (places - rolled)[-1] - (places - rolled)[0]
+    judge.memory["slid"] = slid
+    start = judge.memory.setdefault("places", np.array(places[0]))
+    way = np.linalg.norm((places[-1] - start)[:, :2], axis=1)
+    slip = float(np.linalg.norm(slid[:, :2], axis=1).max())
+    if slip > _SLIP:
+        return f"A foot slipped by {1e3 * slip:.0f} mm: reset, and more gently."
+    return float(way.min()) >= _ROLLED or f"The feet are {', '.join(f'{1e3 * x:.0f}' for x in way)} mm from where they stood."
+
+
+def _ice(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    if (push := judge.memory.get("push")) is None:
+        return "Push it with 10 N."
+    if float(np.linalg.norm(push.force)) < 10.0:
+        return "10 N, at least."
+    start = judge.memory.setdefault("feet", np.array(record.foot_positions[0]))
+    moved = float(np.linalg.norm(record.foot_positions[-1] - start, axis=1).max())
+    if moved > 0.01:
+        return f"A foot has slipped by {1e3 * moved:.0f} mm: reset."
+    held = _seconds(judge, record, True)
+    return held >= _STAY or f"All feet within {1e3 * moved:.1f} mm for {held:.1f} s."
+
+
+def _facets(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    n = session.settings.facets
+    lost = 1.0 - math.cos(math.pi / n)
+    if lost > 0.03:
+        return f"{n} facets: the weakest direction has lost {100 * lost:.1f} % of its friction."
+    fewer = 1.0 - math.cos(math.pi / (n - 1))
+    return fewer > 0.03 or f"{n} facets lose {100 * lost:.1f} %; fewer would do."
+
+
+def _topple(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    return "One push, with as little force as topples it."
+
+
+def _fallen(judge: Judge, status: str, session: Session) -> bool | str:
+    push = judge.memory.get("push")
+    if not status.startswith("fell") or push is None:
+        return "It must fall by a push."
+    impulse = float(np.linalg.norm(push.force)) * push.duration
+    judge.memory["score"] = f"{impulse:.1f} N·s."
+    return impulse <= _PLENTY or f"{impulse:.1f} N·s topple it; {_PLENTY:.0f} do, from the right side."
+
+
+_WORLD = ("mass", "true_off", "believed_off", "slope")
+CARDS = (
+    Card("Stand on two feet", "Lift FR and RL, and stand on FL and RR for a second.", _two_feet, fixed=_WORLD),
+    Card("Survive 300 N", "Push it with 300 N from any side; 2 s later it must be on its feet.", _survive, fixed=_WORLD),
+    Card(
+        "Down an icy slope", "The ground falls by 20° and is slippery. Slide 30 cm without falling.", _slide,
+        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "true_off", "believed_off"),
+    ),
+    Card("On an edge", "Bring a foot's planned force onto an edge of its polyhedron: two active facets.", _edge, fixed=_WORLD),
+    Card(
+        "No answer", "Find settings for which the quadratic program has no solution.", _no_answer,
+        fixed=("true_off", "believed_off"), end=_infeasible,
+    ),
+    Card(
+        "Quick foot", "From four feet that carry to a front foot 2 cm in the air in less than 0.5 s; stay so for 1 s.", _quick,
+        fixed=_WORLD,
+    ),
+    Card(
+        "Feet that travel", "No foot is lifted, none slips, and all four end 12 mm away from where they stood.", _travel,
+        fixed=_WORLD,
+    ),
+    Card(
+        "On ice", "The ground has a friction of 0.05. Push with 10 N; no foot may slip by 1 cm for 2 s.", _ice,
+        Settings(friction=(0.7, 0.05)), (*_WORLD, "gait"),
+    ),
+    Card(
+        "How many facets?", "The fewest facets with which no direction loses more than 3 % of the cone's friction.", _facets,
+        fixed=_WORLD,
+    ),
+    Card(
+        "The weakest side", "Topple the standing robot with one push of at most 19 N·s.", _topple,
+        fixed=(*_WORLD, "friction", "facets", "shift", "lifted", "weights", "bandwidth", "gait", "nod"), end=_fallen,
+    ),
+)  # fmt: skip

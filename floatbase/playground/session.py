@@ -1,0 +1,215 @@
+"""A robot, its world and its controller as the playground's settings make them; with or without a page."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.actuators import FirstOrderLag
+from floatbase.behaviours import Gait, Stand, Walk
+from floatbase.control import Belief, Command
+from floatbase.dynamics import Contacts, equations_of_motion
+from floatbase.playground.settings import Settings
+from floatbase.robots import Robot, State
+from floatbase.simulation import Actuators, AlteredSimulation, Controller, World
+
+PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller: with each, robots stand a push
+_NOD_RATE = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
+_YAW_OVER_PITCH = 1.15  # the ellipse is a little wider in yaw
+_GROWING = 1.5  # s in which the ellipse grows from nothing
+
+
+class BaseMotors:
+    """A controller around another one that drives motors of the base which no robot has: S without its zeros.
+
+    At each tick `sim.base_wrench` becomes the base's rows of (7), M q̈ + h - Jᵀ λ, of what the controller plans: zero, but for
+    rounding, unless it believes in such motors.
+    """
+
+    def __init__(self, controller: Controller, sim: AlteredSimulation):
+        self.controller, self.sim = controller, sim
+
+    @property
+    def contacts(self) -> Contacts:
+        """Those of the controller now."""
+        held: Contacts = self.controller.contacts  # type: ignore[attr-defined]
+        return held
+
+    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
+        """The tick."""
+        command: Command = self.controller(q, v, t)  # type: ignore[arg-type]
+        eom = equations_of_motion(State(self.sim.robot, q, v), self.contacts)
+        self.sim.base_wrench = (eom.M @ command.qdd + eom.h - eom.J.T @ command.forces)[:6]
+        return command
+
+
+def nodding(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callable[[float], tuple[Array, Array, Array]]:
+    """Orientations that describe an ellipse in pitch and yaw around `rotation`, as `OrientationTask` takes them.
+
+    rotation: (3, 3), world.
+    size: rad, half its width in pitch.
+    begin: s, when it grows from nothing.
+    Returns R (3, 3), angular velocity and acceleration, rad/s and rad/s², world, as a function of t.
+    """
+    home, step = np.asarray(rotation, dtype=float), 1e-4
+
+    def angles(t: float) -> Array:
+        s = min(max((t - begin) / _GROWING, 0.0), 1.0)
+        phase = 2.0 * math.pi * _NOD_RATE * (t - begin)
+        return size * s**3 * (10.0 - 15.0 * s + 6.0 * s**2) * np.array([math.sin(phase), _YAW_OVER_PITCH * math.cos(phase)])
+
+    def path(t: float) -> tuple[Array, Array, Array]:
+        before, now, after = angles(t - step), angles(t), angles(t + step)
+        (p1, y1), (p2, y2) = (after - before) / (2.0 * step), (after - 2.0 * now + before) / step**2
+        turn = pin.rpy.rpyToMatrix(0.0, now[0], now[1])
+        up, aside = np.array([0.0, 0.0, 1.0]), turn[:, 1]  # the axes of yaw and of pitch
+        return turn @ home, y1 * up + p1 * aside, y2 * up + p2 * aside + y1 * p1 * np.cross(up, aside)
+
+    return path
+
+
+_NAMES: dict[str, Any] = {
+    "fb": fb, "AlteredSimulation": AlteredSimulation, "World": World, "Belief": Belief, "FirstOrderLag": FirstOrderLag,
+    "Gait": Gait, "Stand": Stand, "Walk": Walk, "BaseMotors": BaseMotors, "nodding": nodding,
+}  # fmt: skip
+
+
+class Session:
+    """A robot under settings that change while it runs.
+
+    robot: as from `fb.load`. settings: those at first.
+    `sim`, `controller` and `actuators` are what `rollout` takes, made by the very lines that `settings.code` shows. `period` is
+    what fits this machine, s. `last` is the newest record, which `see` is told of. `note` says why a change was refused.
+    """
+
+    def __init__(self, robot: Robot, settings: Settings | None = None):
+        self.robot = robot
+        self.settings = Settings() if settings is None else settings
+        self.last: fb.Rollout | None = None
+        self.note = ""
+        self._make_world()
+        self.controller: Controller = self._controller(self.settings, self.home)
+        self._periods: dict[bool, float] = {}
+        self.period = self._fitting_period()
+
+    def _make_world(self) -> None:
+        """A world on the true ground, with the robot standing in it."""
+        names = _NAMES | {"robot": self.robot}
+        world = eval(self.settings.world(self.robot), names)
+        self.sim: AlteredSimulation = AlteredSimulation(self.robot, eval(self.settings.ground(), names), world=world)
+        self._ground = self.settings.slope[1]
+        self.home = self.sim.state
+        self._make_actuators()
+
+    def _make_actuators(self) -> None:
+        names = _NAMES | {"robot": self.robot}
+        exec(self.settings.actuators_line(), names)
+        self.actuators: Actuators | None = names["actuators"]
+
+    def _controller(self, settings: Settings, state: State) -> Controller:
+        """The controller that settings ask for, of a robot that is to stand as in `state`. Raises `FloatbaseError`."""
+        names = _NAMES | {"robot": self.robot, "sim": self.sim, "state": state}
+        exec("\n".join(settings.controller_lines(self.robot)), names)
+        made: Controller = names["controller"]
+        return made
+
+    @property
+    def walk(self) -> Walk | None:
+        """The behaviour that makes steps, where there is one."""
+        inner = self.controller.controller if isinstance(self.controller, BaseMotors) else self.controller
+        return inner if isinstance(inner, Walk) else None
+
+    def see(self, record: fb.Rollout) -> None:
+        """Take note of the newest slice."""
+        self.last = record
+
+    def change(self, **changes: Any) -> bool:
+        """Change settings; returns whether the robot was put back on its feet for it, as another slope asks for."""
+        before, self.settings = self.settings, replace(self.settings, **changes)
+        now, new_ground = self.settings, self.settings.slope[1] != self._ground
+        try:
+            if new_ground:
+                self.last = None
+                self._make_world()
+            else:
+                names = _NAMES | {"robot": self.robot}
+                world: World = eval(now.world(self.robot), names)
+                self.sim.world = replace(world, friction=now.friction[1])
+                if now.bandwidth[1] != before.bandwidth[1]:
+                    self._make_actuators()
+            self._renew_controller(before)
+            self.note = ""
+        except fb.FloatbaseError as error:
+            self.note = str(error)
+        return new_ground
+
+    def _renew_controller(self, before: Settings) -> None:
+        """The controller of the settings; a walk whose velocity or gait alone changes goes on."""
+        now, walk = self.settings, self.walk
+        if walk is not None and before.gait and replace(now, gait=None, velocity=(0, 0, 0), begin=0.0) == replace(
+            before, gait=None, velocity=(0, 0, 0), begin=0.0
+        ):  # fmt: skip
+            walk.velocity, walk.yaw_rate = list(now.velocity[:2]), now.velocity[2]
+            if now.gait is None:
+                walk.gait = replace(walk.gait, stop=self.sim.time)
+            elif now.gait != before.gait:
+                walk.gait = self._controller(now, self.home).gait  # type: ignore[attr-defined]
+            return
+        self.controller = self._controller(now, self._standing_here())
+        self.period = self._fitting_period()
+
+    def restart(self) -> None:
+        """After a reset of the simulation: schedules count from the clock's new beginning, and actuators hold the robot."""
+        self.last = None
+        self.settings = replace(self.settings, begin=0.0)
+        self._make_actuators()
+        self.controller = self._controller(self.settings, self.home)
+
+    def _standing_here(self) -> State:
+        """The standing posture where the feet are now: on the same place, turned as the robot is."""
+        contacts = Contacts.feet(self.robot)
+        if self.last is None or not self.robot.is_floating or not len(contacts):
+            return self.home
+        present = self.last.final
+        R, R0 = (state.frame_pose("base").rotation for state in (present, self.home))
+        turn = pin.exp3(np.array([0.0, 0.0, math.atan2(*(R @ R0.T)[[1, 0], 0])]))
+        q = np.array(self.home.q)
+        q[3:7] = pin.Quaternion(turn @ R0).coeffs()
+        turned = self.home.replace(q=q)
+        q[:3] += (contacts.positions(present) - contacts.positions(turned)).mean(axis=0) * [1.0, 1.0, bool(self._ground)]
+        return turned.replace(q=q)
+
+    def _fitting_period(self) -> float:
+        """`control_period` of a tick like the present one, measured once for each way to compute it."""
+        readable = bool(self.settings.belief()) or "zeros" in self.settings.true_off
+        if readable not in self._periods:
+            trial = AlteredSimulation(self.robot)
+            belief = {"belief": Belief(mass=1.0 + 1e-9)} if readable else {}
+            contacts = Contacts.feet(self.robot)
+            tried = fb.WholeBodyController(self.robot, contacts, fb.standing_tasks(self.robot.standing()), **belief)  # type: ignore[arg-type]
+            self._periods[readable] = control_period(trial, tried)
+        return self._periods[readable]
+
+
+def control_period(sim: fb.Simulation, controller: Controller, share: float = 0.5) -> float:
+    """The shortest of `PERIODS`, s, of which physics and controller need at most `share` on this machine; else the longest.
+
+    The rest of the time is for pictures. Leaves the simulation reset.
+    """
+    ticks, clock = 10, [time.perf_counter()]
+    for _ in range(4):  # the first one warms up, and the best of the others is this machine when it is not interrupted
+        fb.rollout(sim, controller, ticks * PERIODS[0], control_period=PERIODS[0])
+        clock.append(time.perf_counter())
+    sim.reset()
+    tick = min(end - begin for begin, end in pairwise(clock[1:])) / ticks
+    return next((period for period in PERIODS if tick <= share * period), PERIODS[-1])

@@ -1,0 +1,94 @@
+"""What the playground shows as Python is what it runs: pasted elsewhere, it makes the same robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.playground import BaseMotors, Session, Settings, nodding
+
+GO2 = judges.load("go2")
+EACH = {
+    "as it begins": Settings(),
+    "believed otherwise": Settings(friction=(0.5, 0.9), slope=(8.0, 10.0), mass=(1.2, 1.0), bandwidth=(8.0, 12.0)),
+    "another world": Settings(mass=(1.0, 1.2), true_off=("velocity", "cones"), friction=(0.6, 0.4)),
+    "another stance": Settings(shift=(-0.05, -0.03, -0.01), lifted=("FL_foot",), facets=6),
+    "another program": Settings(weights=(2.0, 10.0, 0.1), torque=0.8, least_force=5.0),
+    "it nods": Settings(nod=0.2),
+    "it trots": Settings(gait="trot", velocity=(0.2, 0.05, 0.1), friction=(0.6, 0.8)),
+    "it steps": Settings(catches=True),
+    "terms off": Settings(believed_off=("velocity", "drift", "cones"), true_off=("velocity",)),
+    "motors of the base": Settings(believed_off=("zeros",), true_off=("zeros",)),
+    "a leg unfelt": Settings(believed_off=("forces",), true_off=("forces",), leg="FR_foot"),
+    "no gravity": Settings(believed_off=("gravity",), true_off=("gravity",)),
+}
+
+
+def run_of(code: str) -> fb.Rollout:
+    """The rollout of a program."""
+    names: dict[str, Any] = {}
+    exec(code, names)
+    run: fb.Rollout = names["run"]
+    return run
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_the_program_runs_and_makes_the_same_robot(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    settings, period = EACH[name], 4e-3
+    session = Session(GO2, settings)
+    push = fb.Push([20.0, -10.0, 0.0], 0.5)
+    here = fb.rollout(session.sim, session.controller, 3.0, [push], control_period=period, actuators=session.actuators)
+    there = run_of(settings.code(GO2, period, push))
+    assert here.outcome == there.outcome and np.array_equal(here.q, there.q) and np.array_equal(here.planned, there.planned)
+    assert there.outcome in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_changes_lead_where_a_beginning_with_them_leads(name: str) -> None:
+    """On its feet and at rest, a session that is changed has the controller, world and actuators of one that begins so."""
+    changed, begun = Session(GO2), Session(GO2, EACH[name])
+    changed.change(**{field: getattr(EACH[name], field) for field in Settings.__dataclass_fields__})
+    assert changed.note == ""
+    runs = [fb.rollout(s.sim, s.controller, 0.2, control_period=4e-3, actuators=s.actuators) for s in (changed, begun)]
+    assert np.array_equal(runs[0].q, runs[1].q)
+
+
+def test_what_cannot_be_is_told_and_the_robot_goes_on() -> None:
+    session = Session(GO2)
+    before = session.controller
+    session.change(facets=2)
+    assert "facets" in session.note and session.controller is before
+    session.change(facets=5)
+    assert session.note == "" and session.controller is not before
+
+
+def test_motors_of_the_base_do_nothing_unless_the_controller_believes_in_them() -> None:
+    """With them and without gravity in its plan's torques, the base carries itself: joints need next to nothing."""
+    used = {}
+    for believed in ((), ("zeros",)):
+        session = Session(GO2, Settings(believed_off=believed, true_off=("zeros",)))
+        assert isinstance(session.controller, BaseMotors)
+        record = fb.rollout(session.sim, session.controller, 0.4, control_period=4e-3)
+        assert record.outcome == "completed"
+        used[believed] = float(np.abs(session.sim.base_wrench).max())
+    assert used[()] < 1e-6 * GO2.weight < 0.5 * GO2.weight < used[("zeros",)]
+
+
+def test_nodding_has_the_velocity_and_acceleration_that_differences_have() -> None:
+    path, h = nodding(np.eye(3), 0.3, begin=1.0), 1e-4
+    assert np.allclose(path(0.5)[0], np.eye(3), atol=1e-12)
+    for t in (1.4, 2.0, 7.3):
+        (before, w0, _), (now, omega, alpha), (after, w1, _) = path(t - h), path(t), path(t + h)
+        spin = (after - before) / (2 * h) @ now.T
+        assert np.allclose([spin[2, 1], spin[0, 2], spin[1, 0]], omega, atol=1e-5)
+        assert np.allclose((w1 - w0) / (2 * h), alpha, atol=1e-3)
+
+
+def test_settings_keep_their_kind_when_replaced() -> None:
+    assert replace(Settings(), gait="trot").gait == "trot"
+    assert Settings().is_plain and not Settings(mass=(1.0, 1.1)).is_plain

@@ -1,0 +1,126 @@
+"""Terms of (7) switched off in the world: judged by Newton's law of the whole robot and by closed forms."""
+
+from __future__ import annotations
+
+import copy
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.control import Belief
+from floatbase.errors import InputError, UnknownNameError
+from floatbase.simulation import AlteredSimulation, World
+
+GO2 = judges.load("go2")
+G = 9.81  # m/s²
+
+
+def standing(sim: AlteredSimulation, belief: object = None, seconds: float = 0.6) -> fb.Rollout:
+    options = {} if belief is None else {"belief": belief}
+    controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), fb.standing_tasks(GO2.standing()), **options)
+    return fb.rollout(sim, controller, seconds, control_period=2e-3)
+
+
+def in_the_air(sim: AlteredSimulation, omega: float = 0.0) -> None:
+    state = GO2.standing()
+    q, v = np.array(state.q), np.zeros(GO2.nv)
+    q[2] += 2.0
+    v[3] = omega
+    sim.reset(state.replace(q=q, v=v))
+
+
+def test_as_it_is_made_it_is_the_simulation() -> None:
+    plain, altered = fb.Simulation(GO2, 0.7), AlteredSimulation(GO2, 0.7)
+    controller = judges.controller_of("go2")
+    push = [fb.Push([30.0, 10.0, 0.0])]
+    a, b = (fb.rollout(sim, controller, 0.3, push, control_period=2e-3) for sim in (plain, altered))
+    assert np.array_equal(a.q, b.q) and np.array_equal(a.measured, b.measured)
+
+
+def test_without_gravity_it_floats_and_with_it_it_falls() -> None:
+    for gravity in (True, False):
+        sim = AlteredSimulation(GO2, world=World(gravity=gravity))
+        in_the_air(sim)
+        for _ in range(200):
+            sim.step(np.zeros(12))
+        assert sim.state.com_velocity[2] == pytest.approx(-0.2 * G * gravity, abs=1e-3)
+
+
+def test_the_ground_carries_the_mass_that_the_world_has() -> None:
+    sim = AlteredSimulation(GO2, world=World(mass=1.2))
+    record = standing(sim)
+    assert record.outcome == "completed"
+    assert record.measured[-50:].reshape(50, -1, 3)[:, :, 2].sum(axis=1).mean() == pytest.approx(1.2 * GO2.weight, rel=0.02)
+    sim.world = World()
+    assert np.isclose(sim.model.body_mass.sum(), GO2.mass)
+
+
+def test_a_foot_that_the_ground_does_not_touch_carries_nothing() -> None:
+    sim = AlteredSimulation(GO2, world=World(untouched=["FL_foot"]))
+    record = standing(sim, seconds=0.1)
+    assert not record.measured.reshape(len(record), -1, 3)[:, 0].any()
+    assert record.measured.reshape(len(record), -1, 3)[-1, 1:].any()
+
+
+def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
+    """M q̈ = 0 with M q̈ + h: without gravity and torques all velocities stay what they are, and else they do not."""
+    change = {}
+    for kept in (True, False):
+        sim = AlteredSimulation(GO2, timestep=5e-4, world=World(gravity=False, velocity_forces=kept))
+        in_the_air(sim, omega=5.0)
+        before = sim.data.qvel.copy()
+        for _ in range(20):
+            sim.step(np.zeros(12))
+        change[kept] = float(np.abs(sim.data.qvel - before).max())
+    assert change[False] < 1e-9 * 5.0
+    assert change[True] > 0.05
+
+
+def test_magnets_let_the_ground_pull() -> None:
+    """Pulled up with 1.5 weights by a controller whose feet may pull, feet on magnets stay; without them they do not."""
+    up = 1.5 * GO2.weight
+    nets = {}
+    for magnets in (0.0, GO2.weight):
+        sim = AlteredSimulation(GO2, world=World(magnets=magnets))
+        tasks, belief = fb.standing_tasks(GO2.standing()), Belief(cones=False)
+        controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, belief=belief)
+        record = fb.rollout(sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3)
+        nets[magnets] = float(record.measured.reshape(len(record), -1, 3)[-20:, :, 2].sum(axis=1).mean())
+        stuck = sim.contact_positions()[:, 2].max() < 5e-3
+        assert stuck == bool(magnets)
+    assert nets[0.0] == 0.0
+    assert nets[GO2.weight] < -0.2 * GO2.weight
+
+
+def test_motors_of_the_base_carry_it() -> None:
+    sim = AlteredSimulation(GO2)
+    in_the_air(sim)
+    R = sim.state.frame_pose("base").rotation
+    sim.base_wrench = np.concatenate([R.T @ [0.0, 0.0, GO2.weight + 2.0 * GO2.mass], np.zeros(3)])
+    for _ in range(10):
+        sim.step(np.zeros(12))
+    assert sim.state.com_velocity[2] == pytest.approx(0.01 * 2.0, rel=0.05)
+    sim.reset()
+    assert not sim.base_wrench.any()
+
+
+def test_friction_changes_while_it_runs() -> None:
+    sim = AlteredSimulation(GO2, 0.8)
+    assert standing(sim, seconds=0.2).outcome == "completed"
+    sim.world = World(friction=0.05)
+    record = fb.rollout(sim, judges.controller_of("go2"), 0.3, [fb.Push([60.0, 0.0, 0.0], 0.2, 0.1)], control_period=2e-3)
+    forces = record.measured.reshape(len(record), -1, 3)
+    assert np.all(np.hypot(*forces[:, :, :2].transpose(2, 0, 1)) <= 0.05 * forces[:, :, 2] + 0.1)
+
+
+def test_a_copy_is_on_its_own_and_mistakes_are_told() -> None:
+    sim = AlteredSimulation(GO2, world=World(velocity_forces=False))
+    other = copy.copy(sim)
+    other.world = World(mass=2.0)
+    assert np.isclose(sim.model.body_mass.sum(), GO2.mass) and sim.world.mass == 1.0
+    with pytest.raises(UnknownNameError, match="FL_foot"):
+        sim.world = World(untouched=["FL_fot"])
+    with pytest.raises(InputError, match="base_wrench"):
+        sim.base_wrench = [1.0, 2.0]

@@ -1,0 +1,93 @@
+"""The playground in a browser: every control to both ends, the challenges, the texts; and as a notebook shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from waiting import until
+
+import floatbase as fb
+from floatbase.playground import CARDS, Playground, gap, playground
+from floatbase.robots import Robot
+
+from .looks import picture
+
+ENDS = """() => {
+  for (const input of document.querySelectorAll('#panel input[type=range]'))
+    for (const end of [input.min, input.max]) { input.value = end; input.dispatchEvent(new Event('input')); }
+}"""
+BACK = "() => document.querySelectorAll('#panel input[type=range]').forEach((one) => one.dispatchEvent(new Event('dblclick')))"
+
+
+@pytest.fixture
+def field(go2: Robot) -> Iterator[Playground]:
+    started = Playground(go2)
+    started.start()
+    yield started
+    started.close()
+
+
+def opened(page, field: Playground) -> None:
+    page.goto(field.url)
+    page.wait_for_function("window.viewer && viewer.gui_controllers['show cones']")
+
+
+def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Playground) -> None:
+    opened(page, field)
+    page.evaluate(ENDS)
+    for count in ("#panel input[type=checkbox]", "#board button", "#panel .buttons button"):
+        for number in range(page.evaluate("(which) => document.querySelectorAll(which).length", count)):
+            page.evaluate("([which, i]) => document.querySelectorAll(which)[i].click()", [count, number])
+            page.wait_for_timeout(30)
+    for number in range(page.evaluate("document.querySelectorAll('#panel select').length")):
+        options = page.evaluate("(i) => document.querySelectorAll('#panel select')[i].length", number)
+        for option in range(options):
+            page.locator("#panel select").nth(number).select_option(str(option), force=True)
+            page.wait_for_timeout(30)
+    picture(page, "playground_ends")
+    page.evaluate("viewer.gui_controllers['challenge'].setValue(0)")
+    page.evaluate("viewer.gui_controllers['all as at first'].fire()")
+    until(lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0, lambda: page.wait_for_timeout(20))
+    assert field.session.settings.friction == (0.7, 0.7) and field.session.note == ""
+    page.wait_for_function("viewer.gui_controllers['friction believed'].getValue() == 0.7")
+
+
+def test_a_challenge_is_begun_and_solved_and_tells_so(page, field: Playground) -> None:
+    number = next(i for i, card in enumerate(CARDS) if card.title == "How many facets?")
+    opened(page, field)
+    page.evaluate(f"viewer.gui_controllers['challenge'].setValue({number + 1})")
+    page.wait_for_function("document.getElementById('panel').textContent.includes('4 facets: the weakest')")
+    page.evaluate("viewer.gui_controllers['facets'].setValue(13)")
+    page.wait_for_function("document.getElementById('panel').textContent.includes('Solved')")
+    assert "facets=13" in page.evaluate("document.querySelector('#panel pre').textContent")
+    picture(page, "playground_solved")
+
+
+def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, field: Playground) -> None:
+    """Its plan lacks 0.5 m g, which only kp times the error in height makes up for: it sinks by 0.5 g / kp = 49 mm."""
+    opened(page, field)
+
+    def sunk() -> float:
+        return float(field.robot.standing().com[2] - field.session.sim.state.com[2])
+
+    def work() -> None:
+        page.wait_for_timeout(20)
+
+    page.evaluate("viewer.gui_controllers['mass [×] true'].setValue(1.5)")
+    until(lambda: abs(sunk() - 0.049) < 0.01, work)
+    page.wait_for_function("document.querySelector('#panel pre').textContent.includes('World(mass=1.5)')")
+    page.evaluate("viewer.gui_controllers['mass [×] believed'].setValue(1.5)")
+    until(lambda: abs(sunk()) < 0.01, work)
+    page.wait_for_function("document.querySelector('#panel p.strip').textContent.includes('differ by')")
+    assert gap(field.session.last) < 0.5 * field.robot.weight
+
+
+def test_in_a_notebook_it_shows_itself_and_runs() -> None:
+    shown = playground("solo12")
+    try:
+        assert "<iframe" in shown._repr_html_()
+        until(lambda: shown.session.last is not None)
+        assert shown.robot.name == "solo12" and isinstance(shown.session.last, fb.Rollout)
+    finally:
+        shown.close()
