@@ -1,10 +1,9 @@
-"""Lesson X, The crash investigation: a program that sees only a black box; the solution of exercise X.3, as it is shown."""
+"""Lesson X: a program that sees only a black box, the solution of exercise X.3."""
 
 from itertools import combinations
 
 import numpy as np
 
-from floatbase._arrays import Array
 from floatbase.lessons.lessonX.box import BlackBox
 from floatbase.lessons.lessonX.tools import ground_normal, lagged, needed, sliding
 
@@ -42,7 +41,7 @@ def of_motors(box: BlackBox) -> str:
     return exchanged(box, got, told, off)
 
 
-def exchanged(box: BlackBox, got: Array, told: Array, off: Array) -> str:
+def exchanged(box: BlackBox, got: np.ndarray, told: np.ndarray, off: np.ndarray) -> str:
     """Two joints that got each other's orders, as far as their motors can."""
     names, limits = box.robot.joint_names, box.robot.torque_limits
     best, found = 0.3, ""
