@@ -156,7 +156,7 @@ EXERCISES = (
         stub="impulse = np.zeros(3)  # replace: N·s, in the world's axes",
         solution="missed = needed(kicked)[:, :3]\n"
         "rows = np.flatnonzero(np.linalg.norm(missed, axis=1) > 50)  # N\n"
-        "rows = rows[rows < rows[0] + 100]  # the kick comes first; later ones are blows of the fall\n"
+        "rows = rows[rows < rows[0] + 100]  # the kick, and no blow of the fall\n"
         'R = [kicked.state(i).frame_pose("base").rotation for i in rows]\n'
         "impulse = 0.002 * sum(R_i @ missed[i] for R_i, i in zip(R, rows))",
         judge=Shaped(

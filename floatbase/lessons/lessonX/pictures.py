@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
@@ -58,25 +60,47 @@ def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
 
     got: (n - 1, d) N·m, the torques that the motion needed. joint: its number. ms: time constant of the lag.
     """
-    times, orders = box.time[: len(got)], lagged(box.tau[: len(got)], float(box.time[1] - box.time[0]), ms)
-    most = 1.05 * float(np.abs(got[:, joint]).max())
-    across = EDGE + (WIDTH - 2 * EDGE) * (times - times[0]) / (times[-1] - times[0])
-
-    def curve(torques: Array, style: str) -> str:
-        up = HEIGHT / 2 - (HEIGHT / 2 - EDGE / 2) * np.clip(torques / most, -1.0, 1.0)
-        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, up, strict=True))
-        return f'<polyline points="{points}" fill="none" {style}/>'
-
-    axis = (
-        f'<line x1="{EDGE}" y1="{HEIGHT / 2}" x2="{WIDTH - EDGE}" y2="{HEIGHT / 2}" stroke="currentColor" stroke-width="0.5"/>'
-    )
-    drawn = axis + curve(got[:, joint], f'stroke="{hexadecimal(GREYS[2])}" stroke-width="6"')
-    drawn += curve(orders[:, joint], 'stroke="currentColor" stroke-width="1.5"')
+    times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
+    told = box.tau[: len(got)]
+    orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
+    frame = _Frame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
+    drawn = frame.ticks() + frame.curve(times, got[:, joint], f'stroke="{hexadecimal(GREYS[2])}" stroke-width="6"')
+    drawn += frame.curve(times, orders[:, joint], 'stroke="currentColor" stroke-width="1.5"')
     off = float(np.median(np.abs(orders - got)))
     words = (
-        f"{box.robot.joint_names[joint]}, {times[0]:.1f} to {times[-1]:.2f} s, up to {most:.0f} N·m",
+        f"{box.robot.joint_names[joint]}, from {frame.low:.0f} to {frame.high:.0f} N·m",
         f"thick: needed; thin: ordered, {ms:.0f} ms late; all joints differ by {off:.2f} N·m in the median",
     )
-    text = "".join(f'<text x="{EDGE}" y="{HEIGHT + 14 + 18 * i}" font-size="13">{line}</text>' for i, line in enumerate(words))
-    size = f'viewBox="0 0 {WIDTH} {HEIGHT + 40}" style="max-width: 100%; width: {WIDTH}px"'
+    text = "".join(f'<text x="{EDGE}" y="{HEIGHT + 32 + 18 * i}" font-size="13">{line}</text>' for i, line in enumerate(words))
+    size = f'viewBox="0 0 {WIDTH} {HEIGHT + 60}" style="max-width: 100%; width: {WIDTH}px"'
     return f'<svg {size} fill="currentColor">{drawn}{text}</svg>'
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where times, s, and torques, N·m, lie on a drawing."""
+
+    begin: float
+    end: float
+    low: float
+    high: float
+
+    def across(self, times: npt.ArrayLike) -> Array:
+        return np.asarray(EDGE + (WIDTH - 2 * EDGE) * (np.asarray(times) - self.begin) / (self.end - self.begin))
+
+    def up(self, torques: npt.ArrayLike) -> Array:
+        return np.asarray(10 + (HEIGHT - 20) * (self.high - np.asarray(torques)) / (self.high - self.low))
+
+    def curve(self, times: Array, torques: Array, style: str) -> str:
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(self.across(times), self.up(torques), strict=True))
+        return f'<polyline points="{points}" fill="none" {style}/>'
+
+    def ticks(self) -> str:
+        """The line of no torque, and the tenths of a second."""
+        zero = f'x1="{EDGE}" y1="{self.up(0.0):.1f}" x2="{WIDTH - EDGE}" y2="{self.up(0.0):.1f}"'
+        drawn = f'<line {zero} stroke="currentColor" stroke-width="0.5"/>'
+        for tenth in range(int(np.ceil(10 * self.begin)), int(10 * self.end) + 1):
+            x = float(self.across(tenth / 10))
+            drawn += f'<line x1="{x:.1f}" y1="5" x2="{x:.1f}" y2="{HEIGHT}" stroke="currentColor" stroke-width="0.2"/>'
+            drawn += f'<text x="{x:.1f}" y="{HEIGHT + 12}" font-size="11" text-anchor="middle">{tenth / 10:.1f} s</text>'
+        return drawn
