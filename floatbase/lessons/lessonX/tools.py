@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array
+from floatbase._arrays import Array, cross
 from floatbase.lessons.lessonX.box import BlackBox
 
 _STANDS = 5.0  # N of a foot that bears on the ground
@@ -74,7 +74,7 @@ def sliding(box: BlackBox, normal: npt.ArrayLike) -> Array:
         for foot, force in zip(box.robot.feet, box.measured[i].reshape(-1, 3), strict=True):
             velocity, pressed = state.frame_velocity(foot.frame), force @ n
             arm = state.frame_pose(foot.frame).rotation @ foot.centre - foot.radius * n
-            slip = velocity[:3] + np.cross(velocity[3:], arm)
+            slip = velocity[:3] + cross(velocity[3:], arm)
             if pressed > _STANDS and np.linalg.norm(slip - (slip @ n) * n) > _SLIDES:
                 ratios.append(np.linalg.norm(force - pressed * n) / pressed)
     return np.array(ratios)
