@@ -1,0 +1,198 @@
+"""Exercises of lesson X, The crash investigation."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from floatbase._arrays import Array
+from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
+from floatbase.lessons.lessonX import program
+from floatbase.lessons.lessonX.box import BlackBox
+from floatbase.lessons.lessonX.cases import FAULTS, LARGEST_SEED, Case, black_boxes, drawn_cases, innocent_boxes, innocent_cases
+from floatbase.lessons.lessonX.tools import needed
+from floatbase.lessons.lessonX.verdicts import judged
+
+VISITED = 5  # seed of the box of exercise X.1
+_UNSEEN = (20611, 20612, 20613, 102, 20615, 20616)  # seeds from which the last exercise takes one fault each
+_SOUND = 20617  # and of its two robots without
+_TOUCHED = 20.0  # N: a larger residual is a kick, and none of the physics' own steps
+
+
+# X.1 ----------------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def kicked_box() -> BlackBox:
+    """The record of a robot without a fault that somebody kicked."""
+    return innocent_cases(VISITED)[1].record()
+
+
+@cache
+def _residual() -> tuple[Array, Array]:
+    """Force on the base that (7) misses while somebody kicks, (m, 3) N, in base axes and in the world's."""
+    box = kicked_box()
+    found = needed(box)[:, :3]
+    rows = np.flatnonzero(np.linalg.norm(found, axis=1) > _TOUCHED)
+    rows = rows[box.time[rows] < innocent_cases(VISITED)[1].pushes[0].start + 0.2]
+    return found[rows], np.array([_turned(i, found[i]) for i in rows])
+
+
+def _turned(i: int | np.integer[Any], row: Array) -> Array:
+    """A force in the base's axes at row i, (3,) N, in the world's."""
+    return np.asarray(kicked_box().state(i).frame_pose("base").rotation @ row)
+
+
+def _impulse() -> Array:
+    """As it was given."""
+    (push,) = innocent_cases(VISITED)[1].pushes
+    return np.asarray(push.force * push.duration)
+
+
+def _momentum() -> Array:
+    """How the robot's momentum changed while it was kicked."""
+    box, (push,) = kicked_box(), innocent_cases(VISITED)[1].pushes
+    first, last = (int(np.searchsorted(box.time, push.start + part * push.duration)) for part in (0.0, 1.0))
+    return np.asarray(box.robot.mass * (box.state(last).com_velocity - box.state(first).com_velocity))
+
+
+def _kicks() -> dict[str, Callable[[], Any]]:
+    return {
+        "There is nothing there yet: the first three columns of what (7) misses, summed up over time.": lambda: np.zeros(3),
+        "Those are the base's axes, which turn: take each row into the world's by R before you sum up.": lambda: (
+            0.002 * _residual()[0].sum(axis=0)
+        ),
+        "A sum of forces is no impulse yet: each row lasts 2 ms.": lambda: _residual()[1].sum(axis=0),
+        "The blows of the fall are in it, too: take the time of the kick alone.": lambda: (
+            0.002 * np.sum([_turned(i, row) for i, row in enumerate(needed(kicked_box())[:, :3])], axis=0)
+        ),
+        "That is the force, N. How long did it last?": lambda: _impulse() / innocent_cases(VISITED)[1].pushes[0].duration,
+        "That is what the robot's momentum gained. The ground has its part in that.": _momentum,
+    }
+
+
+# X.2 ----------------------------------------------------------------------------------------------------------------------
+
+
+def _judge_report(answer: Any) -> Verdict:
+    """A seed, and a line for each of its boxes."""
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, "There is no answer yet: the report is a list of lines.")
+    if not isinstance(answer, list | tuple) or not answer or not all(isinstance(line, str) for line in answer):
+        return Verdict(False, 'The report is a list of lines of text, such as "A: mass 0.93".')
+    seed = re.fullmatch(r"seed (\d{1,10})", answer[0].strip())
+    if not seed or int(seed[1]) > LARGEST_SEED:
+        return Verdict(False, 'The first line says which boxes these are, as in "seed 7".')
+    lines = {line.strip()[:1].upper(): line.split(":", 1)[1] for line in answer[1:] if ":" in line}
+    told = {name: line for name, line in lines.items() if line.strip(" ?.")}
+    return _report_of(int(seed[1]), told)
+
+
+def _report_of(seed: int, told: dict[str, str]) -> Verdict:
+    """told: name of a box -> what is said of it."""
+    cases = {case.name: case for case in drawn_cases(seed)}
+    if unknown := sorted(set(told) - set(cases)):
+        return Verdict(False, f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.")
+    if not told:
+        return Verdict(False, 'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".')
+    boxes = {box.name: box for box in black_boxes(seed)}
+    said = {name: judged(cases[name], boxes[name], line) for name, line in sorted(told.items())}
+    wrong = [f"{name}: {hint}" for name, hint in said.items() if hint]
+    solved, left = [name for name in said if not said[name]], [name for name in cases if name not in said]
+    if not wrong and not left:
+        return Verdict(True, "Six faults, each with evidence that holds. The insurance pays.")
+    parts = [f"Solved: {', '.join(solved)}." if solved else "", *wrong, f"Open: {', '.join(left)}." if left else ""]
+    return Verdict(False, "\n".join(part for part in parts if part))
+
+
+# X.3 ----------------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def _unseen(i: int) -> tuple[Case, BlackBox]:
+    """One of the cases of the last exercise: six with a fault, then two without."""
+    if i < len(FAULTS):
+        case = next(case for case in drawn_cases(_UNSEEN[i]) if case.mistake.fault == FAULTS[i])
+        return case, replace(case.record(), name="unseen")
+    sound = i - len(FAULTS)
+    return innocent_cases(_SOUND)[sound], replace(innocent_boxes(_SOUND)[sound], name="unseen")
+
+
+def _judge_program(answer: Any) -> Verdict:
+    """A function of a box, tried on boxes of each kind that nobody has seen."""
+    if answer is None or answer is Ellipsis:
+        return Verdict(False, "There is no answer yet: give your function, without brackets.")
+    if not callable(answer):
+        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.")
+    for i in range(len(FAULTS) + 2):
+        if said := _tried(answer, *_unseen(i)):
+            return Verdict(False, said)
+    return Verdict(True, "Six faults found in boxes it had never seen, each with its evidence, and no innocent accused.")
+
+
+def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> str:
+    """What is wrong with a program's word about a box; "" where it is right."""
+    what = f"a robot with {case.mistake.fault}" if case.mistake.fault else "a sound robot"
+    what += " that was kicked over" if case.pushes else ""
+    try:
+        line = program(box)
+    except Exception as error:  # whatever a learner's function raises
+        return f"Of {what}: your function stops with {type(error).__name__}: {error}"
+    if not isinstance(line, str):
+        return f'Return a line of text, such as "mass 0.93" or "nothing"; this is {type(line).__name__}.'
+    hint = judged(case, box, line)
+    return hint and f'Of {what} your program says "{line}": {hint}'
+
+
+EXERCISES = (
+    Exercise(
+        name="X.1",
+        statement="The impulse of a kick, (3,), N·s, world, from what (7) misses in the record of a robot without a fault.",
+        stub="impulse = np.zeros(3)  # replace: N·s, in the world's axes",
+        solution="missed = needed(kicked)[:, :3]\n"
+        "rows = np.flatnonzero(np.linalg.norm(missed, axis=1) > 50)  # N\n"
+        "rows = rows[rows < rows[0] + 100]  # the kick, and no blow of the fall\n"
+        'R = [kicked.state(i).frame_pose("base").rotation for i in rows]\n'
+        "impulse = 0.002 * sum(R_i @ missed[i] for R_i, i in zip(R, rows))",
+        judge=Shaped(
+            Numeric(
+                right=_impulse,
+                praise="Nobody recorded the kick, and you know how hard it was and where it came from.",
+                mistakes=_kicks(),
+                tolerance=0.02,
+            ),
+            {(): "Three numbers: an impulse has a direction.", (6,): "The force alone, three numbers, without its moment."},
+        ),
+        explanation="Who touches the robot is missing in (7). The first rows have no motor that could have done it.",
+        names=lambda: {"kicked": kicked_box(), "needed": needed},
+    ),
+    Exercise(
+        name="X.2",
+        statement="The report on your six boxes: the seed, and for each box a fault with its evidence.",
+        stub="report = [\n"
+        '    f"seed {seed}",\n'
+        '    "A: ?",  # a fault and its evidence, such as "A: mass 0.93"\n'
+        '    "B: ?",\n    "C: ?",\n    "D: ?",\n    "E: ?",\n    "F: ?",\n]',
+        solution="from floatbase.lessons.lessonX.program import investigate as detective\n"
+        "\n"
+        'report = [f"seed {seed}"]\n'
+        'report += [f"{box.name}: {detective(box)}" for box in black_boxes(seed)]',
+        judge=_judge_report,
+        explanation="The detective is the solution of X.3, which reveal shows there.",
+        names=lambda: {"seed": 1, "black_boxes": black_boxes},
+    ),
+    Exercise(
+        name="X.3",
+        statement="A program that sees only a box, and names its fault with the evidence, or nothing.",
+        stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as in your report',
+        solution=inspect.getsource(program),
+        judge=_judge_program,
+        explanation="The plan first, then the motors, then the ground: each question has an answer of its own.",
+    ),
+)

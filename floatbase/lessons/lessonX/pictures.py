@@ -1,0 +1,106 @@
+"""Lesson X, The crash investigation: films of black boxes, moments of them, orders beside the torques that were needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from floatbase._arrays import Array
+from floatbase.lessons.lessonX.box import BlackBox
+from floatbase.lessons.lessonX.tools import lagged
+from floatbase.simulation import Rollout
+from floatbase.viewer import GREYS, Viewer, hexadecimal
+
+WIDTH, HEIGHT, EDGE = 620, 240, 40  # pixels of a drawing, and of its edge
+_LEAST = 1.0  # N: a smaller force is not worth a word
+
+
+def film(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None = None) -> Viewer:
+    """Play a box: measured and planned forces, cones as they were told. speed: 1 for real time."""
+    places = np.array([box.contacts.positions(box.state(i)) for i in range(len(box))])
+    record = Rollout(
+        box.robot, box.contacts, box.time, box.q, box.v, np.full_like(box.tau, np.nan), box.tau, box.planned, box.measured,
+        places, (), "fell" if box.fell else "completed",
+    )  # fmt: skip
+    return view.play(record, speed=speed, com=False, title=title)
+
+
+def show_moment(view: Viewer, box: BlackBox, missed: Array, time: float) -> str:
+    """Draw one row of a box; what was planned, what was measured, and what (7) misses there, as text.
+
+    missed: (n - 1, nv), as of `needed`. time: s.
+    """
+    i = int(np.clip(np.searchsorted(box.time, time), 0, len(missed) - 1))
+    view.show(box.state(i), box.contacts, box.measured[i], box.planned[i], com=False)
+    gaps = np.linalg.norm((box.measured[i] - box.planned[i]).reshape(-1, 3), axis=1)
+    told = ", ".join(f"{name[:2]} {gap:.0f}" for name, gap in zip(box.contacts.names, gaps, strict=True))
+    left = float(np.linalg.norm(missed[i, :3]))
+    return f"planned and measured forces differ by {told} N; (7) misses {left if left >= _LEAST else 0:.0f} N on the base"
+
+
+def plot_missed(box: BlackBox, missed: npt.ArrayLike) -> Figure:
+    """The force on the base that (7) misses, and the weight for comparison. missed: (n - 1, nv), as of `needed`."""
+    forces = np.linalg.norm(np.asarray(missed)[:, :3], axis=1)
+    figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
+    ax.axhline(box.robot.weight, color=hexadecimal(GREYS[1]), linestyle="--", label="weight")
+    ax.plot(box.time[: len(forces)], forces, color=hexadecimal(GREYS[0]), label="missing on the base")
+    ax.set(xlabel="time [s]", ylabel="force [N]", ylim=(0, None))
+    ax.legend(loc="center left")
+    ax.grid(alpha=0.3)
+    plt.close(figure)
+    return figure
+
+
+def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
+    """Ordered and needed torque of a joint, as SVG, the order after a first-order lag; how well the two fit.
+
+    got: (n - 1, d) N·m, the torques that the motion needed. joint: its number. ms: time constant of the lag.
+    """
+    times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
+    told = box.tau[: len(got)]
+    orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
+    frame = _Frame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
+    drawn = frame.ticks() + frame.curve(times, got[:, joint], f'stroke="{hexadecimal(GREYS[2])}" stroke-width="6"')
+    drawn += frame.curve(times, orders[:, joint], 'stroke="currentColor" stroke-width="1.5"')
+    off = float(np.median(np.abs(orders - got)))
+    words = (
+        f"{box.robot.joint_names[joint]}, from {frame.low:.0f} to {frame.high:.0f} N·m",
+        f"thick: needed; thin: ordered, {ms:.0f} ms late; all joints differ by {off:.2f} N·m in the median",
+    )
+    text = "".join(f'<text x="{EDGE}" y="{HEIGHT + 32 + 18 * i}" font-size="13">{line}</text>' for i, line in enumerate(words))
+    size = f'viewBox="0 0 {WIDTH} {HEIGHT + 60}" style="max-width: 100%; width: {WIDTH}px"'
+    return f'<svg {size} fill="currentColor">{drawn}{text}</svg>'
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where times, s, and torques, N·m, lie on a drawing."""
+
+    begin: float
+    end: float
+    low: float
+    high: float
+
+    def across(self, times: npt.ArrayLike) -> Array:
+        return np.asarray(EDGE + (WIDTH - 2 * EDGE) * (np.asarray(times) - self.begin) / (self.end - self.begin))
+
+    def up(self, torques: npt.ArrayLike) -> Array:
+        return np.asarray(10 + (HEIGHT - 20) * (self.high - np.asarray(torques)) / (self.high - self.low))
+
+    def curve(self, times: Array, torques: Array, style: str) -> str:
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(self.across(times), self.up(torques), strict=True))
+        return f'<polyline points="{points}" fill="none" {style}/>'
+
+    def ticks(self) -> str:
+        """The line of no torque, and the tenths of a second."""
+        zero = f'x1="{EDGE}" y1="{self.up(0.0):.1f}" x2="{WIDTH - EDGE}" y2="{self.up(0.0):.1f}"'
+        drawn = f'<line {zero} stroke="currentColor" stroke-width="0.5"/>'
+        for tenth in range(int(np.ceil(10 * self.begin)), int(10 * self.end) + 1):
+            x = float(self.across(tenth / 10))
+            drawn += f'<line x1="{x:.1f}" y1="5" x2="{x:.1f}" y2="{HEIGHT}" stroke="currentColor" stroke-width="0.2"/>'
+            drawn += f'<text x="{x:.1f}" y="{HEIGHT + 12}" font-size="11" text-anchor="middle">{tenth / 10:.1f} s</text>'
+        return drawn

@@ -1,0 +1,67 @@
+"""Lesson X: a program that sees only a black box, the solution of exercise X.3."""
+
+from itertools import combinations
+
+import numpy as np
+
+from floatbase.lessons.lessonX.box import BlackBox
+from floatbase.lessons.lessonX.tools import ground_normal, lagged, needed, sliding
+
+
+def investigate(box: BlackBox) -> str:
+    """A fault with its evidence, or "nothing"."""
+    return of_plan(box) or of_motors(box) or of_ground(box) or "nothing"
+
+
+def of_plan(box: BlackBox) -> str:
+    """Did the controller plan a motion that is possible?"""
+    rows = [(i, box.equations(i)) for i in range(0, len(box), 5)]
+    left = np.array([e.M @ box.qdd[i] + e.h for i, e in rows])
+    right = np.array([e.S @ box.tau[i] + e.J.T @ box.planned[i] for i, e in rows])
+    factor = np.sum(left * right) / np.sum(left**2)
+    if abs(factor - 1) > 0.05:
+        return f"mass {factor:.3f}"
+    early = [(i, box.equations(i)) for i in np.flatnonzero(box.time < 0.5)]
+    b = max(abs(e.b).max() for _, e in early)
+    asked = max(abs(e.A @ box.qdd[i]).max() for i, e in early)
+    return f"drift {b:.2f} m/s²" if asked < 0.1 * b else ""
+
+
+def of_motors(box: BlackBox) -> str:
+    """Did the joints get what was ordered?"""
+    got, told = needed(box)[:, 6:], box.tau[:-1]
+    off = np.median(abs(told - got), axis=0)
+    if off.max() < 0.5:  # N·m
+        return ""
+    constants = range(0, 120, 2)  # ms
+    period = box.time[1] - box.time[0]
+    late = [np.median(abs(lagged(told, period, ms) - got)) for ms in constants]
+    if min(late) < 0.3 * late[0]:
+        return f"slow motors {constants[np.argmin(late)]} ms"
+    return exchanged(box, got, told, off)
+
+
+def exchanged(box: BlackBox, got: np.ndarray, told: np.ndarray, off: np.ndarray) -> str:
+    """Two joints that got each other's orders, as far as their motors can."""
+    names, limits = box.robot.joint_names, box.robot.torque_limits
+    best, found = 0.3, ""
+    for i, j in combinations(range(len(names)), 2):
+        crossed = np.clip(told[:, [j, i]], -limits[[i, j]], limits[[i, j]])
+        left = np.median(abs(crossed - got[:, [i, j]]), axis=0)
+        share = left.sum() / (off[i] + off[j])
+        if share < best:
+            best, found = share, f"swapped motors {names[i]} {names[j]}"
+    return found
+
+
+def of_ground(box: BlackBox) -> str:
+    """Is the ground what the controller was told?"""
+    normal, told = ground_normal(box), box.contacts.normals[0]
+    angle = np.rad2deg(np.arccos(min(1.0, normal @ told)))
+    if angle > 5:
+        return f"normal {angle:.1f}°"
+    used = sliding(box, normal)
+    if len(used) < 10:
+        return ""
+    mu = np.percentile(used, 90)
+    return f"friction {mu:.2f}" if mu < 0.9 * box.contacts.mus[0] else ""
