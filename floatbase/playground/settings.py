@@ -171,7 +171,7 @@ class Settings(Value):
         run = f"run = fb.rollout(sim, controller, {_whole(3.0, period)}{rest}"
         imports = [line for words, line in _IMPORTS if any(word in text for word in words)]
         lines = [*imports, "", f"robot = fb.load({robot.name!r})"]
-        return "\n".join([*lines, *body, run, "print(run.outcome, run.time[-1])", ""])
+        return "\n".join([*lines, *body, run, 'print(run.outcome, f"at {run.time[-1]:.2f} s")', ""])
 
 
 _IMPORTS = (
