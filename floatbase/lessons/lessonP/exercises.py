@@ -57,7 +57,7 @@ def _judge_stiffness(answer: Any) -> Verdict:
         return Verdict(False, "No motor follows that: the controller looks at the robot only every 4 ms.")
     below = 1e3 * sinks(kp)
     if not np.isfinite(below):
-        return Verdict(False, "So stiff that the robot falls on physics.")
+        return Verdict(False, "So soft that the robot sinks to the ground.")
     if below > MOST + ROUNDING:
         return Verdict(False, f"On physics it sinks by {below:.1f} mm: too soft.")
     if below < LEAST:
