@@ -18,6 +18,7 @@ ROUNDING = 0.05  # mm
 STIFFEST = 1e5  # 1/s², that a judge still tries on physics
 NEAR = 0.01  # of a mistake's value
 UP = 1.0  # s on two feet
+HEIGHT = 1e-4  # m: less counts as none
 
 
 def _load() -> float:
@@ -95,7 +96,7 @@ _SHIFT = Numeric(
     right=_nearest,
     praise="",
     mistakes={
-        "Nothing is moved yet: the centre of mass is beside the diagonal, and the robot tips to that side.": lambda: np.zeros(3),
+        "Nothing is moved yet: the centre of mass is beside the diagonal, so the robot tips.": lambda: np.zeros(3),
         "That is over the other diagonal, of FR and RL, which are to be lifted.": lambda: _nearest("FR_foot", "RL_foot"),
         "The other way round: from the centre of mass to the line, not from the line.": lambda: -_nearest(),
         "That is over the diagonal, but it is not the shortest way: a plumb line meets it at a right angle.": lambda: _towards(
@@ -108,10 +109,9 @@ _SHIFT = Numeric(
             lambda feet: feet["RR_foot"]
         ),
         "Metres, please: that would be as many millimetres.": lambda: 1e3 * _nearest(),
-        "That is the part of the way *along* the diagonal; the part across it is needed.": lambda: _towards(
-            lambda feet: feet["FL_foot"]
-        )
-        - _nearest(),
+        "That is the part of the way *along* the diagonal; the part across it is needed.": lambda: (
+            _towards(lambda feet: feet["FL_foot"]) - _nearest()
+        ),
         "Halfway. The centre of mass is not over the line yet.": lambda: 0.5 * _nearest(),
         "That is a direction: a unit vector along the diagonal.": lambda: np.append(_unit_line(), 0.0),
     },
@@ -122,9 +122,11 @@ _SHIFT = Numeric(
 def _judge_shift(answer: Any) -> Verdict:
     """Geometry, and then physics: how long it stands on two feet."""
     given = numbers(answer, (3,))
-    if not isinstance(given, Verdict) and abs(given[2]) > 1e-4:
+    if isinstance(given, Verdict):
+        return given
+    if abs(given[2]) > HEIGHT:
         return Verdict(False, "Seen from above: the centre of mass keeps its height, so the third number is 0.")
-    verdict = _SHIFT(answer)
+    verdict = _SHIFT(given)
     if not verdict.right:
         return verdict
     times = [on_two_feet(shift) for shift in (np.zeros(3), given)]
