@@ -41,9 +41,8 @@ SETTINGS := $(VENV)/share/jupyter/lab/settings
 QUIET := --LanguageServerManager.autodetect=False
 
 # what pip says, boiled down: a line for every tenth package, and one before the long end
-PACKAGES := $(shell grep -c == environment.txt)
 PROGRESS := n=0; while read -r what which rest; do case "$$what $$which" in \
-	"Collecting "* | "Processing "*) n=$$((n + 1)); [ $$((n % 10)) != 0 ] || echo "  $$n of about $(PACKAGES) packages";; \
+	"Collecting "* | "Processing "*) n=$$((n + 1)); [ $$((n % 20)) != 0 ] || echo "  $$n packages found";; \
 	"Installing collected") echo "  unpacking them all: about a minute";; esac; done
 
 help:
@@ -62,12 +61,12 @@ lab: setup
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
 		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(QUIET) $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
-test: setup
+test: $(VENV)/tests-$(KEY)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest $(WORKERS) --durations=30 $(PYTEST_ARGS)
 
-pages: setup
+pages: $(VENV)/tests-$(KEY)
 	$(BIN)/python -m floatbase.lessons.publish pages $(PAGES_ARGS)
 
 setup: $(VENV)/ready-$(KEY)
@@ -77,13 +76,21 @@ $(VENV)/locked-$(KEY): environment.txt | python
 	@echo "Making $(VENV) with $(BASE): about 2 GB, a few minutes the first time."
 	@rm -rf $(VENV)
 	@"$(BASE)" -m venv $(VENV)
-	@{ PYTHONUNBUFFERED=1 $(PIP) install --progress-bar=off -r environment.txt && \
+	@$(PIP) install -q -c environment.txt hatchling editables
+	@{ PYTHONUNBUFFERED=1 $(PIP) install --progress-bar=off -c environment.txt --no-build-isolation -e ".[course]" && \
 		$(BIN)/jupyter labextension disable $(NEWS) >/dev/null 2>&1 && touch $@; } | { $(PROGRESS); }
 	@test -e $@  # the pipe above forgets whether pip failed
 
 $(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 	@$(PIP) install -q --no-deps --no-build-isolation -e .
-	@$(BIN)/python -m floatbase compile >/dev/null
+	@echo "Compiling the controller, once: about a minute."
+	@$(BIN)/python -m floatbase compile >/dev/null 2>&1 || $(BIN)/python -m floatbase compile
+	@touch $@
+
+# what only tests and pages need
+$(VENV)/tests-$(KEY): $(VENV)/ready-$(KEY)
+	@echo "Adding to $(VENV) what only tests need."
+	@$(PIP) install -q -r environment.txt
 	@touch $@
 
 python:
@@ -99,7 +106,7 @@ lock: | python
 	"$(BASE)" -m venv build/uv
 	build/uv/bin/python -m pip --disable-pip-version-check install -q uv
 	build/uv/bin/uv pip compile -q --universal --python-version 3.11 --fork-strategy fewest \
-		--extra test --extra cluster --extra meshes --extra video --extra pages --no-annotate --no-emit-index-url \
+		--extra course --extra test --extra cluster --extra meshes --extra video --extra pages --no-annotate --no-emit-index-url \
 		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
 
 clean:

@@ -18,7 +18,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("robots", help="list the robots and what they are for")
     view = commands.add_parser("view", help="a live robot in the browser; end it with Ctrl-C")
-    view.add_argument("robot", help="a name that `robots` lists")
+    view.add_argument("robot", help="a name that `robots` lists, or the file of a URDF")
+    view.add_argument("--feet", nargs="+", default=[], metavar="LINK", help="links of a URDF that stand on the ground")
+    view.add_argument("--foot-radius", type=float, default=None, metavar="M", help="radius of balls at these feet, m")
+    view.add_argument("--fixed", action="store_true", help="bolt the root link of a URDF to the ground")
     view.add_argument("--friction", type=float, default=0.7, help="coefficient of friction of the ground (0.7)")
     view.add_argument("--background", default="light", help="white, light or dark (light)")
     view.add_argument("--port", type=int, default=0, help="port of the page (a free one)")
@@ -40,6 +43,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
+def _robot(options: argparse.Namespace) -> fb.Robot:
+    """The robot that a command line names. Raises `FloatbaseError`."""
+    if not options.robot.lower().endswith((".urdf", ".xml")):
+        return fb.load(options.robot)
+    return fb.load_urdf(options.robot, floating=not options.fixed, feet=options.feet, foot_radius=options.foot_radius)
+
+
 def _view(options: argparse.Namespace) -> int:
     """Show a robot until Ctrl-C or SIGTERM."""
     from floatbase.playground import Playground, Settings  # loads MuJoCo and the viewer, which the other commands do without
@@ -47,12 +57,12 @@ def _view(options: argparse.Namespace) -> int:
     ended = threading.Event()
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        robot = fb.load(options.robot)
+        robot = _robot(options)
         settings = Settings(friction=(options.friction, options.friction))
         page = Playground(robot, settings, background=options.background, port=options.port)
         with closing(page):
             page.start()
-            print(f"{options.robot} at {page.url} (end with Ctrl-C)", flush=True)
+            print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
                 page.view.window.open()
             ended.wait()

@@ -17,6 +17,7 @@ _LONGEST_CALL = 10.0  # s in one call: torques and velocities that stay the same
 _STEP_ROUNDING = 1e-9  # of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
 _INTEGRAL_PART = 0.05  # of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
 _DEAD_LEVER = 1e-9  # of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
+_Oil = tuple[Array, Array, Array]  # the parts of an `OilState`, between the steps of the integration
 VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
 
 
@@ -77,6 +78,7 @@ class HydraulicActuators:
         """Close the valves, with pressures that give torques tau, (d,) N·m, zero by default, as far as the supply goes.
 
         q_joints: (d,) rad, the centre by default. A robot that is to stand from the start needs the torques it stands with.
+        The integrals begin empty: torques are off, by what leaks, until they have learned how much that is.
         """
         cylinders = self.cylinders
         tau = checked("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
@@ -103,8 +105,10 @@ class HydraulicActuators:
         force = self._force_for(checked("tau_desired", tau_desired, (cylinders.d,), "N·m"), pose)
         v = checked("v_joints", v_joints, (cylinders.d,), "rad/s")
         steps = max(1, int(np.ceil(positive("dt", dt, "s", most=_LONGEST_CALL) / _LONGEST_STEP - _STEP_ROUNDING)))
+        oil = (self.state.opening, self.state.pressures, self.state.integral)
         for _ in range(steps):
-            self.state = self._advance(force, pose, v, dt / steps)
+            oil = self._advance(oil, force, pose, v, dt / steps)
+        self.state = OilState(*oil)
         return pose.lever * cylinders.force(self.state.pressures)
 
     def _force_for(self, tau: Array, pose: Pose) -> Array:
@@ -113,17 +117,17 @@ class HydraulicActuators:
         lever = np.where(np.abs(pose.lever) < least_lever, least_lever, pose.lever)
         return np.clip(tau / lever, *self.cylinders.force_limits())
 
-    def _advance(self, force: Array, pose: Pose, v: Array, step: float) -> OilState:
-        """The state `step` s later when the loop desires `force`, (d,) N, at joint velocities v."""
-        cylinders, hydraulics, now = self.cylinders, self.cylinders.hydraulics, self.state
+    def _advance(self, oil: _Oil, force: Array, pose: Pose, v: Array, step: float) -> _Oil:
+        """Opening, pressures and integral `step` s later when the loop desires `force`, (d,) N, at joint velocities v."""
+        cylinders, hydraulics, (opening, pressures, integral) = self.cylinders, self.cylinders.hydraulics, oil
         rate = 2.0 * np.pi * hydraulics.loop_bandwidth
-        error = force - cylinders.force(now.pressures)
-        force_rate = rate * (error + _INTEGRAL_PART * rate * now.integral)
-        u = cylinders.opening_for(force_rate, now.pressures, pose, v)
-        integral = now.integral + step * np.where(np.abs(u) < 1.0, error, 0.0)
-        u = np.clip(u, -1.0, 1.0)
-        opening = u + (now.opening - u) * np.exp(-2.0 * np.pi * hydraulics.valve_bandwidth * step)
-        halfway = 0.5 * (now.opening + opening)
-        change = step * cylinders.pressure_rates(halfway, now.pressures, pose, v)
-        change /= 1.0 + step * cylinders.pressure_decay(halfway, now.pressures, pose)
-        return OilState(opening, np.maximum(now.pressures + change, VACUUM), integral)
+        error = force - cylinders.force(pressures)
+        force_rate = rate * (error + _INTEGRAL_PART * rate * integral)
+        u = cylinders.opening_for(force_rate, pressures, pose, v)
+        integral = integral + step * np.where(np.abs(u) < 1.0, error, 0.0)
+        u = np.minimum(np.maximum(u, -1.0), 1.0)
+        after = u + (opening - u) * np.exp(-2.0 * np.pi * hydraulics.valve_bandwidth * step)
+        halfway = 0.5 * (opening + after)
+        change = step * cylinders.pressure_rates(halfway, pressures, pose, v)
+        change /= 1.0 + step * cylinders.pressure_decay(halfway, pressures, pose)
+        return after, np.maximum(pressures + change, VACUUM), integral

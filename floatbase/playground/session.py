@@ -24,7 +24,7 @@ from floatbase.robots import Robot, State
 from floatbase.simulation import Actuators, AlteredSimulation, Controller, World
 
 PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller: with each, robots stand a push
-_NOD_RATE = 0.6  # Hz
+_NOD_RATE = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
 _YAW_OVER_PITCH = 1.15  # the ellipse is a little wider in yaw
 _GROWING = 1.5  # s in which the ellipse grows from nothing
 

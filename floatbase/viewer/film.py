@@ -33,7 +33,7 @@ _NEEDS = (
 _IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
 _DURATION = """() => {
     const {animator} = viewer;
-    const unused = [part("player"), part("panel"), part("fold"), part("board"), ...document.querySelectorAll("#legend.folded")];
+    const unused = [...["player", "panel", "fold", "board", "tools"].map(part), ...document.querySelectorAll("#legend.folded")];
     for (const control of unused) control.style.visibility = "hidden";
     if (!animator.duration) return 0;
     animator.pause();

@@ -10,10 +10,15 @@ function startViewer() {
   const panel = startPanel(viewer);
   const camera = startCamera(viewer, panel);
   const legend = startLegend(viewer, camera);
+  const manners = startManners(viewer, camera);
   const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
-    set_title: (command) => { part("title").textContent = command.text; },
+    set_views: manners.views,
+    set_title: (command) => {
+      part("title").textContent = command.text;
+      manners.describe(command.text);
+    },
     set_legend: (command) => { legend.show(command.items); },
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
     set_theme: (command) => { document.body.className = command.name; },
@@ -103,6 +108,7 @@ function spot(colour, symbol = "patch") {
 
 const LAG = 0.3;  // s by which the camera is behind what it follows, so that it does not shake with every step
 const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
+const WIDE = 1.2;  // width over height of a picture into which the robot fits; a narrower one shows it smaller
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
@@ -138,6 +144,11 @@ function startCamera(viewer, panel) {
   viewer.render = () => {
     const moving = path.length > 0 && go();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
+    const zoom = Math.min(1, (w - 2 * aside()) / h / WIDE);
+    if (zoom != viewer.camera.zoom) {
+      viewer.camera.zoom = zoom;
+      viewer.camera.updateProjectionMatrix();
+    }
     if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
     else viewer.camera.clearViewOffset();
     render();
@@ -191,7 +202,7 @@ function startPlayer(viewer) {
       if (![...speed.options].some((option) => option.value == requested)) speed.add(new Option(`${requested}×`, requested));
       speed.value = requested;
       animator().mixer.timeScale = command.options.speed;
-      if (command.options.paused) {
+      if (command.options.paused || calm()) {
         animator().pause();
         animator().seek(0);  // the first picture: before this, items that come later are seen, too
       }

@@ -20,6 +20,8 @@ from floatbase.viewer import wire
 
 _BODY = """
 <div><div id="meshcat-pane"></div></div>
+<div id="tools"><button type="button" aria-label="first view" title="back to the first view (key: h)">⌂</button>
+<details><summary title="other views, and what is shown">view</summary><div></div></details></div>
 <div id="board" role="group" aria-label="terms of the equation of motion"></div>
 <button id="fold" type="button" aria-label="panel" aria-expanded="true" title="fold the panel"></button><div id="panel"></div>
 <div id="title"></div>
@@ -91,11 +93,11 @@ def _own(name: str) -> str:
 
 
 def _scripts() -> str:
-    return _own("page.js") + _own("panel.js")
+    return _own("page.js") + _own("panel.js") + _own("manners.js")
 
 
 def _page(scripts: str, title: str) -> str:
     return (
-        f'<!DOCTYPE html><html><head><meta charset="utf-8"><link rel="icon" href="data:,"><title>{html.escape(title)}'
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><link rel="icon" href="data:,"><title>{html.escape(title)}'
         f"</title><style>{_own('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
     )

@@ -227,12 +227,20 @@ class Painter:
         judged = None if force is None or self._is_quiet(force) else force
         if self.facets is None:
             status = "idle" if judged is None else _friction_cone(tuple(normal.tolist()), mu).status(judged)
-            return {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
+            made = {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
+            return made | self._rim(position, _polyhedron(tuple(normal.tolist()), mu, 4, True, 0.0), height, status)
         polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inside, self.turn)
         status = "idle" if judged is None else polyhedron.status(judged)
         status = "inside" if status == "active" else status  # an active facet has a colour of its own
         active = () if judged is None else polyhedron.active_facets(judged)
-        return shapes.friction_polyhedron(position, polyhedron, height, status, active)
+        made = shapes.friction_polyhedron(position, polyhedron, height, status, active)
+        return made | self._rim(position, polyhedron, height, status)
+
+    def _rim(self, position: Array, polyhedron: FrictionPolyhedron, height: float, status: str) -> Picture:
+        """What tells a force outside its cone from others by more than a hue."""
+        if status != "outside":
+            return {}
+        return {"/rim": shapes.rim(position, polyhedron, height, is_round=self.facets is None)}
 
     def _is_quiet(self, force: Array) -> bool:
         """Whether a force is too small to be drawn or judged."""

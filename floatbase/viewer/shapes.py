@@ -21,6 +21,7 @@ from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import COM, CONE, CONE_ALPHA, PATCH, RGB, RGBA, WARNING, with_alpha
 from floatbase.viewer.lowering import Shape
 
+_RIM = 0.025  # thickness of a rim, over the radius of the mouth
 FACET_ALPHA = 0.75
 ARROW_SLENDERNESS = 0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
 ARROW_LENGTH = 0.2  # m
@@ -154,6 +155,19 @@ def friction_polyhedron(
     for facet in np.atleast_1d(np.asarray(active, dtype=int)):
         picture[f"/facet {facet}"] = Item(_facet(*key, int(facet)), matrix)
     return picture
+
+
+def rim(position: npt.ArrayLike, polyhedron: FrictionPolyhedron, height: float, is_round: bool = False) -> Item:
+    """A dark rim around the mouth of a cone, so that a force outside it is told by more than a hue.
+
+    position, polyhedron, height: as for `friction_polyhedron`.
+    is_round: whether it is the rim of the round cone with the polyhedron's normal and friction.
+    """
+    frame = _surface_frame(polyhedron.normal)
+    if is_round:
+        return Item(_round_rim(), placed(position, frame, (polyhedron.mu * height, polyhedron.mu * height, height)))
+    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside), float(polyhedron.turn))
+    return Item(_edged_rim(*key), placed(position, frame, height))
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
@@ -295,6 +309,19 @@ def _unit_cone() -> Shape:
 def _unit_polyhedron(mu: float, facets: int, inside: bool, turn: float) -> Shape:
     rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside, turn).rays
     return lowering.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True)
+
+
+@lru_cache(maxsize=64)
+def _edged_rim(mu: float, facets: int, inside: bool, turn: float) -> Shape:
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside, turn).rays
+    edges = [geometry.rod(a, b, _RIM * mu) for a, b in zip(rays, np.roll(rays, -1, axis=0), strict=True)]
+    return lowering.mesh(*geometry.merged(edges), PATCH)
+
+
+@lru_cache(maxsize=1)
+def _round_rim() -> Shape:
+    vertices, faces = geometry.torus_arc(1.0, _RIM, 0.0, 2.0 * np.pi)
+    return lowering.mesh(vertices + np.array([0.0, 0.0, 1.0], dtype=np.float32), faces, PATCH)
 
 
 @lru_cache(maxsize=256)

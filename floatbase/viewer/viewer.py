@@ -293,11 +293,16 @@ class Viewer(Controls):
         self.canvas.set_again(*self._looking(view, FOLLOWED if self._moving else ROBOT))
         return self
 
-    def _looking(self, view: View, followed: str = ROBOT) -> tuple[wire.Update, wire.Update]:
-        """The commands that set the camera to a view of the robot where it is now, and what it follows from there."""
+    def _looking(self, view: View, followed: str = ROBOT) -> tuple[wire.Update, ...]:
+        """The commands for a view of the robot where it is now, for what the camera follows from there, and for the presets."""
+        presets = wire.set_views({name: self._from(preset) for name, preset in PRESETS.items()})
+        return wire.set_camera(*self._from(view)), self._following(followed), presets
+
+    def _from(self, view: View) -> tuple[Array, Array, float]:
+        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a view of the robot now."""
         low, high = self.painter.feet_box if view.feet else self.painter.box
         target, eye = target_and_eye(view, low + self._moved, high + self._moved)
-        return wire.set_camera(eye, target, view.angle), self._following(followed)
+        return eye, target, view.angle
 
     def _following(self, followed: str) -> wire.Update:
         """The command that lets the camera follow the robot, or what stands for it in a recording, if it is to follow."""

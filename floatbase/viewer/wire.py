@@ -25,7 +25,7 @@ Update = tuple[Key, bytes]
 TYPES = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "delete_control",
     "set_control", "move_control", "set_camera", "set_follow", "set_title", "set_legend", "set_theme", "set_kept",
-    "set_text", "set_strip",
+    "set_text", "set_strip", "set_views",
 )  # fmt: skip
 
 ANIMATION: Key = ("/", "set_animation", "")
@@ -95,6 +95,12 @@ def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bo
     """
     at, moved = _upright(start), _upright(begin)
     return encode({"type": "set_follow", "path": "", "node": node, "from": at, "begin": moved, "smooth": smooth})
+
+
+def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:
+    """The views that the page offers by name, each as position, target and angle of `set_camera`."""
+    named = {name: {"position": _upright(eye), "target": _upright(at), "fov": fov} for name, (eye, at, fov) in views.items()}
+    return encode({"type": "set_views", "path": "", "views": named})
 
 
 def page_command(kind: str, **values: Any) -> Update:

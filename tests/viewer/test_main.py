@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +31,22 @@ def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys: pytest.Captur
     assert "floatbase: unknown robot 'go3'; near names: go2" in capsys.readouterr().err
     assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
     assert "port is 99999" in capsys.readouterr().err
+
+
+def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, solo = tmp_path / "mine.urdf", load("solo12")
+    file.write_text(solo.urdf)
+    assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2
+    assert "FL_FOTT" in capsys.readouterr().err
+    assert main(["view", str(tmp_path / "none.urdf"), "--no-browser"]) == 2
+    assert "none.urdf" in capsys.readouterr().err
+    options = ["--feet", *(foot.frame for foot in solo.feet), "--foot-radius", "0.01"]
+    command = [sys.executable, "-m", "floatbase", "view", str(file), "--no-browser", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert "mine at http://127.0.0.1" in process.stdout.readline()
+        process.terminate()
+        assert process.wait(timeout=20) == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

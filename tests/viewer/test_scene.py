@@ -249,7 +249,8 @@ def test_what_is_not_passed_is_not_drawn(viewer: Viewer, standing: State, contac
     full = paths(viewer)
     assert len([path for path in full if "/measured/" in path]) == 4
     assert len([path for path in full if "/planned/" in path]) == 4
-    assert len([path for path in full if "/cone/" in path]) == 4
+    assert len([path for path in full if path.endswith("/surface")]) == 4
+    assert any(path.endswith("/rim") for path in full)  # of the foot whose force is outside
     assert any("/com/" in path for path in full - bare)
     viewer.show(standing, contacts.only("FL_foot"), forces=forces[0], com=False, cones=False)
     assert {path for path in paths(viewer) - bare if "/scale/" not in path} == {
@@ -330,7 +331,7 @@ def legend(viewer: Viewer) -> list[str]:
 
 def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     viewer.show(standing, contacts, forces, planned=forces, support=True, push=("base", [0, 30.0, 0]), ghost=standing)
-    cone = ["friction cone: force inside", "friction cone: surface reached", "friction cone: force outside"]
+    cone = ["friction cone: force inside", "friction cone: surface reached", "friction cone: force outside (dark rim)"]
     assert legend(viewer) == [
         "measured force", "planned force", "centre of mass", "push", *cone, "support region", "desired posture",
     ]  # fmt: skip
@@ -370,7 +371,7 @@ def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(viewer: Viewer,
     for view in ("front", "front", View(30.0), View(30.0)):
         before = looked()
         viewer.camera(view)
-        assert looked() == before + 2  # where from, and whether it follows
+        assert looked() == before + 3  # where from, whether it follows, and the presets there
     before = looked()
     viewer.show(standing)
     assert looked() == before

@@ -1,0 +1,148 @@
+"""Exercises of lesson B, Torque is an abstraction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from floatbase._arrays import Array
+from floatbase.lessons.exercises import Exercise, Numeric, Verdict, numbers
+from floatbase.lessons.lessonB.helpers import comes_back
+from floatbase.lessons.rounding import about
+
+FOOT, CRANK, GAMMA, PISTON = 0.40, 0.10, np.deg2rad(50.0), 5000.0  # of exercise B.1: m, m, rad, N
+STEP = 1e-5  # rad, of a difference
+WANTED, GOT = np.array([12.0, 12.0, -12.0, -12.0]), np.array([9.0, 15.0, -9.0, -9.0])  # N·m, of exercise B.2
+LEVER, GAIN = np.array([0.036, 0.036, 0.036, -0.020]), 0.001  # m; 1/N
+NEAR_HOME = 1.0  # mm, of exercise B.3
+MOST_DAMPING = 20.0  # 1/s
+LOST, SOFT = 50.0, 100.0  # mm; 1/s²
+
+
+def _length(gamma: float, sign: float = -1.0) -> float:
+    """From the cylinder's foot to the rod's end, m, as the distance of two points."""
+    return float(np.linalg.norm([CRANK * np.cos(gamma) + sign * FOOT, CRANK * np.sin(gamma)]))
+
+
+def _torque() -> float:
+    """The piston's force times what its length gains for each radian."""
+    return PISTON * (_length(GAMMA + STEP) - _length(GAMMA - STEP)) / (2.0 * STEP)
+
+
+def _opening(error: Callable[[Array, Array], Array]) -> Callable[[], Array]:
+    """k times an error of the forces of the piston, wanted and got."""
+    return lambda: np.asarray(GAIN * error(WANTED / LEVER, GOT / LEVER))
+
+
+def _judge_gains(answer: Any) -> Verdict:
+    """Whether go2 on 5 Hz comes back to within a millimetre; if not, what kind of mistake the gains look like."""
+    given = numbers(answer, (2,))
+    if isinstance(given, Verdict):
+        return given
+    kp, kd = map(float, given)
+    if min(kp, kd) <= 0.0:
+        return Verdict(False, "A gain that is not above zero draws nothing back, or pushes it away.")
+    if kp < kd:
+        return Verdict(False, "kp comes first, in 1/s², and then kd, in 1/s: here kp is the smaller one.")
+    if kd > MOST_DAMPING:
+        return Verdict(False, f"kd = {about(kd)} is more than the {MOST_DAMPING:g} that the measured velocities allow.")
+    outcome, off, swing = comes_back(kp, kd)
+    far = f"{about(off)} mm off in the end"
+    if outcome != "completed" or off > LOST:
+        what = far if outcome == "completed" else outcome
+        if kp < SOFT:
+            return Verdict(False, f"{what}: too soft. What leaks pushes it aside before the loops have learned how much it is.")
+        return Verdict(False, f"{what}: far too much kp for this kd. A late torque feeds the swing that it was to end.")
+    if off <= NEAR_HOME:
+        return Verdict(True, f"{far}: stiff enough for what leaks, and not yet too stiff for a torque that comes late.")
+    if swing > off:
+        why = "A late torque lags more behind a quick swing: less kp, or more kd, if you may."
+        return Verdict(False, f"{far}, and it still swings, by {about(swing)} mm. {why}")
+    return Verdict(
+        False, f"{far}, but nearly at rest there. What leaks pushes it aside, and kp is the spring that holds against it."
+    )
+
+
+EXERCISES = (
+    Exercise(
+        name="B.1",
+        statement="The torque of an excavator's cylinder on its arm, N·m.",
+        stub="torque = piston * b  # N·m, if crank and cylinder were square; replace",
+        names=lambda: {"piston": PISTON, "b": CRANK},
+        solution="length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(gamma))\ntorque = piston * a * b * np.sin(gamma) / length",
+        judge=Numeric(
+            right=_torque,
+            praise="Force times dℓ/dq: which is the distance of the joint from the line of the cylinder.",
+            mistakes={
+                "That would be so if crank and cylinder were square. They are not here.": lambda: PISTON * CRANK,
+                "γ is the angle at the joint, between crank and foot. What counts is the angle between the crank and the "
+                "cylinder, along which the force goes.": lambda: PISTON * CRANK * np.sin(GAMMA),
+                "The cosine is along the crank, and has no lever. And γ is not the angle between crank and cylinder.": lambda: (
+                    PISTON * CRANK * np.cos(GAMMA)
+                ),
+                "That is the crank times the sine of the angle at the foot. It goes with the other side: a.": lambda: (
+                    PISTON * CRANK * CRANK * np.sin(GAMMA) / _length(GAMMA)
+                ),
+                "That lever is a sin γ: the distance of the foot from the line of the crank.": lambda: (
+                    PISTON * FOOT * np.sin(GAMMA)
+                ),
+                "The derivative of ℓ²/2 is a b sin γ. You want that of ℓ: one more division by ℓ.": lambda: (
+                    PISTON * FOOT * CRANK * np.sin(GAMMA)
+                ),
+                "The derivative of the cosine is a sine.": lambda: PISTON * FOOT * CRANK * np.cos(GAMMA) / _length(GAMMA),
+                "np.sin and np.cos take radians; this is the sine of 50 radians.": lambda: (
+                    PISTON * FOOT * CRANK * np.sin(50.0) / np.sqrt(FOOT**2 + CRANK**2 - 2 * FOOT * CRANK * np.cos(50.0))
+                ),
+                "The law of cosines has a minus: at γ = 0 the crank points to the foot, and ℓ is shortest.": lambda: (
+                    PISTON * FOOT * CRANK * np.sin(GAMMA) / _length(GAMMA, 1.0)
+                ),
+                "That is the lever, in m. The torque is the piston's force times it.": lambda: _torque() / PISTON,
+            },
+        ),
+        explanation="ℓ² = a² + b² - 2 a b cos γ, so dℓ/dγ = a b sin γ / ℓ; and τ q̇ = F ℓ̇.",
+    ),
+    Exercise(
+        name="B.2",
+        statement="What the loop tells the valve in four situations, shape (4,).",
+        stub="u = k * (wanted - got)  # shape (4,); replace: an error of the piston's force",
+        names=lambda: {"k": GAIN, "wanted": WANTED, "got": GOT},
+        solution="u = k * (wanted / lever - got / lever)",
+        judge=Numeric(
+            right=_opening(lambda wanted, got: wanted - got),
+            praise="Too little of a pull asks for oil on the other side; beyond the dead point out and in change their roles.",
+            mistakes={
+                "That is the error of the torque. The piston knows nothing of the joint: which force should it have?": lambda: (
+                    GAIN * (WANTED - GOT)
+                ),
+                "'Too little: open it more' is not enough: for more *pull* the valve must open to the other side.": _opening(
+                    lambda wanted, got: abs(wanted) - abs(got)
+                ),
+                "A size has lost its sign: u says to which side the valve opens.": _opening(
+                    lambda wanted, got: abs(wanted - got)
+                ),
+                "All the other way: this lets out where oil is missing.": _opening(lambda wanted, got: got - wanted),
+                "The lever's sign got lost: beyond the dead point the rod must go *in* to turn the joint forwards.": lambda: (
+                    GAIN * (WANTED - GOT) / abs(LEVER)
+                ),
+                "The right sides. But a short lever needs a larger force for the same torque: divide by it.": lambda: (
+                    GAIN * (WANTED - GOT) * np.sign(LEVER)
+                ),
+                "Force is torque divided by the lever, not times it.": lambda: GAIN * (WANTED - GOT) * LEVER,
+                "That opens for what is wanted, and never looks at what is there: no loop.": _opening(
+                    lambda wanted, got: wanted
+                ),
+            },
+        ),
+        explanation="F = τ / L, with L's sign. u > 0 feeds A, and the force grows; u < 0 feeds B, and it falls.",
+    ),
+    Exercise(
+        name="B.3",
+        statement="Gains kp and kd ≤ 20 with which go2 on 5 Hz comes back to within 1 mm.",
+        stub="gains = (100.0, 20.0)  # kp in 1/s², kd in 1/s; kd at most 20; replace",
+        solution="gains = (490.0, 20.0)",
+        judge=_judge_gains,
+        explanation="What leaks is a force, so go2 stays aside by an amount ∝ 1/kp; but kp/kd must stay below 2π · 5 Hz.",
+    ),
+)

@@ -1,0 +1,177 @@
+"""Lesson B, Torque is an abstraction: a cylinder on its crank, torques on the bench, how far go2 sways, and where watts go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+
+from floatbase._arrays import Array
+from floatbase.actuators import VACUUM, Hydraulics
+from floatbase.lessons.lessonB.bench import Bench, Row, held_then_turned, run_loop
+from floatbase.lessons.rounding import about
+from floatbase.simulation import Rollout
+from floatbase.viewer import GREYS, View, Viewer, below, geometry, hexadecimal, props, shapes
+
+BAR = 1e5  # Pa
+LARGER = 3.0  # times: how the crank and its cylinder are drawn
+JOINT = np.array([0.0, 0.0, 0.35])  # m: where the joint is drawn
+BEND = np.deg2rad(115.0)  # rad: from the crank to the shank, one piece of steel
+SHANK = 0.35  # m
+AT_JOINT = View(-90.0, 4.0, 1.0, around=((0.05, 0.0, 0.55), 0.62))
+DASHES = ("-", "--", ":", "-.")
+WIDTH, HEIGHT, LEFT, GAP = 620.0, 150.0, 58.0, 34.0  # pixels of a strip in the panel, of what is left of it and below it
+LASTS = 0.4  # s, of the panel's run
+
+
+def show_crank(view: Viewer, angle: float, torque: float) -> str:
+    """Draw a knee's cylinder, three times as large; as text its lever, and the pressures that a torque takes.
+
+    angle: °, of the joint from where the lever is longest; the rod goes out as it grows. torque: N·m.
+    """
+    bench = Bench(lambda t: (np.deg2rad(angle), 0.0))
+    gamma = np.arccos(bench.crank / bench.base) + bench.angle
+    foot = JOINT + [0.0, 0.0, LARGER * bench.base]
+    end = JOINT + LARGER * bench.crank * _towards(gamma)
+    stroke = (LARGER * (bench.base - bench.crank), LARGER * (bench.base + bench.crank))
+    least, most = bench.reach()
+    a, b = _pressures(bench, min(most, max(least, torque)))
+    supply = bench.hydraulics.supply_pressure
+    picture = view.painter.stage() | below("cylinder", props.hydraulic_cylinder(foot, end, stroke, (a / supply, b / supply)))
+    for name, start, tip, radius in (
+        ("thigh", JOINT, foot, 0.012),
+        ("crank", JOINT, end, 0.016),
+        ("shank", JOINT, JOINT + SHANK * _towards(gamma + BEND), 0.02),
+    ):
+        way = tip - start
+        length = float(np.linalg.norm(way))
+        aside = np.array([0.0, 0.09 if name == "thigh" else 0.0, 0.0])  # behind the cylinder
+        picture[name] = shapes.rod(start + aside, geometry.frame_along(way / length), length, radius, GREYS[1])
+    picture["joint"] = shapes.rod(JOINT + [0.0, -0.05, 0.0], geometry.frame_along([0.0, 1.0, 0.0]), 0.16, 0.028, GREYS[0])
+    view.draw(picture)
+    told = f"lever <b>{about(1000 * bench.lever, 'mm', floor=0.05)}</b>; within reach: {least:.0f} to {most:.0f} N·m; "
+    if not least <= torque <= most:
+        return f"{told}<b>{torque:.0f} N·m are more than the supply gives here</b>"
+    return f"{told}for {torque:.0f} N·m <b>A {a / BAR:.0f} bar, B {b / BAR:.0f} bar</b>"
+
+
+def _towards(gamma: float) -> Array:
+    """The unit vector, (3,), at an angle from straight up, in the plane of the picture."""
+    return np.array([np.sin(gamma), 0.0, np.cos(gamma)])
+
+
+def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
+    """Of both chambers, Pa, that make a torque, as much below the supply at one as above the tank at the other."""
+    h = bench.hydraulics
+    lines, force = h.supply_pressure + h.tank_pressure, torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0
+    a = (force + bench.ring * lines) / (bench.area + bench.ring)
+    return a, lines - a
+
+
+def plot_lever(angles: npt.ArrayLike, levers: npt.ArrayLike) -> Axes:
+    """A lever, mm, over the joint's angle from its best, °."""
+    axis = _axes("angle of the joint from the best one [°]", "lever [mm]")
+    axis.plot(angles, levers, color=hexadecimal(GREYS[0]), linewidth=2.0)
+    axis.axhline(0.0, color=hexadecimal(GREYS[2]), linewidth=1.0)
+    return axis
+
+
+def plot_torques(runs: Mapping[str, Sequence[Row]], wanted: float = 12.0) -> Axes:
+    """Torques on the bench over time; name -> rows of a run. A thin line is what was wanted."""
+    axis = _axes("time [ms]", "torque at the joint [N·m]")
+    axis.axhline(wanted, color=hexadecimal(GREYS[2]), linewidth=1.0)
+    for i, (name, rows) in enumerate(runs.items()):
+        times, torques = [1000 * row.time for row in rows], [row.torque for row in rows]
+        axis.plot(times, torques, DASHES[i % 4], color=hexadecimal(GREYS[min(i, 2)]), linewidth=1.8, label=name)
+    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return axis
+
+
+def plot_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
+    """How far the centre of mass has gone to the left, mm, over time from the start of each record; name -> record.
+
+    side: -1 for to the right.
+    """
+    axis = _axes("time [s]", f"gone to the {'left' if side > 0 else 'right'} [mm]")
+    for i, (name, record) in enumerate(records.items()):
+        gone = 1000 * side * (record.com - record.com[0])[:, 1]
+        axis.plot(record.time - record.time[0], gone, DASHES[i % 4], color=hexadecimal(GREYS[i % 3]), linewidth=1.8, label=name)
+    axis.axhline(0.0, color=hexadecimal(GREYS[2]), linewidth=1.0)
+    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return axis
+
+
+def plot_watts(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -> Axes:
+    """Powers over time, (n, k), W, with k names."""
+    axis = _axes("time [s]", "power [W]")
+    watts = np.asarray(watts)
+    for i, name in enumerate(names):
+        times = step * np.arange(len(watts))
+        axis.plot(times, watts[:, i], DASHES[i % 4], color=hexadecimal(GREYS[i % 3]), linewidth=1.8, label=name)
+    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return axis
+
+
+def _axes(x: str, y: str) -> Axes:
+    _, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
+    axis.set(xlabel=x, ylabel=y)
+    axis.grid(alpha=0.25)
+    return axis
+
+
+def show_step(bandwidth: float, supply: float, turning: float) -> str:
+    """The package's loop on the bench: 12 N·m wanted from 0 s on, and the joint turned for a while from 150 ms on; as SVG.
+
+    bandwidth: Hz, of the loop. supply: bar. turning: rad/s; the rod goes out.
+    """
+    hydraulics = replace(Hydraulics(), supply_pressure=supply * BAR)
+    rows = run_loop(Bench(held_then_turned(turning), hydraulics=hydraulics), bandwidth, LASTS)
+    torques = [row.torque for row in rows]
+    low, high = np.floor(min(torques) / 20 + 0.02), np.ceil(max(torques) / 20)
+    ticks = 20 * np.linspace(low, high, round(high - low) + 1)
+    drawn = _strip(0.0, "torque [N·m]", ticks, {"wanted": [12.0] * len(rows), "got": torques})
+    pressures = {"A": [row.a / BAR for row in rows], "B": [row.b / BAR for row in rows]}
+    drawn += _strip(HEIGHT + GAP, "pressure [bar]", np.linspace(0.0, 200.0, 5), pressures)
+    boiling = sum(min(row.a, row.b) <= VACUUM for row in rows)
+    reached = next((row.time for row in rows if abs(row.torque - 12.0) < 0.6), None)
+    late = "12 N·m are not reached" if reached is None else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
+    boils = f"<b>the oil boils for {boiling} ms</b>" if boiling else "no oil boils"
+    total = 2 * HEIGHT + 2 * GAP
+    svg = f'<svg width="{WIDTH}" viewBox="0 -8 {WIDTH} {total}" style="max-width: 100%" fill="currentColor">{drawn}</svg>'
+    return f"{svg}<div>{late}; while it turns, {min(torques[150:]):.1f} to {max(torques[150:]):.1f} N·m; {boils}</div>"
+
+
+def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[float]]) -> str:
+    """Curves over the panel's time, one strip of SVG: solid and dark the last, dashed the first."""
+    right, low, high = WIDTH - 70.0, ticks[0], ticks[-1]
+
+    def x(t: float) -> float:
+        return LEFT + (right - LEFT) * t / LASTS
+
+    def y(value: float) -> float:
+        return float(top + HEIGHT * (high - value) / (high - low))
+
+    drawn = f'<text x="14" y="{top + HEIGHT / 2}" font-size="12" text-anchor="middle" '
+    drawn += f'transform="rotate(-90 14 {top + HEIGHT / 2})">{title}</text>'
+    for value in ticks:
+        drawn += (
+            f'<line x1="{LEFT}" y1="{y(value):.1f}" x2="{right}" y2="{y(value):.1f}" stroke="currentColor" opacity="0.15"/>'
+        )
+        drawn += f'<text x="{LEFT - 6}" y="{y(value) + 4:.1f}" font-size="11" text-anchor="end">{value:.0f}</text>'
+    for t in np.linspace(0.0, LASTS, 5):
+        drawn += f'<text x="{x(t):.1f}" y="{top + HEIGHT + 15}" font-size="11" text-anchor="middle">{1000 * t:.0f} ms</text>'
+    heights = [y(values[-1]) for values in curves.values()]
+    if abs(heights[0] - heights[1]) < 12.0:  # names must not lie on each other
+        up = 1.0 if heights[0] > heights[1] else -1.0
+        middle = sum(heights) / 2
+        heights = [middle + 7.0 * up, middle - 7.0 * up]
+    for (name, values), at, dash, grey in zip(curves.items(), heights, ("5 4", ""), (GREYS[2], GREYS[1]), strict=True):
+        path = " ".join(f"{x(1e-3 * i):.1f},{y(value):.1f}" for i, value in enumerate(values))
+        style = f'stroke="{hexadecimal(grey)}" stroke-width="2.5" stroke-dasharray="{dash}"'
+        drawn += f'<polyline points="{path}" fill="none" {style}/>'
+        drawn += f'<text x="{right + 6}" y="{at + 4:.1f}" font-size="12">{name}</text>'
+    return drawn

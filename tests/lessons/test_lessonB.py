@@ -1,0 +1,219 @@
+"""Lesson B: the bench is the package's cylinder, pictures show it, and wrong answers of each kind get the hint that fits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import judges
+import numpy as np
+import pytest
+from hints import missed, right
+
+import floatbase as fb
+from floatbase.actuators import VACUUM, Cylinders, HydraulicActuators, Hydraulics
+from floatbase.lessons.lessonB import (
+    Bench,
+    comes_back,
+    held_then_turned,
+    plot_lever,
+    plot_sway,
+    plot_torques,
+    plot_watts,
+    run_loop,
+    show_crank,
+    show_step,
+)
+from floatbase.viewer import GREYS, hexadecimal
+
+ROBOT = judges.load("go2")
+KNEE = ROBOT.joint_names.index("FL_calf_joint")
+ROUNDING = 1e-9  # N·m and Pa per Pa: the same formulas in another order
+
+
+@pytest.fixture(scope="module")
+def view() -> Iterator[fb.Viewer]:
+    made = fb.Viewer(ROBOT)
+    yield made
+    made.close()
+
+
+# the bench
+
+
+def knee(hydraulics: Hydraulics) -> HydraulicActuators:
+    """The package's actuators with another supply, the cylinders' size that of the first."""
+    actuators = HydraulicActuators(ROBOT, hydraulics)
+    size = ROBOT.torque_limits / Hydraulics().weakest_torque
+    actuators.cylinders = Cylinders(hydraulics, size, actuators.cylinders.centre)
+    actuators.reset()
+    return actuators
+
+
+@pytest.mark.parametrize(
+    ("bandwidth", "speed", "wanted", "supply"),
+    [(50.0, 0.5, 12.0, 160e5), (5.0, 4.0, -20.0, 160e5), (1.0, 15.0, 12.0, 60e5), (20.0, 2.0, 60.0, 160e5)],
+)
+def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
+    bandwidth: float, speed: float, wanted: float, supply: float
+) -> None:
+    """Turned fast, out of reach, boiling: 0.4 s of go2's knee."""
+    hydraulics = Hydraulics(loop_bandwidth=bandwidth, supply_pressure=supply)
+    actuators, motion = knee(hydraulics), held_then_turned(speed)
+    rows = run_loop(Bench(motion, wanted, hydraulics), bandwidth, 0.4)
+    centre = actuators.cylinders.centre
+    for row, after in pairwise(rows):
+        angle, velocity = motion(row.time)
+        actuators.step(np.full(12, wanted), centre + angle, np.full(12, velocity), 1e-3)
+        got = actuators.torques(centre + after.angle)[KNEE]
+        assert after.torque == pytest.approx(got, abs=ROUNDING * 1e2)
+        assert np.allclose(actuators.state.pressures[:, KNEE], [after.a, after.b], rtol=ROUNDING)
+
+
+def test_the_benchs_spring_rate_and_reach_are_the_cylinders() -> None:
+    actuators = HydraulicActuators(ROBOT)
+    cylinders, angle = actuators.cylinders, 0.4
+    bench, pose = Bench(lambda t: (angle, 0.0)), cylinders.pose(cylinders.centre + angle)
+    assert bench.spring == pytest.approx(pose.lever[KNEE] ** 2 * pose.stiffness[KNEE], rel=1e-12)
+    assert bench.volumes == pytest.approx(tuple(pose.volumes[:, KNEE]), rel=1e-12)
+    assert bench.reach() == pytest.approx(tuple((pose.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12)
+    pressures = np.array([[bench.a], [bench.b]]) * np.ones(12)
+    for side in (1.0, -1.0):
+        rates = cylinders.pressure_rates(np.full(12, side), pressures, pose, np.zeros(12))
+        leaking = cylinders.pressure_rates(np.zeros(12), pressures, pose, np.zeros(12))
+        change = pose.lever * cylinders.force(rates - leaking)
+        assert bench.rate(side) == pytest.approx(side * change[KNEE], rel=1e-9)
+
+
+def test_the_joint_is_held_then_turned_then_held() -> None:
+    motion = held_then_turned(2.0, start=0.1, end=0.6)
+    assert motion(0.05) == (0.0, 0.0) and motion(0.3) == pytest.approx((0.4, 2.0)) and motion(0.9) == (0.6, 0.0)
+
+
+def test_a_valve_told_to_open_more_than_it_can_is_all_open() -> None:
+    wide, full = Bench(), Bench()
+    wide.step(7.0)
+    full.step(1.0)
+    assert wide.rows == full.rows and wide.rows[-1].u == 1.0 and wide.rows[-1].time == pytest.approx(1e-3)
+
+
+# pictures
+
+
+def test_the_crank_is_drawn_with_its_lever_and_what_is_out_of_reach_is_said(view: fb.Viewer) -> None:
+    best = show_crank(view, 0.0, 12.0)
+    picture = view.canvas.picture
+    rod, crank = picture["cylinder/rod"].matrix, picture["crank"].matrix
+    assert np.allclose(rod[:3, 2] / np.linalg.norm(rod[:3, 2]) @ crank[:3, 2], 0.0, atol=1e-6)  # square
+    assert np.allclose(rod[:3, 3] + rod[:3, 2], crank[:3, 3] + crank[:3, 2])
+    assert "lever <b>36 mm</b>" in best and "within reach: -45 to 76 N·m" in best
+    assert "more than the supply gives" not in best and "more than the supply gives" in show_crank(view, -80.0, 12.0)
+    a, b = (int(bar) for bar in re.findall(r"(\d+) bar", best))
+    bench = Bench()
+    assert bench.lever * 1e5 * (a * bench.area - b * bench.ring) == pytest.approx(12.0, abs=0.4)  # N·m: bars are rounded
+
+
+def test_the_step_response_tells_when_the_torque_comes_and_when_oil_boils() -> None:
+    quick, slow, torn = show_step(50.0, 160.0, 0.0), show_step(5.0, 160.0, 0.0), show_step(50.0, 60.0, 20.0)
+    comes = [int(re.findall(r"after <b>(\d+) ms", text)[0]) for text in (quick, slow)]
+    assert comes[0] < 15 < comes[1] < 120
+    assert "no oil boils" in quick and "no oil boils" in slow and "the oil boils for" in torn
+    bench = Bench(held_then_turned(20.0), hydraulics=replace(Hydraulics(), supply_pressure=60e5))
+    boiled = sum(min(row.a, row.b) <= VACUUM for row in run_loop(bench, 50.0, 0.4))
+    assert f"boils for {boiled} ms" in torn
+    assert set(re.findall(r"#[0-9A-F]{6}", torn)) <= {hexadecimal(grey) for grey in GREYS}
+    assert re.findall(r"<text[^>]*\sfill=", torn) == []
+
+
+def test_plots_show_what_they_are_given() -> None:
+    bench = Bench()
+    bench.step(0.1)
+    runs = {"one": bench.rows, "two": bench.rows}
+    record = fb.rollout(fb.Simulation(ROBOT), judges.controller_of("go2"), 0.02)
+    gone = 1000 * (record.com - record.com[0])[:, 1]
+    torques, sways = plot_torques(runs), plot_sway({"perfect": record}, side=-1)
+    levers, watts = plot_lever([0, 1], [36, 0]), plot_watts(np.arange(6.0).reshape(3, 2), ("pump", "joint"))
+    assert np.allclose(torques.lines[1].get_ydata(), [row.torque for row in bench.rows])
+    assert np.allclose(sways.lines[0].get_ydata(), -gone) and "right" in sways.get_ylabel()
+    assert np.allclose(levers.lines[0].get_ydata(), [36, 0])
+    assert np.allclose(watts.lines[1].get_ydata(), [1, 3, 5])
+    for axis, names in ((torques, ["one", "two"]), (watts, ["pump", "joint"])):
+        legend = axis.get_legend()
+        assert legend is not None and [text.get_text() for text in legend.get_texts()] == names
+
+
+# exercises
+
+FOOT, CRANK, GAMMA = 0.40, 0.10, np.deg2rad(50.0)
+
+
+def test_b_1_is_the_distance_of_the_joint_from_the_cylinders_line() -> None:
+    rod = CRANK * np.array([np.cos(GAMMA), np.sin(GAMMA)])
+    along = rod - [FOOT, 0.0]
+    length = np.linalg.norm(along)
+    lever = FOOT * along[1] / length  # the joint from the line through foot and rod
+    assert right("B.1", 5000 * lever)
+    wrong = {
+        "would be so if crank and cylinder were square": 500.0,
+        "the angle between the crank and the cylinder": 500.0 * np.sin(GAMMA),
+        "The cosine is along the crank": 500.0 * np.cos(GAMMA),
+        "the angle at the foot": 500.0 * along[1] / length,
+        "a sin γ": 2000.0 * np.sin(GAMMA),
+        "one more division by ℓ": 200.0 * np.sin(GAMMA),
+        "The derivative of the cosine": 200.0 * np.cos(GAMMA) / length,
+        "take radians": 200.0 * np.sin(50.0) / np.sqrt(0.17 - 0.08 * np.cos(50.0)),
+        "has a minus": 200.0 * np.sin(GAMMA) / np.sqrt(0.17 + 0.08 * np.cos(GAMMA)),
+        "That is the lever, in m": lever,
+        "the sign is not": -5000 * lever,
+        "no answer yet": None,
+        "Neither right": 1.0e6,
+    }
+    assert missed("B.1", [(answer, hint) for hint, answer in wrong.items()]) == []
+
+
+def test_b_2_opens_to_the_side_that_the_force_needs() -> None:
+    wanted, got, lever = np.array([12, 12, -12, -12]), np.array([9, 15, -9, -9]), np.array([0.036, 0.036, 0.036, -0.020])
+    F_d, F = wanted / lever, got / lever
+    u = 0.001 * (F_d - F)
+    assert list(np.sign(u)) == [1, -1, -1, 1]
+    assert right("B.2", u)
+    wrong = {
+        "the error of the torque": 0.001 * (wanted - got),
+        "to the other side": 0.001 * (abs(F_d) - abs(F)),
+        "has lost its sign": abs(u),
+        "All the other way": -u,
+        "The lever's sign got lost": 0.001 * (wanted - got) / abs(lever),
+        "divide by it": 0.001 * (wanted - got) * np.sign(lever),
+        "not times it": 0.001 * (wanted - got) * lever,
+        "never looks at what is there": 0.001 * F_d,
+        "should have shape": u[:, None],
+        "no answer yet": None,
+        "Neither right": np.ones(4),
+    }
+    assert missed("B.2", [(answer, hint) for hint, answer in wrong.items()]) == []
+
+
+def test_b_3_has_gains_between_what_leaks_and_what_comes_late() -> None:
+    assert right("B.3", (490.0, 20.0)) and right("B.3", [420, 20])
+    wrong = {
+        "What leaks pushes it aside, and kp": (100.0, 20.0),
+        "it still swings": (700.0, 20.0),
+        "far too much kp": (2000.0, 20.0),
+        "too soft": (2.0, 2.0),
+        "is more than the 20": (490.0, 44.0),
+        "kp comes first": (20.0, 490.0),
+        "draws nothing back": (-490.0, 20.0),
+        "should have shape": 490.0,
+        "no answer yet": None,
+        "should be numbers": "490, 20",
+    }
+    assert missed("B.3", [(answer, hint) for hint, answer in wrong.items()]) == []
+
+
+def test_go2_stays_aside_by_what_leaks_and_less_on_a_stiffer_spring() -> None:
+    soft, stiff = comes_back(100.0, 20.0), comes_back(250.0, 20.0)
+    assert soft.outcome == stiff.outcome == "completed"
+    assert 2.0 < soft.off / stiff.off < 4.0
+    assert soft.off > 3.0 and max(soft.swing, stiff.swing) < 1.0
