@@ -130,7 +130,7 @@ def test_outcomes_are_plotted_where_they_belong() -> None:
     assert (stands.outcome, falls.outcome) == ("completed", "fell")
     axis = plot_outcomes({(0.1, 0.2): stands, (0.3, 0.2): falls}, "friction")
     said = {text.get_position(): text.get_text() for text in axis.texts}
-    assert said == {(0, 0): "stands", (0, 1): "down at 0.2 s"}
+    assert said == {(0, 0): "stands", (0, 1): "0.2 s"}
     assert [label.get_text() for label in axis.get_yticklabels()] == ["0.1", "0.3"]
 
 

@@ -11,11 +11,9 @@ from matplotlib.axes import Axes
 from floatbase.simulation import Rollout
 from floatbase.viewer import GREYS, hexadecimal
 
-_FALLEN = 1e3  # mm that stand for a fall, above all others
-
 
 def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> Axes:
-    """A table of squares: dark where a robot fell, with the time in s, light where it stood.
+    """A table of squares: dark where a robot fell, with the time when it was down, light where it stood.
 
     records: (believed, true) -> record. name: of what is believed.
     """
@@ -25,8 +23,8 @@ def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> 
     axis.imshow(fell, cmap="Greys", vmin=0.0, vmax=2.0, origin="lower")
     for i, b in enumerate(believed):
         for j, t in enumerate(true):
-            words = f"down at {records[b, t].time[-1]:.1f} s" if fell[i, j] else "stands"
-            axis.text(j, i, words, ha="center", va="center", fontsize="x-small")
+            words = f"{records[b, t].time[-1]:.1f} s" if fell[i, j] else "stands"
+            axis.text(j, i, words, ha="center", va="center", fontsize="small")
     axis.set_xticks(range(len(true)), [f"{x:g}" for x in true])
     axis.set_yticks(range(len(believed)), [f"{x:g}" for x in believed])
     axis.set(xlabel=f"{name}, true", ylabel=f"{name}, believed")
@@ -38,11 +36,14 @@ def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) ->
     _, axis = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
     x, y = np.asarray(gains, dtype=float), np.asarray(moved, dtype=float)
     stands = np.isfinite(y)
-    axis.loglog(x[stands], y[stands], "o-", color=hexadecimal(GREYS[0]), label="stands")
+    top = 1.3 * y[stands].max(initial=1.0)
+    axis.semilogx(x[stands], y[stands], "o-", color=hexadecimal(GREYS[0]), label="stands")
     if not stands.all():
-        axis.plot(x[~stands], np.full((~stands).sum(), _FALLEN), "x", color=hexadecimal(GREYS[0]), ms=9, label="falls")
+        axis.plot(x[~stands], np.full((~stands).sum(), top), "x", color=hexadecimal(GREYS[0]), ms=9, label="falls")
     axis.axvline(border, color=hexadecimal(GREYS[1]), linestyle="--", label="4 ω²")
-    axis.set(xlabel="kp [1/s²]", ylabel="farthest aside [mm]", ylim=(4.0, 2.0 * _FALLEN))
+    axis.set_xticks(x, [f"{gain:g}" for gain in x])
+    axis.minorticks_off()
+    axis.set(xlabel="kp [1/s²]", ylabel="farthest aside [mm]", ylim=(0.0, 1.1 * top))
     axis.grid(alpha=0.25)
-    axis.legend(fontsize="small")
+    axis.legend(fontsize="small", loc="lower left")
     return axis
