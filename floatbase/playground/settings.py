@@ -135,7 +135,7 @@ class Settings(Value):
         kp = min(_GAIN, (2.0 * math.pi * self.bandwidth[0] / _SLOWER) ** 2) if self.bandwidth[0] < IDEAL else _GAIN
         gains = "" if kp == _GAIN else f", kp={kp:.4g}"
         weight = "" if motion == 1.0 else f", weight={10.0 * motion:g}"
-        com = "state.com" if not any(self.shift) else f"state.com + {[round(x, 6) for x in self.shift]}"
+        com = "state.com" if not any(self.shift) else f"state.com + {[round(float(x), 6) for x in self.shift]}"
         level = "state.frame_pose('base').rotation"
         if self.nod:
             level = f"nodding({level}, {self.nod:g}, {self.begin:.6g})"
@@ -171,7 +171,7 @@ class Settings(Value):
         run = f"run = fb.rollout(sim, controller, {_whole(3.0, period)}{rest}"
         imports = [line for words, line in _IMPORTS if any(word in text for word in words)]
         lines = [*imports, "", f"robot = fb.load({robot.name!r})"]
-        return "\n".join([*lines, *body, run, "print(run.outcome, run.time[-1])", ""])
+        return "\n".join([*lines, *body, run, 'print(run.outcome, f"at {run.time[-1]:.2f} s")', ""])
 
 
 _IMPORTS = (

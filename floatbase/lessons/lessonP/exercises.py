@@ -1,0 +1,197 @@
+"""Exercises of lesson P, Playground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._arrays import Array
+from floatbase.lessons.exercises import Exercise, Numeric, Verdict, numbers
+from floatbase.lessons.lessonP.helpers import BAG, HIDDEN, box_in_the_dark, on_two_feet, sinks
+
+G = 9.81  # m/s²
+MOST, LEAST = 10.0, 9.0  # mm that it may sink, and must: less is stiffer than was asked for
+ROUNDING = 0.05  # mm
+STIFFEST = 1e5  # 1/s², that a judge still tries on physics
+NEAR = 0.01  # of a mistake's value
+UP = 1.0  # s on two feet
+HEIGHT = 1e-4  # m: less counts as none
+
+
+def _load() -> float:
+    """The bag as a part of the robot's mass."""
+    return BAG / fb.load("go2").mass
+
+
+def _stiffness_slips() -> dict[str, float]:
+    """Hint -> the kp that this kind of mistake leads to."""
+    right, ratio = _load() * G / (MOST / 1e3), _load()
+    return {
+        "That carries the robot and the bag; it knows its own weight. Only what it does not know makes it sink.": right
+        * (1.0 + ratio)
+        / ratio,
+        "That would be for the robot's own weight. Only the bag is not known.": right / ratio,
+        "Metres: 10 mm are 0.01 m, and kp is for metres.": right / 1e3,
+        "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the controller believes.": right
+        * fb.load("go2").mass,
+        "The controller plans forces for the mass that it believes, the smaller one: divide by that.": right / (1.0 + ratio),
+        "That looks like kd = 2 √kp, which acts on velocities; at rest there are none.": 2.0 * right**0.5,
+        "Without g that is no acceleration.": right / G,
+    }
+
+
+def _judge_stiffness(answer: Any) -> Verdict:
+    """Physics decides: go2 with the bag, and this kp."""
+    given = numbers(answer, ())
+    if isinstance(given, Verdict):
+        return given
+    kp = float(given)
+    if kp <= 0.0:
+        return Verdict(False, "A spring that pulls back needs kp > 0.")
+    for hint, slip in _stiffness_slips().items():
+        if abs(kp - slip) <= NEAR * slip:
+            return Verdict(False, hint)
+    if kp > STIFFEST:
+        return Verdict(False, "No motor follows that: the controller looks at the robot only every 4 ms.")
+    below = 1e3 * sinks(kp)
+    if not np.isfinite(below):
+        return Verdict(False, "So soft that the robot sinks to the ground.")
+    if below > MOST + ROUNDING:
+        return Verdict(False, f"On physics it sinks by {below:.1f} mm: too soft.")
+    if below < LEAST:
+        return Verdict(False, f"On physics it sinks by {below:.1f} mm only: softer would do, and is kinder to motors.")
+    return Verdict(True, f"On physics it sinks by {below:.1f} mm. (A kp does not weigh: the bag is still not known.)")
+
+
+def _corners() -> tuple[Array, dict[str, Array]]:
+    """The centre of mass and the feet, each seen from above, (2,) m."""
+    state = fb.load("go2").standing()
+    contacts = fb.Contacts.feet(state.robot)
+    return state.com[:2], {name: place[:2] for name, place in zip(contacts.names, contacts.positions(state), strict=True)}
+
+
+def _nearest(first: str = "FL_foot", second: str = "RR_foot") -> Array:
+    """The way from the centre of mass to the nearest point of a line through two feet, (3,) m: least squares along the line."""
+    com, feet = _corners()
+    line = feet[second] - feet[first]
+    along = np.linalg.lstsq(line[:, None], com - feet[first], rcond=None)[0]
+    return np.append(feet[first] + line * along - com, 0.0)
+
+
+def _towards(point: Callable[[dict[str, Array]], Array]) -> Array:
+    com, feet = _corners()
+    return np.append(point(feet) - com, 0.0)
+
+
+def _unit_line() -> Array:
+    _, feet = _corners()
+    line = feet["RR_foot"] - feet["FL_foot"]
+    return np.asarray(line / np.linalg.norm(line))
+
+
+_SHIFT = Numeric(
+    right=_nearest,
+    praise="",
+    mistakes={
+        "Nothing is moved yet: the centre of mass is beside the diagonal, so the robot tips.": lambda: np.zeros(3),
+        "That is over the other diagonal, of FR and RL, which are to be lifted.": lambda: _nearest("FR_foot", "RL_foot"),
+        "The other way round: from the centre of mass to the line, not from the line.": lambda: -_nearest(),
+        "That is over the diagonal, but it is not the shortest way: a plumb line meets it at a right angle.": lambda: _towards(
+            lambda feet: (feet["FL_foot"] + feet["RR_foot"]) / 2.0
+        ),
+        "That is over a foot. Standing on one end of the diagonal is harder than on both.": lambda: _towards(
+            lambda feet: feet["FL_foot"]
+        ),
+        "That is over the foot RR. Standing on one end of the diagonal is harder than on both.": lambda: _towards(
+            lambda feet: feet["RR_foot"]
+        ),
+        "Metres, please: that would be as many millimetres.": lambda: 1e3 * _nearest(),
+        "That is the part of the way *along* the diagonal; the part across it is needed.": lambda: (
+            _towards(lambda feet: feet["FL_foot"]) - _nearest()
+        ),
+        "Halfway. The centre of mass is not over the line yet.": lambda: 0.5 * _nearest(),
+        "That is a direction: a unit vector along the diagonal.": lambda: np.append(_unit_line(), 0.0),
+    },
+    tolerance=0.02,
+)
+
+
+def _judge_shift(answer: Any) -> Verdict:
+    """Geometry, and then physics: how long it stands on two feet."""
+    given = numbers(answer, (3,))
+    if isinstance(given, Verdict):
+        return given
+    if abs(given[2]) > HEIGHT:
+        return Verdict(False, "Seen from above: the centre of mass keeps its height, so the third number is 0.")
+    verdict = _SHIFT(given)
+    if not verdict.right:
+        return verdict
+    times = [on_two_feet(shift) for shift in (np.zeros(3), given)]
+    if times[1] < UP:
+        return Verdict(False, f"On physics it stood on two feet for {times[1]:.1f} s only.")
+    return Verdict(True, f"On physics it stays up on FL and RR for {times[1]:.1f} s, and for {times[0]:.1f} s where it was.")
+
+
+def _measured(row: int = -1) -> float:
+    return float(box_in_the_dark().measured[row, 2::3].sum()) / fb.load("go2").weight
+
+
+def _planned() -> float:
+    return float(box_in_the_dark().planned[-1, 2::3].sum()) / fb.load("go2").weight
+
+
+def _by_sinking(kp: float) -> float:
+    record = box_in_the_dark()
+    return 1.0 + kp * float(record.state(0).com[2] - record.final.com[2]) / G
+
+
+EXERCISES = (
+    Exercise(
+        name="P.1",
+        statement="The kp of the task for the centre of mass with which go2 sinks 10 mm under a bag of 6 kg, 1/s².",
+        stub="kp = 0.0  # 1/s²; replace by your expression",
+        solution="kp = bag / go2.mass * 9.81 / 0.010",
+        judge=_judge_stiffness,
+        explanation="At rest m (kp s + g) = (m + bag) g. On physics it is 3 to 6 % less, since legs have masses of their own.",
+    ),
+    Exercise(
+        name="P.2",
+        statement="The shortest horizontal shift of the centre of mass that brings it over the diagonal FL - RR, (3,), m.",
+        stub="shift = np.zeros(3)  # m, world; replace by your expression",
+        solution="line = feet['RR_foot'] - feet['FL_foot']\n"
+        "across = np.array([-line[1], line[0], 0]) / np.linalg.norm(line[:2])\n"
+        "shift = across * (across @ (feet['FL_foot'] - com))",
+        judge=_judge_shift,
+        explanation="The part of (foot - com) across the line; what is along the line does not matter.",
+    ),
+    Exercise(
+        name="P.3",
+        statement="The mass in the world of a record, as a multiple of what the controller believes.",
+        stub="factor = 1.0  # replace by what you read from dark",
+        solution="factor = dark.measured[-1, 2::3].sum() / go2.weight",
+        judge=Numeric(
+            right=lambda: HIDDEN,
+            praise="Measured forces weigh, whatever anybody believes. (This is how a scale works, and a good robot has four.)",
+            mistakes={
+                "That is what it believes.": lambda: 1.0,
+                "That is the first row, before the ground has answered: wait until it is at rest.": lambda: _measured(0),
+                "That is planned. It plans for an acceleration that never comes; take what was measured.": _planned,
+                "That is what is missing, as a part; the question is all of it.": lambda: HIDDEN - 1.0,
+                "The other way round: believed for true.": lambda: 1.0 / HIDDEN,
+                "That is a mass in kg; as a multiple of what is believed, please.": lambda: HIDDEN * fb.load("go2").mass,
+                "Those are newtons; as a multiple of the weight that is believed, please.": lambda: (
+                    HIDDEN * fb.load("go2").weight
+                ),
+                "That is one foot's part on average: four feet carry.": lambda: HIDDEN / 4.0,
+                "That is from how far it sank, with kp = 100. Who says that kp was 100? Forces do not need it.": lambda: (
+                    _by_sinking(100.0)
+                ),
+            },
+            tolerance=5e-3,
+        ),
+        explanation="At rest the ground carries the true weight, and nothing else.",
+    ),
+)

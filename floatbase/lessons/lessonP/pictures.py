@@ -1,0 +1,49 @@
+"""Lesson P, Playground: outcomes for what is believed and what is true, and how far a push moves a robot with slow motors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from floatbase.simulation import Rollout
+from floatbase.viewer import GREYS, hexadecimal
+
+
+def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> Axes:
+    """A table of squares: dark where a robot fell, with the time when it was down, light where it stood.
+
+    records: (believed, true) -> record. name: of what is believed.
+    """
+    believed, true = (sorted({pair[i] for pair in records}) for i in (0, 1))
+    _, axis = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
+    fell = np.array([[records[b, t].outcome != "completed" for t in true] for b in believed])
+    axis.imshow(fell, cmap="Greys", vmin=0.0, vmax=2.0, origin="lower")
+    for i, b in enumerate(believed):
+        for j, t in enumerate(true):
+            words = f"{records[b, t].time[-1]:.1f} s" if fell[i, j] else "stands"
+            axis.text(j, i, words, ha="center", va="center", fontsize="small")
+    axis.set_xticks(range(len(true)), [f"{x:g}" for x in true])
+    axis.set_yticks(range(len(believed)), [f"{x:g}" for x in believed])
+    axis.set(xlabel=f"{name}, true", ylabel=f"{name}, believed")
+    return axis
+
+
+def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) -> Axes:
+    """How far a push moves a robot, mm, for gains, 1/s²; a cross at the top is a fall, a dashed line the border."""
+    _, axis = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
+    x, y = np.asarray(gains, dtype=float), np.asarray(moved, dtype=float)
+    stands = np.isfinite(y)
+    top = 1.3 * y[stands].max(initial=1.0)
+    axis.semilogx(x[stands], y[stands], "o-", color=hexadecimal(GREYS[0]), label="stands")
+    if not stands.all():
+        axis.plot(x[~stands], np.full((~stands).sum(), top), "x", color=hexadecimal(GREYS[0]), ms=9, label="falls")
+    axis.axvline(border, color=hexadecimal(GREYS[1]), linestyle="--", label="4 ω²")
+    axis.set_xticks(x, [f"{gain:g}" for gain in x])
+    axis.minorticks_off()
+    axis.set(xlabel="kp [1/s²]", ylabel="farthest aside [mm]", ylim=(0.0, 1.1 * top))
+    axis.grid(alpha=0.25)
+    axis.legend(fontsize="small", loc="lower left")
+    return axis
