@@ -112,9 +112,11 @@ class Session:
         self._make_actuators()
 
     def _make_actuators(self) -> None:
-        names = _NAMES | {"robot": self.robot}
-        exec(self.settings.actuators_line(), names)
+        names = _NAMES | {"robot": self.robot, "state": self.home}
+        exec("\n".join(self.settings.actuators_lines()), names)
         self.actuators: Actuators | None = names["actuators"]
+        if self.last is not None and isinstance(self.actuators, FirstOrderLag):
+            self.actuators.reset(self.last.tau[-1])
 
     def _controller(self, settings: Settings, state: State) -> Controller:
         """The controller that settings ask for, of a robot that is to stand as in `state`. Raises `FloatbaseError`."""

@@ -15,7 +15,6 @@ STEPS = {4: "Gait.trot(robot, swing=0.2)", 2: "Gait.walk(robot, swing=0.4)"}  # 
 TERMS = ("gravity", "velocity", "drift", "forces", "zeros", "cones")  # of (7) that can be switched off
 IDEAL = 100.0  # Hz: actuators at this end of their slider are perfect
 AHEAD = 1.0  # s from a control to the first step
-_SLOWER = 4.0  # times slower than the actuators that it believes in, a controller answers
 _GAIN = 100.0  # 1/s², of tasks with perfect actuators
 _LIFT = 0.04  # m that a foot which is to leave the ground is lifted
 
@@ -96,17 +95,23 @@ class Settings(Value):
         return f"Belief({', '.join(parts)})" if parts else ""
 
     def world_lines(self, robot: Robot) -> list[str]:
-        """Lines that make `sim` and `actuators` for `robot`."""
+        """Lines that make `sim`, `state` where it stands in it, and `actuators` for `robot`."""
         if self.is_plain:
             lines = [f"sim = fb.Simulation(robot, {self.ground()})"]
         else:
             lines = [f"sim = AlteredSimulation(robot, {self.ground()}, world={self.world(robot)})"]
-        return [*lines, self.actuators_line()]
+        return [*lines, "state = sim.state", *self.actuators_lines()]
 
-    def actuators_line(self) -> str:
-        """The line that makes `actuators`."""
+    def actuators_lines(self) -> list[str]:
+        """Lines that make `actuators` for `robot` and `state`: slow ones begin with the torques that hold it up."""
         hertz = self.bandwidth[1]
-        return "actuators = None" if hertz >= IDEAL else f"actuators = FirstOrderLag(robot, {hertz:g})"
+        if hertz >= IDEAL:
+            return ["actuators = None"]
+        return [
+            f"actuators = FirstOrderLag(robot, {hertz:g})",
+            "hold = fb.WholeBodyController(robot, fb.Contacts.feet(robot), fb.standing_tasks(state))",
+            "actuators.reset(hold(state.q, state.v).tau)",
+        ]
 
     def controller_lines(self, robot: Robot) -> list[str]:
         """Lines that make `controller` for `robot`, `sim` and `state`, where it is to stand."""
@@ -132,7 +137,7 @@ class Settings(Value):
     def _standing_lines(self, options: str) -> list[str]:
         """Lines of a controller that stands."""
         motion, posture, effort = self.weights
-        kp = min(_GAIN, (2.0 * math.pi * self.bandwidth[0] / _SLOWER) ** 2) if self.bandwidth[0] < IDEAL else _GAIN
+        kp = min(_GAIN, (2.0 * math.pi * self.bandwidth[0]) ** 2)  # behind a lag ω, 4 ω² is the border of what dies out
         gains = "" if kp == _GAIN else f", kp={kp:.4g}"
         weight = "" if motion == 1.0 else f", weight={10.0 * motion:g}"
         com = "state.com" if not any(self.shift) else f"state.com + {[round(float(x), 6) for x in self.shift]}"
@@ -160,7 +165,7 @@ class Settings(Value):
 
         period: s, of the controller. push: an `fb.Push`, or None.
         """
-        body = [*self.world_lines(robot), "state = sim.state", *self.controller_lines(robot)]
+        body = [*self.world_lines(robot), *self.controller_lines(robot)]
         text = "\n".join(body)
         pushes = ""
         if push is not None:
