@@ -91,6 +91,7 @@ def _slider(text: str, low: float, first: float, high: float, step: float, wait:
         description=text,
         readout_format=f".{max(0, -math.floor(math.log10(step)))}f",
         continuous_update=not wait,
+        tooltip=text,
         layout=widgets.Layout(width="60%"),
     )
 
@@ -136,10 +137,12 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
     The first slider says how hard, N, and pushes when it is let go; the second says where to, in degrees: 0 forwards, 90 to
     the robot's left (+y, where it begins), 180 backwards; the button *push* pushes once more. A push starts the run, as
     *run* does, and either puts a fallen robot back on its feet first. *pause* stops it, *reset* begins anew with both
-    sliders where they began. A line says what happens, and what stopped the run.
+    sliders where they began. The third slider slows time down. A line says what happens, and what stopped the run.
     """
     force = _slider("push [N]", -most, 0.0, most, 5.0, wait=True)
     towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0, wait=True)
+    speed = _slider("slow motion [×]", 0.05, 1.0, 1.0, 0.05, wait=False)
+    speed.observe(lambda change: run.slow_motion(change["new"]), names="value")
     line = _Line(run)
 
     def push(_: Any = None) -> None:
@@ -167,7 +170,8 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
     run.on_status(lambda _: line.tell())
     force.observe(let_go, names="value")
     buttons = [button("run", run.start), button("pause", run.pause), button("reset", reset)]
-    return _PushPanel([view.widget(), force, widgets.HBox([towards, _button("push", push)]), widgets.HBox([*buttons, line])])
+    rows = [force, widgets.HBox([towards, _button("push", push)]), speed, widgets.HBox([*buttons, line])]
+    return _PushPanel([view.widget(), *rows])
 
 
 class _PushPanel(widgets.VBox):

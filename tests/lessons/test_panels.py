@@ -110,7 +110,7 @@ class Pushed:
         self.view = fb.Viewer(robot)
         self.sim = fb.Simulation(robot)
         self.run: Live = live(self.sim, controller, self.view)
-        _, self.force, row, buttons = push_panel(self.run, self.view, most=600.0).children
+        _, self.force, row, self.speed, buttons = push_panel(self.run, self.view, most=600.0).children
         self.towards, self.push = row.children
         self.line = buttons.children[-1]
         self.buttons: dict[str, widgets.Button] = {b.description: b for b in buttons.children[:-1]}
@@ -199,3 +199,12 @@ def test_a_reset_shows_what_the_run_does_and_no_old_word(panel: Pushed) -> None:
     assert panel.line.value == "a push of 0 N: set how hard first"
     panel.buttons["reset"].click()
     assert panel.line.value == "running"
+
+
+def test_time_can_be_slowed_down(panel: Pushed) -> None:
+    panel.speed.value = 0.1
+    panel.run.start()
+    until(lambda: panel.sim.time > 0.05)
+    begin, clock = panel.sim.time, time.monotonic()
+    until(lambda: time.monotonic() - clock > 1.0)
+    assert panel.sim.time - begin < 0.5  # a tenth of real time, on a machine however slow
