@@ -49,14 +49,21 @@ class World(Value):
 class AlteredSimulation(Simulation):
     """A `Simulation` whose `world` can be set at any time, and that can push the base as if it had motors of its own.
 
-    robot, ground, timestep: as for `Simulation`. world: what holds at first.
+    robot, ground, timestep, links: as for `Simulation`. world: what holds at first.
     """
 
-    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3, world: World | None = None):
+    def __init__(
+        self,
+        robot: Robot,
+        ground: Ground | float = 1.0,
+        timestep: float = 1e-3,
+        world: World | None = None,
+        links: bool = True,
+    ):
         of_kind("robot", robot, Robot)
         self._world = World()
         self._base_wrench: Array = np.zeros(6)
-        super().__init__(robot, ground, timestep)
+        super().__init__(robot, ground, timestep, links)
         model = self.model
         self._own = {name: np.array(getattr(model, name)) for name in ("body_mass", "body_inertia", "dof_armature")}
         self._gravity, self._touching = np.array(model.opt.gravity), np.array(model.geom_conaffinity)

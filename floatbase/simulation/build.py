@@ -1,6 +1,7 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-Only the ground's planes and balls at the feet touch. Links that are welded together are one body, which has all their inertia.
+The ground's planes touch balls at the feet and hulls of the other links; nothing else touches, as no link does another. Links
+that are welded together are one body, which has all their inertia.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
 from floatbase.simulation.conversion import rotation_matrix
+from floatbase.simulation.shapes import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
 _IMPEDANCE_RATIO = 100.0  # friction as stiff as the normal force: feet creep less under a steady load
@@ -67,9 +69,10 @@ class Ground(Value):
         return np.asarray(points) @ self.normals.T - self.offsets
 
 
-def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
+def build_model(robot: Robot, ground: Ground, timestep: float, links: bool = True) -> mujoco.MjModel:
     """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact points, motors as joints.
 
+    links: whether the ground touches links, too, besides feet.
     Raises `SimulationError` when MuJoCo cannot build it.
     """
     spec = _urdf_without_shapes(robot)
@@ -97,6 +100,8 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
         _add_foot(spec, foot, feet.point_names)
+    if links:
+        _add_links(spec, robot)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -188,3 +193,13 @@ def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
         centres, radius = foot.corners + [0.0, 0.0, _CORNER_RADIUS], _CORNER_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
         body.add_geom(name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1)
+
+
+def _add_links(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """The hulls of links, without names and mass."""
+    for number, points in link_hulls(robot):
+        joint = spec.joint(robot.model.names[number])  # the free base's has another name
+        body = spec.body(body_name(robot.base)) if joint is None else joint.parent
+        mesh = spec.add_mesh(name=f"hull of {body.name}", uservert=points.ravel())
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, mass=0.0, contype=0, conaffinity=1)

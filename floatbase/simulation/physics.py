@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Fixed, Value, checked, cross, number, of_kind, positive, said, text
+from floatbase._arrays import Array, Fixed, Value, checked, cross, flag, number, of_kind, positive, said, text
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -80,30 +80,34 @@ class Simulation(Fixed):
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat foot one at each corner),
     each joint a torque motor with the robot's limit and rotor inertia, the ground planes with friction. Joint friction and
-    damping are off, as in (1)-(7); the URDF's joint limits are on. Only feet and ground touch.
+    damping are off, as in (1)-(7); the URDF's joint limits are on. The ground touches feet and, after a fall, other links: the
+    hulls of the URDF's collision shapes. Links go through each other.
 
-    robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s. `model` and
-    `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
+    robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s; links: whether
+    links touch the ground, else only feet do. Contact forces are those at the feet. `model` and `data` are MuJoCo's own, `feet`
+    the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
     What it was made with does not change any more; what `model` and `data` hold may. A copy has `model` and `data` of its own.
     """
 
     _instead: ClassVar[dict[str, str]] = {
-        **dict.fromkeys(("robot", "ground", "timestep", "feet", "model", "data", "point_names"), _ANOTHER),
+        **dict.fromkeys(("robot", "ground", "timestep", "links", "feet", "model", "data", "point_names"), _ANOTHER),
         **dict.fromkeys(("state", "q", "v", "joints", "time"), _MOVE),
     }
 
-    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
+    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3, links: bool = True):
         self.robot = of_kind("robot", robot, Robot)
         self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self.timestep = positive("timestep", timestep, "s", most=_LONGEST_TIMESTEP)
+        self.links = flag("links", links)
         self.feet = Contacts.feet(robot)
-        self.model = build_model(robot, self.ground, self.timestep)
+        self.model = build_model(robot, self.ground, self.timestep, links)
         self.data = mujoco.MjData(self.model)
         self._convert = Conversion(robot, self.model)
         self._motors = np.array([self.model.actuator(name).id for name in robot.joint_names], dtype=int)
         self._balls = np.array([self.model.geom(name).id for name in self.point_names], dtype=int)
         # of each plane, which is a geom; known from its first contact on
         self._contact_frames, self._frameless = np.zeros((self.model.ngeom, 3, 3)), set(range(len(self.ground.normals)))
+        self._most_contacts = len(self._balls) * len(self.ground.normals)  # of feet: in a valley a ball touches two planes
         self._planes = list(zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True))
         self._radii = self.model.geom_size[self._balls, :1]
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
@@ -213,26 +217,30 @@ class Simulation(Fixed):
         return self._forces_of(geoms[None], numbers[None])[0]
 
     def _raw_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """What MuJoCo has of the n contacts now: their geoms, shape (n, 2), and forces in their frame, shape (3 n,), N."""
+        """What MuJoCo has of n contacts now, of all feet at least: geoms, shape (n, 2), forces in their frame, shape (3 n,), N."""
         data = self.data
         contact, numbers, limits = data.contact, data.efc_force, data.nl
         if limits:  # behind the joints at their limits come the contacts
             numbers = numbers[limits:]
-        geoms = contact.geom  # from the plane to a ball
+        geoms = contact.geom  # from the plane to a ball or a link
         if numbers.size != 3 * len(geoms):  # a ball that only just touches has none, another cone than ours has others
             numbers = np.zeros((len(geoms), 6))
             for i, wrench in enumerate(numbers):
                 mujoco.mj_contactForce(self.model, data, i, wrench)
             numbers = numbers[:, :3].ravel()
-        if self._frameless and len(geoms):  # all contacts with a plane have one frame at all times
-            for i, plane in enumerate(geoms[:, 0].tolist()):
-                self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
-                self._frameless.discard(plane)
+        if self._frameless and len(geoms):  # all balls on a plane have one contact frame at all times
+            for i, (plane, geom) in enumerate(geoms.tolist()):
+                if geom in self._balls:
+                    self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
+                    self._frameless.discard(plane)
+        if len(geoms) > self._most_contacts:  # so links touch
+            feet = np.isin(geoms[:, 1], self._balls)
+            geoms, numbers = geoms[feet], numbers.reshape(-1, 3)[feet].ravel()
         return geoms, numbers
 
     def _forces_of(self, geoms: npt.NDArray[np.int32], numbers: Array) -> Array:
         """`contact_forces` of N instants, shape (N, n_points, 3), N, from their `_raw_contacts`, with geom 0 for none."""
-        n, planes, balls = len(geoms), geoms[:, :, 0], geoms[:, :, 1]
+        n, planes, balls = len(geoms), geoms[:, :, 0], geoms[:, :, 1]  # or links, whose forces are not asked for
         forces, world = np.zeros((n, self.model.ngeom, 3)), numbers.reshape(*balls.shape, 3)
         for plane in range(len(self._planes)):
             rows, columns = np.nonzero(planes == plane)  # no ball touches a plane twice, so nothing is added to a sum twice
@@ -241,11 +249,10 @@ class Simulation(Fixed):
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the point of each ball that is nearest to the ground."""
-        return self._lowest_points(self.data.geom_xpos)
+        return self._lowest_points(self.data.geom_xpos[self._balls])
 
-    def _lowest_points(self, geom_positions: Array) -> Array:
-        """`contact_positions` for MuJoCo's positions of all its geoms, shape (…, geoms, 3), m."""
-        centres = geom_positions[..., self._balls, :]
+    def _lowest_points(self, centres: Array) -> Array:
+        """`contact_positions` for centres of the balls, shape (…, n_points, 3), m."""
         nearest = np.argmin(self.ground.clearances(centres), axis=-1)
         return centres - self._radii * self.ground.normals[nearest]
 

@@ -153,9 +153,9 @@ class Recorder:
         self._tau_desired = np.empty((ticks, d))
         # MuJoCo's own numbers, which `finished` turns into ours, all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force  # views of its memory
-        self._geoms, self._steps = np.empty((ticks, sim.model.ngeom, 3)), 0
+        self._centres, self._steps = np.empty((ticks, points, 3)), 0
         self._actuators = np.empty((ticks * substeps, sim.model.nu))
-        touching = points * len(sim.ground.normals)  # at most: in the bottom of a valley a ball touches two planes
+        touching = sim._most_contacts
         self._touching = np.zeros((ticks * substeps, touching, 2), dtype=np.int32)
         self._forces = np.zeros((ticks * substeps, 3 * touching))
         self._stances: list[Contacts] = []
@@ -165,7 +165,8 @@ class Recorder:
     def before(self, t: float, q: Array, v: Array) -> None:
         """Keep clock, state and feet before a tick. They count when `complete` does."""
         n = self._n
-        self._time[n], self._q[n], self._v[n], self._geoms[n] = t, q, v, self._geom_positions
+        self._time[n], self._q[n], self._v[n] = t, q, v
+        self._geom_positions.take(self._sim._balls, 0, self._centres[n], "clip")  # "clip": it is the fastest
 
     def after_step(self) -> None:
         """Keep what motors and ground did in a timestep of the tick."""
@@ -246,7 +247,7 @@ class Recorder:
         sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)
         measured = self._mean(sim._forces_of(self._touching[steps], self._forces[steps]))
-        lowest = sim._lowest_points(self._geoms[:n])
+        lowest = sim._lowest_points(self._centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             forces, positions = np.full((n, contact.k), np.nan), np.full((n, len(contact.point_names), 3), np.nan)

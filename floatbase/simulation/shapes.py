@@ -1,0 +1,118 @@
+"""Hulls of a robot's links, with which it lies on the ground after a fall, from the URDF's collision shapes."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from floatbase._arrays import Array, read_only
+from floatbase.errors import InputError
+from floatbase.robots import Robot, State
+
+_CLEARANCE = 0.02  # m over the ground of the standing robot: below it, only feet touch
+_THINNEST = 1e-3  # m: flatter points have no hull for MuJoCo
+_SHORTEST = 0.4  # of the longest link: shorter ones, as hips and wrists, lie within or close to others, and cost as much time
+_SIDES = 24  # of a cylinder
+_DIRECTIONS = 200  # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 1 mm
+
+
+@lru_cache(maxsize=16)
+def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
+    """Pinocchio's number of the joint that moves a link, and points whose hull it fills, shape (n, 3), m, in the joint's frame.
+
+    All that one joint moves has one hull: a plane touches a body where it touches its hull. None have robots that are bolted to
+    the ground, links with a foot, which lie on that and on the link above, and links much shorter than the longest. Points that
+    are less than 2 cm above the ground when the robot stands are left out.
+    """
+    if not robot.is_floating:
+        return ()
+    model, placements, clouds = robot.model, _standing(robot), dict[int, list[Array]]()
+    on_feet = {model.frames[robot.frame_id(foot.frame)].parentJoint for foot in robot.feet}
+    for item in _collisions(robot):
+        if item.parentJoint in on_feet:
+            continue
+        points = _points(item.geometry) @ item.placement.rotation.T + item.placement.translation
+        at = placements[item.parentJoint]
+        high = points @ at.rotation[2] + at.translation[2] > _CLEARANCE
+        clouds.setdefault(int(item.parentJoint), []).append(points[high] if robot.feet else points)
+    hulls = {joint: np.vstack(cloud) for joint, cloud in clouds.items()}
+    lengths = {joint: float(np.linalg.norm(np.ptp(points, axis=0))) for joint, points in hulls.items() if len(points)}
+    least = _SHORTEST * max(lengths.values(), default=0.0)
+    kept = [joint for joint, length in lengths.items() if length >= least and _thickness(hulls[joint]) > _THINNEST]
+    return tuple((joint, read_only(_farthest(hulls[joint]))) for joint in kept)
+
+
+def _standing(robot: Robot) -> list[pin.SE3]:
+    """The placements of all joints when the robot stands on level ground, or has its posture where it cannot."""
+    try:
+        state = robot.standing()
+    except InputError:
+        state = State(robot, robot.posture)
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, state.q)
+    return list(data.oMi)
+
+
+def _collisions(robot: Robot) -> list[Any]:
+    """The URDF's collision shapes as Pinocchio reads them; without meshes where one of their files cannot be read."""
+    root = ElementTree.fromstring(robot.urdf)
+    meshed = [(link, shape) for link in root.findall("link") for shape in link.findall("collision[geometry]")]
+    for text in (robot.urdf, None):
+        if text is None:
+            for link, shape in meshed:
+                if shape.find("geometry/mesh") is not None:
+                    link.remove(shape)
+            text = ElementTree.tostring(root, encoding="unicode")
+        try:
+            loader = coal.CachedMeshLoader(coal.BV_OBB)  # legs share files
+            folders = [str(folder) for folder in robot.package_dirs]
+            found = pin.buildGeomFromUrdfString(robot.model, text, pin.COLLISION, package_dirs=folders, mesh_loader=loader)
+            return list(found.geometryObjects)
+        except ValueError:
+            continue
+    return []
+
+
+def _points(shape: Any) -> Array:
+    """Points whose hull is a shape, in its own frame, shape (n, 3), m; none for a kind that is not known."""
+    match shape:
+        case coal.Box():
+            return np.array(shape.halfSide).ravel() * (2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0)
+        case coal.Sphere():
+            return shape.radius * _directions()
+        case coal.Cylinder() | coal.Capsule():
+            ends = np.array([[0.0, 0.0, -shape.halfLength], [0.0, 0.0, shape.halfLength]])
+            angles = np.arange(_SIDES) * 2.0 * np.pi / _SIDES
+            circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_SIDES)])
+            around = circle if isinstance(shape, coal.Cylinder) else _directions()
+            return np.vstack([end + shape.radius * around for end in ends])
+        case coal.BVHModelBase():
+            return np.array(shape.vertices())
+    return np.zeros((0, 3))
+
+
+def _thickness(points: Array) -> float:
+    """The least extension along the principal axes of points, shape (n, 3); 0 for fewer than four points."""
+    if len(points) < 4:
+        return 0.0
+    centred = points - points.mean(axis=0)
+    axes = np.linalg.eigh(centred.T @ centred)[1]
+    return float(np.ptp(centred @ axes, axis=0).min())
+
+
+def _farthest(points: Array) -> Array:
+    """Those points, shape (m, 3), that are the farthest in some direction: enough for a hull."""
+    return points[np.unique(np.argmax(points @ _directions().T, axis=0))]
+
+
+def _directions() -> Array:
+    """Unit vectors that cover a sphere evenly along a golden spiral, shape (n, 3), the six axes among them."""
+    i = np.arange(_DIRECTIONS)
+    z, turn = 1.0 - (2.0 * i + 1.0) / _DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
+    flat = np.sqrt(1.0 - z**2)
+    return np.vstack([np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z]), np.eye(3), -np.eye(3)])
