@@ -17,7 +17,7 @@ from floatbase._arrays import Array, Fixed, Value, checked, cross, flag, number,
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
-from floatbase.simulation.build import Ground, body_name, build_model
+from floatbase.simulation.build import LINK, Ground, body_name, build_model
 from floatbase.simulation.conversion import Conversion
 
 _FALLEN_HEIGHT = 0.4  # part of the base's height at the last reset: a crouch keeps more, lying down does not
@@ -80,27 +80,24 @@ class Simulation(Fixed):
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat foot one at each corner),
     each joint a torque motor with the robot's limit and rotor inertia, the ground planes with friction. Joint friction and
-    damping are off, as in (1)-(7); the URDF's joint limits are on. The ground touches feet and, after a fall, other links: the
-    hulls of the URDF's collision shapes. Links go through each other.
+    damping are off, as in (1)-(7); the URDF's joint limits are on. Only feet and ground touch, after a fall `links` too.
 
-    robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s; links: whether
-    links touch the ground, else only feet do. Contact forces are those at the feet. `model` and `data` are MuJoCo's own, `feet`
-    the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
+    robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s. `model` and
+    `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
     What it was made with does not change any more; what `model` and `data` hold may. A copy has `model` and `data` of its own.
     """
 
     _instead: ClassVar[dict[str, str]] = {
-        **dict.fromkeys(("robot", "ground", "timestep", "links", "feet", "model", "data", "point_names"), _ANOTHER),
+        **dict.fromkeys(("robot", "ground", "timestep", "feet", "model", "data", "point_names"), _ANOTHER),
         **dict.fromkeys(("state", "q", "v", "joints", "time"), _MOVE),
     }
 
-    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3, links: bool = True):
+    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
         self.robot = of_kind("robot", robot, Robot)
         self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self.timestep = positive("timestep", timestep, "s", most=_LONGEST_TIMESTEP)
-        self.links = flag("links", links)
         self.feet = Contacts.feet(robot)
-        self.model = build_model(robot, self.ground, self.timestep, links)
+        self.model = build_model(robot, self.ground, self.timestep)
         self.data = mujoco.MjData(self.model)
         self._convert = Conversion(robot, self.model)
         self._motors = np.array([self.model.actuator(name).id for name in robot.joint_names], dtype=int)
@@ -110,6 +107,8 @@ class Simulation(Fixed):
         self._most_contacts = len(self._balls) * len(self.ground.normals)  # of feet: in a valley a ball touches two planes
         self._planes = list(zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True))
         self._radii = self.model.geom_size[self._balls, :1]
+        hulls = [i for i in range(self.model.ngeom) if self.model.geom(i).name.startswith(LINK)]
+        self._hulls, self._links = np.array(hulls, dtype=int), False
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._watch()
         self.reset()
@@ -173,6 +172,21 @@ class Simulation(Fixed):
         sunk = self._start_height - self._base_height() > (1.0 - _FALLEN_HEIGHT) * self._stature
         return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < _FALLEN_COSINE
 
+    @property
+    def links(self) -> bool:
+        """Whether the ground touches links, too, not only feet: the hulls of the URDF's collision shapes. A reset ends it.
+
+        A fallen robot lies on them, as `rollout(…, settle=1.0)` shows. Before a fall only feet touch, as in (7), and links in
+        the ground come out slowly. The link that has a foot lies on that, and links go through each other.
+        """
+        return self._links
+
+    @links.setter
+    def links(self, touch: bool) -> None:
+        self._links = flag("links", touch)
+        self.model.geom_conaffinity[self._hulls] = touch
+        self.model.body_conaffinity[self.model.geom_bodyid[self._hulls]] = touch
+
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing on the ground by default, at time 0.
 
@@ -181,6 +195,7 @@ class Simulation(Fixed):
         state = self._standing() if state is None else of_kind("state", state, State)
         if state.robot != self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
+        self.links = False
         mujoco.mj_resetData(self.model, self.data)
         self._qpos[:], self._qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
@@ -217,7 +232,7 @@ class Simulation(Fixed):
         return self._forces_of(geoms[None], numbers[None])[0]
 
     def _raw_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """What MuJoCo has of n contacts now, of all feet at least: geoms, shape (n, 2), forces in their frame, shape (3 n,), N."""
+        """What MuJoCo has of n contacts now, all of feet among them: geoms, (n, 2), and forces in their frame, (3 n,), N."""
         data = self.data
         contact, numbers, limits = data.contact, data.efc_force, data.nl
         if limits:  # behind the joints at their limits come the contacts

@@ -37,9 +37,11 @@ class Rollout(Value):
         contacts that the physics does not have.
 
     pushes: those handed to `rollout`.
-    outcome: why the record ends there: "completed", "fell", "diverged" or "controller failed".
+    outcome: why the record ends there, or the controller does: "completed", "fell", "diverged" or "controller failed".
     error: of a controller that failed: the exception it raised, or one that names the NaN or infinite torque it gave.
     stances: the controller's contacts at each row; empty where they were `contacts` throughout.
+    fell_at: s, when it had fallen, None where it did not. Rows from then on, of a rollout that settles, have no controller:
+        τ_desired is the brakes', planned forces are NaN.
     """
 
     robot: Robot
@@ -56,6 +58,7 @@ class Rollout(Value):
     outcome: Outcome
     error: FloatbaseError | None = None
     stances: tuple[Contacts, ...] = ()
+    fell_at: float | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -188,7 +191,13 @@ class Recorder:
             self._with_plan.append(n)
         self._n += 1
 
-    def finished(self, pushes: tuple[Push, ...], outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
+    def finished(
+        self,
+        pushes: tuple[Push, ...],
+        outcome: Outcome,
+        error: FloatbaseError | None = None,
+        fell_at: float | None = None,
+    ) -> Rollout:
         """The record. Raises `InputError` where a contact was of one kind in one stance and of another in a later one."""
         contacts = self._first
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
@@ -215,6 +224,7 @@ class Recorder:
             outcome=outcome,
             error=error,
             stances=() if all(stance is contacts for stance in self._stances) else tuple(self._stances),
+            fell_at=fell_at,
         )
 
     def _kept(self, rows: Array) -> Array:

@@ -16,7 +16,6 @@ from floatbase.robots import Robot, State
 
 _CLEARANCE = 0.02  # m over the ground of the standing robot: below it, only feet touch
 _THINNEST = 1e-3  # m: flatter points have no hull for MuJoCo
-_SHORTEST = 0.4  # of the longest link: shorter ones, as hips and wrists, lie within or close to others, and cost as much time
 _SIDES = 24  # of a cylinder
 _DIRECTIONS = 200  # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 1 mm
 
@@ -26,8 +25,8 @@ def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
     """Pinocchio's number of the joint that moves a link, and points whose hull it fills, shape (n, 3), m, in the joint's frame.
 
     All that one joint moves has one hull: a plane touches a body where it touches its hull. None have robots that are bolted to
-    the ground, links with a foot, which lie on that and on the link above, and links much shorter than the longest. Points that
-    are less than 2 cm above the ground when the robot stands are left out.
+    the ground, and links with a foot, which lie on that and on the link above. Points that are less than 2 cm above the ground
+    when the robot stands are left out.
     """
     if not robot.is_floating:
         return ()
@@ -41,10 +40,7 @@ def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
         high = points @ at.rotation[2] + at.translation[2] > _CLEARANCE
         clouds.setdefault(int(item.parentJoint), []).append(points[high] if robot.feet else points)
     hulls = {joint: np.vstack(cloud) for joint, cloud in clouds.items()}
-    lengths = {joint: float(np.linalg.norm(np.ptp(points, axis=0))) for joint, points in hulls.items() if len(points)}
-    least = _SHORTEST * max(lengths.values(), default=0.0)
-    kept = [joint for joint, length in lengths.items() if length >= least and _thickness(hulls[joint]) > _THINNEST]
-    return tuple((joint, read_only(_farthest(hulls[joint]))) for joint in kept)
+    return tuple((joint, read_only(_farthest(points))) for joint, points in hulls.items() if _thickness(points) > _THINNEST)
 
 
 def _standing(robot: Robot) -> list[pin.SE3]:
@@ -60,22 +56,24 @@ def _standing(robot: Robot) -> list[pin.SE3]:
 
 def _collisions(robot: Robot) -> list[Any]:
     """The URDF's collision shapes as Pinocchio reads them; without meshes where one of their files cannot be read."""
-    root = ElementTree.fromstring(robot.urdf)
-    meshed = [(link, shape) for link in root.findall("link") for shape in link.findall("collision[geometry]")]
-    for text in (robot.urdf, None):
-        if text is None:
-            for link, shape in meshed:
+    try:
+        return _read(robot, robot.urdf)
+    except ValueError:
+        root = ElementTree.fromstring(robot.urdf)
+        for link in root.findall("link"):
+            for shape in link.findall("collision"):
                 if shape.find("geometry/mesh") is not None:
                     link.remove(shape)
-            text = ElementTree.tostring(root, encoding="unicode")
-        try:
-            loader = coal.CachedMeshLoader(coal.BV_OBB)  # legs share files
-            folders = [str(folder) for folder in robot.package_dirs]
-            found = pin.buildGeomFromUrdfString(robot.model, text, pin.COLLISION, package_dirs=folders, mesh_loader=loader)
-            return list(found.geometryObjects)
-        except ValueError:
-            continue
-    return []
+        return _read(robot, ElementTree.tostring(root, encoding="unicode"))
+
+
+def _read(robot: Robot, urdf: str) -> list[Any]:
+    """The collision shapes of a URDF's text. Raises `ValueError` where a file of a mesh is missing."""
+    loader = coal.CachedMeshLoader(coal.BV_OBB)  # legs share files
+    folders = [str(folder) for folder in robot.package_dirs]
+    return list(
+        pin.buildGeomFromUrdfString(robot.model, urdf, pin.COLLISION, package_dirs=folders, mesh_loader=loader).geometryObjects
+    )
 
 
 def _points(shape: Any) -> Array:
