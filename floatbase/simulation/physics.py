@@ -27,6 +27,7 @@ _LONGEST_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 
 _CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
 _ANOTHER = "make another, fb.Simulation(robot, ground=…, timestep=…)"
 _MOVE = "sim.reset(sim.state.replace(q=…, v=…)) puts the robot there, at time 0"
+_MIDPHASE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # it knows only the geoms that touch from the first
 _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
 
 
@@ -177,7 +178,7 @@ class Simulation(Fixed):
         """Whether the ground touches links, too, not only feet: the hulls of the URDF's collision shapes. A reset ends it.
 
         A fallen robot lies on them, as `rollout(…, settle=1.0)` shows. Before a fall only feet touch, as in (7), and links in
-        the ground come out slowly. The link that has a foot lies on that, and links go through each other.
+        the ground come out slowly. Links go through each other.
         """
         return self._links
 
@@ -185,7 +186,11 @@ class Simulation(Fixed):
     def links(self, touch: bool) -> None:
         self._links = flag("links", touch)
         self.model.geom_conaffinity[self._hulls] = touch
-        self.model.body_conaffinity[self.model.geom_bodyid[self._hulls]] = touch
+        bodies, options = self.model.geom_bodyid, self.model.opt
+        self.model.body_conaffinity[bodies[self._hulls]] = touch
+        self.model.body_conaffinity[bodies[self._balls]] = 1
+        options.disableflags &= ~_MIDPHASE
+        options.disableflags |= _MIDPHASE * touch
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing on the ground by default, at time 0.

@@ -40,8 +40,8 @@ class Rollout(Value):
     outcome: why the record ends there, or the controller does: "completed", "fell", "diverged" or "controller failed".
     error: of a controller that failed: the exception it raised, or one that names the NaN or infinite torque it gave.
     stances: the controller's contacts at each row; empty where they were `contacts` throughout.
-    fell_at: s, when it had fallen, None where it did not. Rows from then on, of a rollout that settles, have no controller:
-        τ_desired is the brakes', planned forces are NaN.
+    off_at: s, from when on the controller is off, since the robot fell or the controller failed; None in other cases. A rollout
+        that settles has rows from then on: τ_desired is the brakes', planned forces are NaN.
     """
 
     robot: Robot
@@ -58,7 +58,7 @@ class Rollout(Value):
     outcome: Outcome
     error: FloatbaseError | None = None
     stances: tuple[Contacts, ...] = ()
-    fell_at: float | None = None
+    off_at: float | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -165,6 +165,13 @@ class Recorder:
         self._plans = np.empty((ticks, stance.k))
         self._with_plan: list[int] = []  # the rows of those
 
+    def drop(self) -> None:
+        """Forget the timesteps of a tick that was begun and is not completed."""
+        first = self._n * self._substeps
+        self._touching[first : self._steps] = 0
+        self._forces[first : self._steps] = 0.0
+        self._steps = first
+
     def before(self, t: float, q: Array, v: Array) -> None:
         """Keep clock, state and feet before a tick. They count when `complete` does."""
         n = self._n
@@ -196,7 +203,7 @@ class Recorder:
         pushes: tuple[Push, ...],
         outcome: Outcome,
         error: FloatbaseError | None = None,
-        fell_at: float | None = None,
+        off_at: float | None = None,
     ) -> Rollout:
         """The record. Raises `InputError` where a contact was of one kind in one stance and of another in a later one."""
         contacts = self._first
@@ -224,7 +231,7 @@ class Recorder:
             outcome=outcome,
             error=error,
             stances=() if all(stance is contacts for stance in self._stances) else tuple(self._stances),
-            fell_at=fell_at,
+            off_at=off_at,
         )
 
     def _kept(self, rows: Array) -> Array:

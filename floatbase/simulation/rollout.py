@@ -12,7 +12,7 @@ from floatbase._arrays import LARGEST, Array, checked, function, of_kind, plain_
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.physics import Push, Simulation, acting, pushes_of
-from floatbase.simulation.record import Recorder, Rollout
+from floatbase.simulation.record import Outcome, Recorder, Rollout
 from floatbase.simulation.settling import settle as lie_down
 
 _MOST_STEPS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
@@ -62,8 +62,8 @@ def rollout(
     actuators: what the controller's torques pass through in every timestep, such as `HydraulicActuators`; without it the
         joints get the controller's torques, within the motors' limits. Its memory lasts from one rollout to the next: reset
         it with the simulation.
-    settle: s, a whole number of control periods, for which a robot that has fallen goes on to fall, to lie on the ground at the
-        end: without controller and actuators, its motors braking, `sim.links` on. `Rollout.fell_at` tells the time.
+    settle: s, a whole number of control periods, for which a robot goes on after a fall or a controller's failure, to lie on
+        the ground in the end: controller and actuators are off, the motors brake, `sim.links` is on. See `Rollout.off_at`.
 
     A fall, a divergence of the physics, an error of the package that the controller raises, torques that are no finite numbers
     end the rollout: `outcome` says so, and the rows up to there are returned.
@@ -84,27 +84,31 @@ def rollout(
     if idle:
         warnings.warn(idle, SimulationWarning, stacklevel=2)
     record = Recorder(sim, _stance(sim, controller), ticks + more, substeps)
+
+    def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
+        off_at = sim.time
+        lie_down(sim, record, _stance(sim, controller), more, substeps, pushes)
+        return record.finished(pushes, outcome, error, off_at)
+
     for _ in range(ticks):
         t, q, v = sim.time, sim.q, sim.v
         record.before(t, q, v)
         try:
             command = controller(q, v, t)
         except FloatbaseError as failure:
-            return record.finished(pushes, "controller failed", failure)
+            return end("controller failed", failure)
         stance = _stance(sim, controller)
         try:
             desired = _desired(sim, command)
             planned = _planned(command, stance)
             _act(sim, desired, substeps, pushes, actuators, record)
         except _NotFinite as failure:
-            return record.finished(pushes, "controller failed", failure)
+            return end("controller failed", failure)
         record.complete(desired, stance, planned)
         if sim.diverged:
             return record.finished(pushes, "diverged")
         if sim.fallen:
-            fell_at = sim.time
-            lie_down(sim, record, stance, more, substeps, pushes)
-            return record.finished(pushes, "fell", fell_at=fell_at)
+            return end("fell")
     return record.finished(pushes, "completed")
 
 

@@ -1,4 +1,4 @@
-"""What comes after a fall: the motors brake, and the robot lies down on its links."""
+"""What comes after a fall, or after a controller has failed: the motors brake, and the robot lies down on its links."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ def settle(sim: Simulation, record: Recorder, stance: Contacts, ticks: int, subs
     """Add ticks to a record in which the controller is off, τ = -d q̇ with `brake`, and links touch the ground."""
     if not ticks:
         return
+    record.drop()
     sim.links = True
     damping = brake(sim)
     for _ in range(ticks):
@@ -36,12 +37,12 @@ def settle(sim: Simulation, record: Recorder, stance: Contacts, ticks: int, subs
             return
 
 
-def settled(sim: Simulation, fall: Rollout, ticks: int, substeps: int, pushes: tuple[Push, ...]) -> Rollout:
-    """The next ticks after a fall, or after the record of others, as a record of their own."""
-    stance = fall.contacts_at(-1)
+def settled(sim: Simulation, before: Rollout, ticks: int, substeps: int, pushes: tuple[Push, ...]) -> Rollout:
+    """The next ticks after a record at whose end the controller is off, as a record of their own."""
+    stance = before.contacts_at(-1) if len(before) else before.contacts
     record = Recorder(sim, stance, ticks, substeps)
     settle(sim, record, stance, ticks, substeps, pushes)
-    return record.finished(pushes, "fell", fell_at=fall.fell_at)
+    return record.finished(pushes, before.outcome, before.error, before.off_at)
 
 
 def lies_still(sim: Simulation) -> bool:

@@ -11,64 +11,50 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase._arrays import Array, read_only
-from floatbase.errors import InputError
-from floatbase.robots import Robot, State
+from floatbase.robots import Robot
 
-_CLEARANCE = 0.02  # m over the ground of the standing robot: below it, only feet touch
 _THINNEST = 1e-3  # m: flatter points have no hull for MuJoCo
 _SIDES = 24  # of a cylinder
-_DIRECTIONS = 200  # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 1 mm
+_DIRECTIONS = 1000  # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 0.2 mm
 
 
 @lru_cache(maxsize=16)
 def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
     """Pinocchio's number of the joint that moves a link, and points whose hull it fills, shape (n, 3), m, in the joint's frame.
 
-    All that one joint moves has one hull: a plane touches a body where it touches its hull. None have robots that are bolted to
-    the ground, and links with a foot, which lie on that and on the link above. Points that are less than 2 cm above the ground
-    when the robot stands are left out.
+    All that one joint moves has one hull: a plane touches a body where it touches its hull. A robot that is bolted to the
+    ground has none.
     """
     if not robot.is_floating:
         return ()
-    model, placements, clouds = robot.model, _standing(robot), dict[int, list[Array]]()
-    on_feet = {model.frames[robot.frame_id(foot.frame)].parentJoint for foot in robot.feet}
+    clouds = dict[int, list[Array]]()
     for item in _collisions(robot):
-        if item.parentJoint in on_feet:
-            continue
         points = _points(item.geometry) @ item.placement.rotation.T + item.placement.translation
-        at = placements[item.parentJoint]
-        high = points @ at.rotation[2] + at.translation[2] > _CLEARANCE
-        clouds.setdefault(int(item.parentJoint), []).append(points[high] if robot.feet else points)
+        clouds.setdefault(int(item.parentJoint), []).append(points)
     hulls = {joint: np.vstack(cloud) for joint, cloud in clouds.items()}
     return tuple((joint, read_only(_farthest(points))) for joint, points in hulls.items() if _thickness(points) > _THINNEST)
 
 
-def _standing(robot: Robot) -> list[pin.SE3]:
-    """The placements of all joints when the robot stands on level ground, or has its posture where it cannot."""
-    try:
-        state = robot.standing()
-    except InputError:
-        state = State(robot, robot.posture)
-    data = robot.model.createData()
-    pin.forwardKinematics(robot.model, data, state.q)
-    return list(data.oMi)
-
-
 def _collisions(robot: Robot) -> list[Any]:
-    """The URDF's collision shapes as Pinocchio reads them; without meshes where one of their files cannot be read."""
+    """The links' collision shapes, or what is seen of links without; no meshes where one of their files is missing."""
+    root = ElementTree.fromstring(robot.urdf)
+    for link in root.findall("link"):
+        if link.find("collision") is None:
+            for seen in link.findall("visual"):
+                seen.tag = "collision"
     try:
-        return _read(robot, robot.urdf)
+        return _read(robot, root)
     except ValueError:
-        root = ElementTree.fromstring(robot.urdf)
         for link in root.findall("link"):
             for shape in link.findall("collision"):
                 if shape.find("geometry/mesh") is not None:
                     link.remove(shape)
-        return _read(robot, ElementTree.tostring(root, encoding="unicode"))
+        return _read(robot, root)
 
 
-def _read(robot: Robot, urdf: str) -> list[Any]:
-    """The collision shapes of a URDF's text. Raises `ValueError` where a file of a mesh is missing."""
+def _read(robot: Robot, root: ElementTree.Element) -> list[Any]:
+    """The collision shapes of a URDF. Raises `ValueError` where a file of a mesh is missing."""
+    urdf = ElementTree.tostring(root, encoding="unicode")
     loader = coal.CachedMeshLoader(coal.BV_OBB)  # legs share files
     folders = [str(folder) for folder in robot.package_dirs]
     return list(
