@@ -9,14 +9,17 @@ from floatbase.dynamics import Contacts
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.record import Recorder, Rollout
 
-_BRAKING_TIME = 0.1  # s, time constant with which the brake stops a joint that nothing else moves
+_BRAKING_TIME = 0.05  # s, time constant with which the brake stops a joint that nothing else moves
 _STILL = 0.05  # m/s and rad/s: slower than this a robot lies still
 
 
-def brake(sim: Simulation) -> Array:
-    """N·m·s/rad of each motor as a brake, shape (d,): its joint's effective inertia now, 1 / (M⁻¹)ᵢᵢ, over 0.1 s."""
-    inverse = np.linalg.inv(sim.state.M)
-    return 1.0 / (_BRAKING_TIME * np.diag(inverse)[-sim.robot.d :]) if sim.robot.d else np.zeros(0)
+def brake(sim: Simulation, period: float) -> Array:
+    """N·m·s/rad of each motor as a brake, shape (d,): its joint's effective inertia now, 1 / (M⁻¹)ᵢᵢ, over 0.05 s.
+
+    period: s, for which a torque is held; the brake takes twice as long at least, or it would shake the joint.
+    """
+    freely = np.diag(np.linalg.inv(sim.state.M))[sim.robot.nv - sim.robot.d :]
+    return np.array(1.0 / (max(_BRAKING_TIME, 2.0 * period) * freely))
 
 
 def settle(sim: Simulation, record: Recorder, stance: Contacts, ticks: int, substeps: int, pushes: tuple[Push, ...]) -> None:
@@ -25,7 +28,7 @@ def settle(sim: Simulation, record: Recorder, stance: Contacts, ticks: int, subs
         return
     record.drop()
     sim.links = True
-    damping = brake(sim)
+    damping = brake(sim, substeps * sim.timestep)
     for _ in range(ticks):
         record.before(sim.time, sim.q, sim.v)
         tau = read_only(-damping * sim.joints[1])
