@@ -131,7 +131,7 @@ class Live:
         period = self._period if control_period is None else positive("control_period", control_period, "s")
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
-            if sim not in (None, self.sim) and self._status != "running":
+            if sim is not None and sim is not self.sim and self._status != "running":
                 self._stop.set()  # it is not the other simulation's robot that falls
             self.sim = self.sim if sim is None else of_kind("sim", sim, Simulation)
             self._actuators = self._actuators if actuators is ... else actuators
