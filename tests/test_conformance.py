@@ -169,7 +169,7 @@ EXAMPLES: dict[str, Any] = {
     "Contacts.flat_feet.robot": TALOS, "robot": ROBOT, "unbolted.robot": judges.load("ur5"), "rod": 0.01, "rollout": RECORD,
     "root": "/robot", "owners": [f"joint {i}" for i in range(12)], "rotation": np.eye(3), "row": 0,
     "LinearConstraint.rows": lambda state, t: None, "Rows.rows": lambda eom, t: (np.eye(18), np.ones(18)), "rows": (),
-    "scale": 0.004, "seed": 3, "seen": 0.4,
+    "scale": 0.004, "seed": 3, "seen": 0.4, "settle": 0.002,
     "show": lambda record: None, "sim": SIM, "Cylinders.size": np.ones(12), "solver": "daqp", "space": SPACE, "speed": 1.0,
     "places": np.zeros((2, 3)), "Viewer.step.step": WALK.history[0], "steps": list(WALK.history), "walk": WALK,
     "spread": 0.2, "WrenchSet.reach.start": 150.0 * np.eye(6)[2], "active_set.start": np.zeros(QP.n), "start": 0.1,

@@ -124,7 +124,7 @@ class Playground:
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
-        if self.run.status != "running":
+        if not self.run.moves:
             self._take_over()
         elif not waiting:
             self.run.soon(self._take_over)
@@ -319,7 +319,7 @@ class Playground:
     def _show(self, record: fb.Rollout) -> None:
         """What the run hands over: draw it, and judge it."""
         self.session.see(record)
-        if self.judge is not None:
+        if self.judge is not None and self.run.status == "running":  # who has fallen is only drawn
             before = self.judge.says
             self.judge.see(record, self.session)
             if self.judge.says != before:

@@ -59,7 +59,7 @@ class AlteredSimulation(Simulation):
         super().__init__(robot, ground, timestep)
         model = self.model
         self._own = {name: np.array(getattr(model, name)) for name in ("body_mass", "body_inertia", "dof_armature")}
-        self._gravity, self._touching = np.array(model.opt.gravity), np.array(model.geom_conaffinity)
+        self._gravity = np.array(model.opt.gravity)
         self._scratch = mujoco.MjData(model)
         self._numbers = {int(ball): i for i, ball in enumerate(self._balls)}
         self.world = World() if world is None else world
@@ -80,7 +80,7 @@ class AlteredSimulation(Simulation):
             getattr(model, name)[:] = world.mass * own
         model.opt.gravity[:] = world.gravity * self._gravity
         model.geom_friction[:, 0] = self.ground.mu if world.friction is None else world.friction
-        model.geom_conaffinity[:] = self._touching
+        model.geom_conaffinity[self._balls] = 1
         model.geom_conaffinity[[self._balls[self.point_names.index(name)] for name in world.untouched]] = 0
         mujoco.mj_setConst(model, self._scratch)
 

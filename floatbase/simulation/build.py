@@ -1,6 +1,7 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-Only the ground's planes and balls at the feet touch. Links that are welded together are one body, which has all their inertia.
+Only the ground's planes and balls at the feet touch; after a fall the planes touch hulls of the other links, too. Links that
+are welded together are one body, which has all their inertia.
 """
 
 from __future__ import annotations
@@ -19,12 +20,16 @@ from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
 from floatbase.simulation.conversion import rotation_matrix
+from floatbase.simulation.shapes import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
 _IMPEDANCE_RATIO = 100.0  # friction as stiff as the normal force: feet creep less under a steady load
 _CONTACT_TIME = 0.004  # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
+_LANDING_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
+_RISING_TIME = 0.2  # s in which a link comes out that was in the ground before it touched
 _CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
+LINK = "hull of"  # so begin the names of the links' geoms
 _SMALLEST_BALL = 1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
 _SMALLEST_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
 _ROUNDING = 1e-9  # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for rounding
@@ -97,6 +102,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
         _add_foot(spec, foot, feet.point_names)
+    _add_links(spec, robot)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -129,7 +135,7 @@ def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
     except ValueError as error:
         raise SimulationError(f"MuJoCo cannot read {robot.name}: {error}") from None
-    spec.compiler.fusestatic = True
+    spec.compiler.fusestatic, spec.compiler.discardvisual = True, False
     bodies = spec.bodies[1:]  # the first is the world
     totals = {body.name: _fused(body) for body in bodies if body.joints or (robot.is_floating and body.parent.name == "world")}
     wrong = [body for body in bodies if body.name in totals and not _can_move(totals[body.name])]
@@ -188,3 +194,16 @@ def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
         centres, radius = foot.corners + [0.0, 0.0, _CORNER_RADIUS], _CORNER_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
         body.add_geom(name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1)
+
+
+def _add_links(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """The hulls of links, without mass, that touch nothing at first: they stop at once, and come out of the ground slowly."""
+    time = max(_LANDING_TIME, 4.0 * spec.option.timestep)
+    for number, points in link_hulls(robot):
+        joint = spec.joint(robot.model.names[number])  # the free base's has another name
+        body = spec.body(body_name(robot.base)) if joint is None else joint.parent
+        mesh = spec.add_mesh(name=f"{LINK} {body.name}", uservert=points.ravel())
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        hull = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, name=mesh.name, mass=0.0)
+        hull.contype, hull.conaffinity, hull.priority = 0, 0, 1
+        hull.solref = [-1.0 / (time * _RISING_TIME), -1.0 / time]  # stiffness and damping for 1 kg, overdamped

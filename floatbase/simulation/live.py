@@ -14,9 +14,11 @@ from floatbase._arrays import function, of_kind, positive, text
 from floatbase.simulation.physics import Push, Simulation, acting
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
+from floatbase.simulation.settling import lies_still, settled
 
 _SLICE = 1.0 / 30.0  # s of simulated time in a slice, about: as often as a picture is drawn
 _LONGEST_JOIN = 5.0  # s that `close` waits for a slice: far longer than one takes
+_SETTLING = 1.5  # s after a fall in which a robot comes to lie, at most
 SEEN = 0.4  # s for which a slice still lists a push that is over: the eye misses an arrow of a tenth of a second
 
 
@@ -37,7 +39,8 @@ class Live:
     idle: s without any call here after which the run pauses by itself, so that a forgotten page costs nothing.
 
     `status` is "running", "paused", or why the run stopped: "fell", "diverged", "controller failed: …", "stopped: …" for an
-    exception, which `error` holds. Calls act between slices, and none but `close` waits.
+    exception, which `error` holds. A fall or a failure is told at once; slices go on with the controller off, as `settle`
+    of `rollout` says, until the robot lies still, or for 1.5 s at most. Calls act between slices, and none but `close` waits.
     """
 
     def __init__(
@@ -69,6 +72,7 @@ class Live:
         self._reset_requested = False
         self._calls: list[Callable[[], None]] = []
         self._status = "paused"
+        self._last: Rollout | None = None  # the last slice where the controller is off; only the thread has to do with it
         self._listener: Callable[[str], None] | None = None
         self._last_call = time.monotonic()
         self._stop = threading.Event()  # ends the present thread; set while paused
@@ -80,6 +84,11 @@ class Live:
         """ "running", "paused", or why it stopped: see the class."""
         return self._status
 
+    @property
+    def moves(self) -> bool:
+        """Whether the thread moves the robot: while the status is "running", and a little longer after a fall or failure."""
+        return not self._stop.is_set()
+
     def on_status(self, listener: Callable[[str], None] | None) -> None:
         """Call `listener(status)` whenever the status changes, in the thread that changed it."""
         self._listener = None if listener is None else function("listener", listener, "listener(status)")
@@ -89,7 +98,7 @@ class Live:
         self._run()
 
     def pause(self) -> None:
-        """Stop after the present slice; `start` goes on from there. What has stopped already stays as it is."""
+        """Stop after the present slice; `start` goes on from there. What has stopped already stays as it is, or in mid-fall."""
         with self._lock:
             self._stop.set()
             changed = self._status == "running" and self._become("paused")
@@ -122,6 +131,8 @@ class Live:
         period = self._period if control_period is None else positive("control_period", control_period, "s")
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
+            if sim is not None and sim is not self.sim and self._status != "running":
+                self._stop.set()  # it is not the other simulation's robot that falls
             self.sim = self.sim if sim is None else of_kind("sim", sim, Simulation)
             self._actuators = self._actuators if actuators is ... else actuators
             self._period, self._duration = period, _slice_of(period)
@@ -198,7 +209,7 @@ class Live:
                 self._requested, self._reset_requested = [], False
             if reset:
                 self.sim.reset()
-                self._pushes = ()
+                self._pushes, self._last = (), None
                 if self._after_reset is not None:
                     self._after_reset()
             with self._lock:
@@ -208,13 +219,18 @@ class Live:
             self._pushes = tuple(p for p in self._pushes if now < p.start + p.duration + SEEN)
             self._pushes += tuple(replace(push, start=now) for push in requested)
             present = acting(self._pushes, now, now + duration)  # the others are only listed, to be seen
-            record = rollout(sim, controller, duration, present, period, actuators)
+            if self._last is None:
+                record = rollout(sim, controller, duration, present, period, actuators)
+            else:
+                substeps = round(period / sim.timestep)
+                record = settled(sim, self._last, round(duration / period), substeps, present)
             record = replace(record, pushes=self._pushes)
+            self._last = record if record.off_at is not None else None
             if len(record):
                 self._show(record)
             outcome = record.outcome if record.error is None else f"{record.outcome}: {record.error}"
         except Exception as error:  # whatever a learner's controller raises must show, or the picture just stands still
-            outcome, self.error = f"stopped: {type(error).__name__}: {error}", error
+            outcome, self.error, self._last = f"stopped: {type(error).__name__}: {error}", error, None
         with self._lock:
             if self._reset_requested:  # the outcome is about a robot that is put back next
                 return
@@ -225,9 +241,16 @@ class Live:
             elif stop is not self._stop:  # paused and started again meanwhile
                 self._reset_requested = True
                 return
-            stop.set()
+            if self._last is None or self._settled:
+                stop.set()
             changed = self._become(outcome)
         self._tell(changed)
+
+    @property
+    def _settled(self) -> bool:
+        """Whether a robot whose controller is off lies still, or has had its time."""
+        since = self.sim.time - (self._last.off_at or 0.0) if self._last is not None else 0.0
+        return lies_still(self.sim) or since >= _SETTLING
 
 
 def _slice_of(period: float) -> float:

@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Fixed, Value, checked, cross, number, of_kind, positive, said, text
+from floatbase._arrays import Array, Fixed, Value, checked, cross, flag, number, of_kind, positive, said, text
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
-from floatbase.simulation.build import Ground, body_name, build_model
+from floatbase.simulation.build import LINK, Ground, body_name, build_model
 from floatbase.simulation.conversion import Conversion
 
 _FALLEN_HEIGHT = 0.4  # part of the base's height at the last reset: a crouch keeps more, lying down does not
@@ -27,6 +27,7 @@ _LONGEST_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 
 _CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
 _ANOTHER = "make another, fb.Simulation(robot, ground=…, timestep=…)"
 _MOVE = "sim.reset(sim.state.replace(q=…, v=…)) puts the robot there, at time 0"
+_MIDPHASE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # it knows only the geoms that touch from the first
 _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
 
 
@@ -80,7 +81,7 @@ class Simulation(Fixed):
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat foot one at each corner),
     each joint a torque motor with the robot's limit and rotor inertia, the ground planes with friction. Joint friction and
-    damping are off, as in (1)-(7); the URDF's joint limits are on. Only feet and ground touch.
+    damping are off, as in (1)-(7); the URDF's joint limits are on. Only feet and ground touch, after a fall `links` too.
 
     robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s. `model` and
     `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
@@ -104,8 +105,11 @@ class Simulation(Fixed):
         self._balls = np.array([self.model.geom(name).id for name in self.point_names], dtype=int)
         # of each plane, which is a geom; known from its first contact on
         self._contact_frames, self._frameless = np.zeros((self.model.ngeom, 3, 3)), set(range(len(self.ground.normals)))
+        self._most_contacts = len(self._balls) * len(self.ground.normals)  # of feet: in a valley a ball touches two planes
         self._planes = list(zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True))
         self._radii = self.model.geom_size[self._balls, :1]
+        hulls = [i for i in range(self.model.ngeom) if self.model.geom(i).name.startswith(LINK)]
+        self._hulls, self._links = np.array(hulls, dtype=int), False
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._watch()
         self.reset()
@@ -169,6 +173,25 @@ class Simulation(Fixed):
         sunk = self._start_height - self._base_height() > (1.0 - _FALLEN_HEIGHT) * self._stature
         return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < _FALLEN_COSINE
 
+    @property
+    def links(self) -> bool:
+        """Whether the ground touches links, too, not only feet: the hulls of the URDF's collision shapes. A reset ends it.
+
+        A fallen robot lies on them, as `rollout(…, settle=1.0)` shows. Before a fall only feet touch, as in (7), and links in
+        the ground come out slowly. Links go through each other.
+        """
+        return self._links
+
+    @links.setter
+    def links(self, touch: bool) -> None:
+        self._links = flag("links", touch)
+        self.model.geom_conaffinity[self._hulls] = touch
+        bodies, options = self.model.geom_bodyid, self.model.opt
+        self.model.body_conaffinity[bodies[self._hulls]] = touch
+        self.model.body_conaffinity[bodies[self._balls]] = 1
+        options.disableflags &= ~_MIDPHASE
+        options.disableflags |= _MIDPHASE * touch
+
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing on the ground by default, at time 0.
 
@@ -177,6 +200,7 @@ class Simulation(Fixed):
         state = self._standing() if state is None else of_kind("state", state, State)
         if state.robot != self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
+        self.links = False
         mujoco.mj_resetData(self.model, self.data)
         self._qpos[:], self._qvel[:] = self._convert.to_mujoco(state.q, state.v)
         mujoco.mj_forward(self.model, self.data)
@@ -213,26 +237,30 @@ class Simulation(Fixed):
         return self._forces_of(geoms[None], numbers[None])[0]
 
     def _raw_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """What MuJoCo has of the n contacts now: their geoms, shape (n, 2), and forces in their frame, shape (3 n,), N."""
+        """What MuJoCo has of n contacts now, all of feet among them: geoms, (n, 2), and forces in their frame, (3 n,), N."""
         data = self.data
         contact, numbers, limits = data.contact, data.efc_force, data.nl
         if limits:  # behind the joints at their limits come the contacts
             numbers = numbers[limits:]
-        geoms = contact.geom  # from the plane to a ball
+        geoms = contact.geom  # from the plane to a ball or a link
         if numbers.size != 3 * len(geoms):  # a ball that only just touches has none, another cone than ours has others
             numbers = np.zeros((len(geoms), 6))
             for i, wrench in enumerate(numbers):
                 mujoco.mj_contactForce(self.model, data, i, wrench)
             numbers = numbers[:, :3].ravel()
-        if self._frameless and len(geoms):  # all contacts with a plane have one frame at all times
-            for i, plane in enumerate(geoms[:, 0].tolist()):
-                self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
-                self._frameless.discard(plane)
+        if self._frameless and len(geoms):  # all balls on a plane have one contact frame at all times
+            for i, (plane, geom) in enumerate(geoms.tolist()):
+                if geom in self._balls:
+                    self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
+                    self._frameless.discard(plane)
+        if len(geoms) > self._most_contacts:  # so links touch
+            feet = np.isin(geoms[:, 1], self._balls)
+            geoms, numbers = geoms[feet], numbers.reshape(-1, 3)[feet].ravel()
         return geoms, numbers
 
     def _forces_of(self, geoms: npt.NDArray[np.int32], numbers: Array) -> Array:
         """`contact_forces` of N instants, shape (N, n_points, 3), N, from their `_raw_contacts`, with geom 0 for none."""
-        n, planes, balls = len(geoms), geoms[:, :, 0], geoms[:, :, 1]
+        n, planes, balls = len(geoms), geoms[:, :, 0], geoms[:, :, 1]  # or links, whose forces are not asked for
         forces, world = np.zeros((n, self.model.ngeom, 3)), numbers.reshape(*balls.shape, 3)
         for plane in range(len(self._planes)):
             rows, columns = np.nonzero(planes == plane)  # no ball touches a plane twice, so nothing is added to a sum twice
@@ -241,11 +269,10 @@ class Simulation(Fixed):
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the point of each ball that is nearest to the ground."""
-        return self._lowest_points(self.data.geom_xpos)
+        return self._lowest_points(self.data.geom_xpos[self._balls])
 
-    def _lowest_points(self, geom_positions: Array) -> Array:
-        """`contact_positions` for MuJoCo's positions of all its geoms, shape (…, geoms, 3), m."""
-        centres = geom_positions[..., self._balls, :]
+    def _lowest_points(self, centres: Array) -> Array:
+        """`contact_positions` for centres of the balls, shape (…, n_points, 3), m."""
         nearest = np.argmin(self.ground.clearances(centres), axis=-1)
         return centres - self._radii * self.ground.normals[nearest]
 

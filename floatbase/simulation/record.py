@@ -37,9 +37,11 @@ class Rollout(Value):
         contacts that the physics does not have.
 
     pushes: those handed to `rollout`.
-    outcome: why the record ends there: "completed", "fell", "diverged" or "controller failed".
+    outcome: why the record ends there, or the controller does: "completed", "fell", "diverged" or "controller failed".
     error: of a controller that failed: the exception it raised, or one that names the NaN or infinite torque it gave.
     stances: the controller's contacts at each row; empty where they were `contacts` throughout.
+    off_at: s, from when on the controller is off, since the robot fell or the controller failed; None in other cases. A rollout
+        that settles has rows from then on: τ_desired is the brakes', planned forces are NaN.
     """
 
     robot: Robot
@@ -56,6 +58,7 @@ class Rollout(Value):
     outcome: Outcome
     error: FloatbaseError | None = None
     stances: tuple[Contacts, ...] = ()
+    off_at: float | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -153,19 +156,27 @@ class Recorder:
         self._tau_desired = np.empty((ticks, d))
         # MuJoCo's own numbers, which `finished` turns into ours, all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force  # views of its memory
-        self._geoms, self._steps = np.empty((ticks, sim.model.ngeom, 3)), 0
+        self._centres, self._steps = np.empty((ticks, points, 3)), 0
         self._actuators = np.empty((ticks * substeps, sim.model.nu))
-        touching = points * len(sim.ground.normals)  # at most: in the bottom of a valley a ball touches two planes
+        touching = sim._most_contacts
         self._touching = np.zeros((ticks * substeps, touching, 2), dtype=np.int32)
         self._forces = np.zeros((ticks * substeps, 3 * touching))
         self._stances: list[Contacts] = []
         self._plans = np.empty((ticks, stance.k))
         self._with_plan: list[int] = []  # the rows of those
 
+    def drop(self) -> None:
+        """Forget the timesteps of a tick that was begun and is not completed."""
+        first = self._n * self._substeps
+        self._touching[first : self._steps] = 0
+        self._forces[first : self._steps] = 0.0
+        self._steps = first
+
     def before(self, t: float, q: Array, v: Array) -> None:
         """Keep clock, state and feet before a tick. They count when `complete` does."""
         n = self._n
-        self._time[n], self._q[n], self._v[n], self._geoms[n] = t, q, v, self._geom_positions
+        self._time[n], self._q[n], self._v[n] = t, q, v
+        self._geom_positions.take(self._sim._balls, 0, self._centres[n], "clip")  # "clip": it is the fastest
 
     def after_step(self) -> None:
         """Keep what motors and ground did in a timestep of the tick."""
@@ -187,7 +198,13 @@ class Recorder:
             self._with_plan.append(n)
         self._n += 1
 
-    def finished(self, pushes: tuple[Push, ...], outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
+    def finished(
+        self,
+        pushes: tuple[Push, ...],
+        outcome: Outcome,
+        error: FloatbaseError | None = None,
+        off_at: float | None = None,
+    ) -> Rollout:
         """The record. Raises `InputError` where a contact was of one kind in one stance and of another in a later one."""
         contacts = self._first
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
@@ -214,6 +231,7 @@ class Recorder:
             outcome=outcome,
             error=error,
             stances=() if all(stance is contacts for stance in self._stances) else tuple(self._stances),
+            off_at=off_at,
         )
 
     def _kept(self, rows: Array) -> Array:
@@ -246,7 +264,7 @@ class Recorder:
         sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)
         measured = self._mean(sim._forces_of(self._touching[steps], self._forces[steps]))
-        lowest = sim._lowest_points(self._geoms[:n])
+        lowest = sim._lowest_points(self._centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             forces, positions = np.full((n, contact.k), np.nan), np.full((n, len(contact.point_names), 3), np.nan)

@@ -12,7 +12,8 @@ from floatbase._arrays import LARGEST, Array, checked, function, of_kind, plain_
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.physics import Push, Simulation, acting, pushes_of
-from floatbase.simulation.record import Recorder, Rollout
+from floatbase.simulation.record import Outcome, Recorder, Rollout
+from floatbase.simulation.settling import settle as lie_down
 
 _MOST_STEPS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
 _PERIOD_ERROR = 1e-6  # part of a period by which a time may miss a whole number of them: how people round
@@ -49,6 +50,7 @@ def rollout(
     pushes: Sequence[Push] = (),
     control_period: float | None = None,
     actuators: Actuators | None = None,
+    settle: float = 0.0,
 ) -> Rollout:
     """Run a controller on the physics from its present state.
 
@@ -60,6 +62,8 @@ def rollout(
     actuators: what the controller's torques pass through in every timestep, such as `HydraulicActuators`; without it the
         joints get the controller's torques, within the motors' limits. Its memory lasts from one rollout to the next: reset
         it with the simulation.
+    settle: s, a whole number of control periods, for which a robot goes on after a fall or a controller's failure, to lie on
+        the ground in the end: controller and actuators are off, the motors brake, `sim.links` is on. See `Rollout.off_at`.
 
     A fall, a divergence of the physics, an error of the package that the controller raises, torques that are no finite numbers
     end the rollout: `outcome` says so, and the rows up to there are returned.
@@ -72,39 +76,47 @@ def rollout(
     period = sim.timestep if control_period is None else control_period
     substeps = _multiple("control_period", period, "the simulation's timestep", sim.timestep)
     ticks = _multiple("duration", duration, "the control period", substeps * sim.timestep)
-    if ticks * substeps > _MOST_STEPS:
-        raise InputError(f"duration {duration:g} s has {ticks * substeps} timesteps; at most {_MOST_STEPS} fit in one record.")
+    more = _multiple("settle", settle, "the control period", substeps * sim.timestep, least=0)
+    steps = (ticks + more) * substeps
+    if steps > _MOST_STEPS:
+        raise InputError(f"duration {duration:g} s has {steps} timesteps; at most {_MOST_STEPS} fit in one record.")
     idle = _idle(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     if idle:
         warnings.warn(idle, SimulationWarning, stacklevel=2)
-    record = Recorder(sim, _stance(sim, controller), ticks, substeps)
+    record = Recorder(sim, _stance(sim, controller), ticks + more, substeps)
+
+    def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
+        off_at = sim.time
+        lie_down(sim, record, _stance(sim, controller), more, substeps, pushes)
+        return record.finished(pushes, outcome, error, off_at)
+
     for _ in range(ticks):
         t, q, v = sim.time, sim.q, sim.v
         record.before(t, q, v)
         try:
             command = controller(q, v, t)
         except FloatbaseError as failure:
-            return record.finished(pushes, "controller failed", failure)
+            return end("controller failed", failure)
         stance = _stance(sim, controller)
         try:
             desired = _desired(sim, command)
             planned = _planned(command, stance)
             _act(sim, desired, substeps, pushes, actuators, record)
         except _NotFinite as failure:
-            return record.finished(pushes, "controller failed", failure)
+            return end("controller failed", failure)
         record.complete(desired, stance, planned)
         if sim.diverged:
             return record.finished(pushes, "diverged")
         if sim.fallen:
-            return record.finished(pushes, "fell")
+            return end("fell")
     return record.finished(pushes, "completed")
 
 
-def _multiple(name: str, time: float, unit: str, period: float) -> int:
-    """How many periods, s, make up a time, s: `InputError` where it is no whole number of them."""
-    time = positive(name, time, "s")
+def _multiple(name: str, time: float, unit: str, period: float, least: int = 1) -> int:
+    """How many periods, s, make up a time, s: `InputError` where that is no whole number, or less than `least`, 0 or 1."""
+    time = positive(name, time, "s", allow_zero=least == 0)
     count = round(time / period)
-    if count < 1 or abs(count * period - time) > _PERIOD_ERROR * period + _TIME_ERROR * time:
+    if count < least or abs(count * period - time) > _PERIOD_ERROR * period + _TIME_ERROR * time:
         near = max(count, 1) * period
         raise InputError(f"{name} {time:g} s is not a whole multiple of {unit} {period:g} s; {near:g} s would be.")
     return count

@@ -91,7 +91,9 @@ def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> Non
     centres = {foot.frame: home.frame_pose(foot.frame).translation * [1, 0, 0] + [0, 0, bottom] for foot in robot.feet}
     sim = fb.Simulation(robot, Ground(normal=[left, right]))
     sim.reset(with_feet(robot, home.q[:3] + [0.0, 0.0, 0.01], centres))
-    assert np.allclose(sim.ground.clearances(sim.data.geom_xpos[-4:]), robot.feet[0].radius, atol=LENGTHS)
+    assert np.allclose(
+        sim.ground.clearances([sim.data.geom(name).xpos for name in sim.point_names]), robot.feet[0].radius, atol=LENGTHS
+    )
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(sim.state))
     record = fb.rollout(sim, controller, 0.1)
     assert len(sim.data.contact.geom) == 8

@@ -1,0 +1,272 @@
+"""A fall ends on the ground: no part of the body in it, nothing changed before it, and a live picture draws it to the end."""
+
+from __future__ import annotations
+
+import copy
+import threading
+from collections.abc import Iterator
+
+import judges
+import numpy as np
+import pinocchio as pin
+import pytest
+from waiting import until
+
+import floatbase as fb
+from floatbase.simulation import AlteredSimulation, Live, World
+
+DEPTH = 5e-3  # m below the ground, at most: a contact that carries a robot gives by less than a millimetre
+PERIOD = 2e-3
+SETTLE = 2.0  # s
+SLOW = 0.5  # m/s and rad/s: a leg in the air may still sink against its brakes
+ROW_NAMES = ("time", "q", "v", "tau", "tau_desired", "planned", "measured", "foot_positions")
+
+
+def pushed(name: str, force: float, towards: float, settle: float = SETTLE, sim: fb.Simulation | None = None) -> fb.Rollout:
+    """A standing robot pushed with a force, N, for 0.1 s; towards: degrees, from forwards to the left."""
+    robot, angle = judges.load(name), np.deg2rad(towards)
+    push = fb.Push([force * np.cos(angle), force * np.sin(angle), 0.0], start=0.05)
+    sim = fb.Simulation(robot) if sim is None else sim
+    return fb.rollout(sim, judges.controller_of(name), 2.0, [push], PERIOD, settle=settle)
+
+
+def lowest(state: fb.State) -> dict[str, float]:
+    """Lowest point of the corners of all shapes of the URDF's collisions, by joint, m over level ground; by Pinocchio alone."""
+    robot = state.robot
+    folders = [str(folder) for folder in robot.package_dirs]
+    shapes = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.COLLISION, package_dirs=folders)
+    data, placed, low = robot.model.createData(), shapes.createData(), dict[str, float]()
+    pin.updateGeometryPlacements(robot.model, data, shapes, placed, state.q)
+    for item, at in zip(shapes.geometryObjects, placed.oMg, strict=True):
+        shape = item.geometry
+        if hasattr(shape, "halfSide"):
+            corners = np.array(shape.halfSide).ravel() * (2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0)
+        elif hasattr(shape, "vertices"):
+            corners = np.array(shape.vertices())
+        else:  # its axis
+            corners = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]) * getattr(shape, "halfLength", 0.0)
+        joint = str(robot.model.names[item.parentJoint])
+        low[joint] = min(low.get(joint, np.inf), float((corners @ at.rotation.T + at.translation)[:, 2].min()))
+    return low
+
+
+@pytest.mark.parametrize("towards", [20.0, 90.0, 110.0, 180.0, 290.0])
+def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards: float) -> None:
+    record = pushed("go2", 400.0, towards)
+    assert record.outcome in ("fell", "controller failed")
+    low = lowest(record.final)
+    assert min(low.values()) > -DEPTH, low
+    assert record.final.q[2] < 0.5 * record.q[0, 2]  # it lies
+    assert np.abs(record.final.v).max() < SLOW  # and rests
+
+
+@pytest.mark.parametrize("name", ["talos", "anymal_kinova", "solo12", "hyq", "g1"])
+@pytest.mark.parametrize("towards", [80.0, 190.0])
+def test_other_robots_lie_on_the_ground_too(name: str, towards: float) -> None:
+    record = pushed(name, 4.0 * judges.load(name).weight, towards, settle=2.5)
+    assert record.outcome in ("fell", "controller failed")
+    low = lowest(record.final)
+    assert min(low.values()) > -2.0 * DEPTH, low  # arms may still swing
+    assert record.final.com[2] < 0.6 * record.state(0).com[2]
+
+
+def test_where_links_touch_nothing_the_trunk_goes_into_the_ground() -> None:
+    sim = fb.Simulation(judges.load("go2"))
+    pushed("go2", 400.0, 20.0, settle=0.0, sim=sim)
+    assert not sim.links
+    for _ in range(1500):
+        sim.step(np.zeros(12))
+    assert min(lowest(sim.state).values()) < -10.0 * DEPTH
+
+
+@pytest.mark.parametrize("towards", [20.0, 110.0])
+def test_a_rollout_that_settles_is_the_same_up_to_the_fall(towards: float) -> None:
+    short, long = (pushed("go2", 400.0, towards, settle) for settle in (0.0, SETTLE))
+    n = len(short)
+    assert len(long) == n + round(SETTLE / PERIOD)
+    assert (long.outcome, long.off_at) == (short.outcome, short.off_at)
+    for name in ROW_NAMES:
+        assert np.array_equal(getattr(long, name)[:n], getattr(short, name), equal_nan=True), name
+    assert long.time[n] == pytest.approx(long.off_at)
+    assert np.allclose(np.diff(long.time), PERIOD)
+    assert np.isnan(long.planned[n:]).all() and np.isfinite(long.planned[:n]).all()
+
+
+def test_motors_brake_within_their_limits() -> None:
+    record = pushed("go2", 400.0, 20.0)
+    n = int(np.searchsorted(record.time, record.off_at or 0.0))
+    power = np.einsum("ij,ij->i", record.tau_desired[n:], record.v[n:, 6:])
+    assert power.max() <= 0.0 and power.min() < -1.0
+    assert np.all(np.abs(record.tau) <= record.robot.torque_limits + 1e-9)
+
+
+def test_a_run_that_ends_well_has_no_fall() -> None:
+    record = fb.rollout(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), 0.02, settle=0.1)
+    assert (record.outcome, record.off_at, len(record)) == ("completed", None, 20)
+
+
+def test_a_controller_that_fails_at_once_lets_the_robot_lie_down() -> None:
+    def fails(q: np.ndarray, v: np.ndarray, t: float) -> None:
+        raise fb.InfeasibleError("no answer")
+
+    record = fb.rollout(fb.Simulation(judges.load("go2")), fails, 0.1, settle=1.5)
+    assert (record.outcome, record.off_at, len(record)) == ("controller failed", 0.0, 1500)
+    assert record.final.q[2] < 0.5 * record.q[0, 2] and min(lowest(record.final).values()) > -DEPTH
+
+
+def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row() -> None:
+    """Torques, forces and times are those of whole ticks, whatever was begun."""
+
+    class Breaks:
+        def __init__(self) -> None:
+            self.steps = 0
+
+        def step(self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+            self.steps += 1
+            return tau_desired if self.steps < 14 else np.full(12, np.nan)
+
+    robot = judges.load("go2")
+    record = fb.rollout(fb.Simulation(robot), judges.controller_of("go2"), 0.1, (), 5e-3, Breaks(), settle=0.1)
+    assert record.outcome == "controller failed" and len(record) == 2 + 20
+    assert record.off_at == pytest.approx(0.013)
+    assert np.allclose(np.diff(record.time)[2:], 5e-3)
+    assert np.allclose(record.tau[2], np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits), atol=1e-9)
+    assert np.abs(record.tau_desired[2]).max() > 1e-3
+
+
+def test_links_touch_from_a_fall_to_the_next_reset() -> None:
+    robot = judges.load("go2")
+    sim = fb.Simulation(robot)
+    once = pushed("go2", 100.0, 90.0, sim=sim)
+    sim.reset()
+    assert not sim.links
+    pushed("go2", 400.0, 20.0, sim=sim)
+    assert sim.links and copy.deepcopy(sim).links
+    sim.reset()
+    again = pushed("go2", 100.0, 90.0, sim=sim)
+    assert not sim.links and once.outcome == again.outcome == "completed"
+    assert np.array_equal(once.q, again.q) and np.array_equal(once.measured, again.measured)
+
+
+def test_forces_are_those_at_the_feet_whatever_else_touches() -> None:
+    """A robot that lies carries part of its weight with other links, so less with its feet; none pulls."""
+    record = pushed("go2", 400.0, 180.0)
+    pressing = record.measured.reshape(len(record), -1, 3)[-1, :, 2]
+    assert pressing.min() >= 0.0 and pressing.sum() < 0.9 * record.robot.weight
+
+
+def test_an_untouched_foot_stays_untouched_after_a_reset_and_magnets_pull_feet_only() -> None:
+    sim = AlteredSimulation(judges.load("go2"), world=World(untouched=["FL_foot"], magnets=10.0))
+    sim.links = True
+    sim.step(np.zeros(12))
+    sim.links = False
+    for _ in range(20):
+        sim.step(np.zeros(12))
+    assert not np.any(sim.contact_forces()[0])
+    sim.world = World()
+    sim.reset()
+    sim.step(np.zeros(12))
+    assert sim.contact_forces()[0, 2] > 0.0
+
+
+def test_a_robot_without_its_meshes_keeps_the_primitives() -> None:
+    """The same URDF, its files nowhere: built all the same, with hulls of boxes and cylinders."""
+    robot = judges.load("anymal_kinova")
+    bare = fb.load_urdf(robot.urdf, feet=list(robot.feet), posture=robot.posture)
+    hulls = [fb.Simulation(one).model.nmesh for one in (bare, robot)]
+    assert 0 < hulls[0] < hulls[1]
+
+
+def test_an_arm_that_is_bolted_to_the_ground_has_no_hulls() -> None:
+    sim = fb.Simulation(judges.load("ur5"))
+    sim.links = True
+    assert sim.model.ngeom == 1
+
+
+# live -------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def slices() -> list[fb.Rollout]:
+    return []
+
+
+@pytest.fixture
+def run(slices: list[fb.Rollout]) -> Iterator[Live]:
+    live = Live(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), slices.append)
+    yield live
+    live.close()
+
+
+FALL = [400.0 * np.cos(0.35), 400.0 * np.sin(0.35), 0.0]
+
+
+def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(run: Live, slices: list[fb.Rollout]) -> None:
+    told: list[tuple[str, int]] = []
+    run.on_status(lambda status: told.append((status, len(slices))))
+    run.push(FALL)
+    until(lambda: not run.moves)
+    run.close()
+    assert [status for status, _ in told] == ["running", "fell"]
+    fell = told[1][1]  # slices when it was told
+    assert len(slices) > fell + 3
+    assert all(record.outcome == "fell" for record in slices[fell - 1 :])
+    assert len({record.off_at for record in slices[fell - 1 :]}) == 1
+    assert np.allclose(np.diff(np.concatenate([record.time for record in slices])), PERIOD)
+    assert slices[-1].time[-1] - slices[-1].off_at < 1.6  # type: ignore[operator]
+    assert min(lowest(slices[-1].final).values()) > -DEPTH
+    assert run.status == "fell"
+
+
+def fall_and_wait(run: Live, slices: list[fb.Rollout]) -> int:
+    """A push that topples it, and the slices when it draws on after the fall."""
+    run.push(FALL)
+    until(lambda: run.status == "fell")
+    count = len(slices)
+    until(lambda: len(slices) > count)
+    assert run.moves
+    return len(slices)
+
+
+def test_a_push_or_a_reset_in_mid_fall_begins_anew(run: Live, slices: list[fb.Rollout]) -> None:
+    for again in (run.reset, lambda: run.push([0.0, 20.0, 0.0])):
+        count = fall_and_wait(run, slices)
+        again()
+        until(lambda count=count: any(record.time[0] == 0.0 for record in slices[count:]))  # type: ignore[misc]
+        assert run.status == "running" and not run.sim.links
+        until(lambda: slices[-1].time[-1] > 0.2)
+        assert slices[-1].outcome == "completed"
+
+
+def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(run: Live, slices: list[fb.Rollout]) -> None:
+    fall_and_wait(run, slices)
+    run.close()
+    count = len(slices)
+    assert (run.status, run.moves) == ("fell", False)
+    assert not threading.Event().wait(0.1) and len(slices) == count
+    run.start()
+    until(lambda: len(slices) > count)
+    assert slices[count].time[0] == 0.0
+
+
+def test_another_simulation_in_mid_fall_does_not_fall(run: Live, slices: list[fb.Rollout]) -> None:
+    fall_and_wait(run, slices)
+    other = fb.Simulation(judges.load("go2"))
+    run.use(judges.controller_of("go2"), sim=other)
+    run.close()
+    assert other.time == 0.0 and not other.links
+
+
+def test_an_error_while_a_fall_is_drawn_is_said() -> None:
+    seen: list[fb.Rollout] = []
+
+    def show(record: fb.Rollout) -> None:
+        seen.append(record)
+        if record.outcome == "fell" and len([one for one in seen if one.outcome == "fell"]) == 3:
+            raise ValueError("no window")
+
+    run = Live(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), show)
+    run.push(FALL)
+    until(lambda: "no window" in run.status)
+    until(lambda: not run.moves)
+    run.close()
