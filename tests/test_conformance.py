@@ -194,7 +194,7 @@ EXAMPLES: dict[str, Any] = {
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
     "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02,
     "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,
-    "contact_weight": 1e4, "section": "stance", "slider.column": "", "choice.value": 0, "choices": ["a", "b"], "symbol": "M",
+    "progress": False, "contact_weight": 1e4, "section": "stance", "slider.column": "", "choice.value": 0, "choices": ["a", "b"], "symbol": "M",
     "part": "shown", "words": "text", "code": True, "strip.unit": "N", "Viewer.term.value": True,
     "AlteredSimulation.ground": 0.7, "mass": 1.2, "friction": 0.5,
     "untouched": ["FL_foot"], "magnets": 20.0, "world": World(mass=1.2),

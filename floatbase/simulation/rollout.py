@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
+from tqdm.auto import tqdm
 
-from floatbase._arrays import LARGEST, Array, checked, function, of_kind, plain_numbers, positive, read_only, said
+from floatbase._arrays import LARGEST, Array, checked, flag, function, of_kind, plain_numbers, positive, read_only, said
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.physics import Push, Simulation, acting, pushes_of
@@ -51,6 +52,7 @@ def rollout(
     control_period: float | None = None,
     actuators: Actuators | None = None,
     settle: float = 0.0,
+    progress: bool = False,
 ) -> Rollout:
     """Run a controller on the physics from its present state.
 
@@ -64,6 +66,7 @@ def rollout(
         it with the simulation.
     settle: s, a whole number of control periods, for which a robot goes on after a fall or a controller's failure, to lie on
         the ground in the end: controller and actuators are off, the motors brake, `sim.links` is on. See `Rollout.off_at`.
+    progress: whether a bar shows how far it is.
 
     A fall, a divergence of the physics, an error of the package that the controller raises, torques that are no finite numbers
     end the rollout: `outcome` says so, and the rows up to there are returned.
@@ -90,7 +93,7 @@ def rollout(
         lie_down(sim, record, _stance(sim, controller), more, substeps, pushes)
         return record.finished(pushes, outcome, error, off_at)
 
-    for _ in range(ticks):
+    for _ in tqdm(range(ticks), "rollout", unit=" ticks") if flag("progress", progress) else range(ticks):
         t, q, v = sim.time, sim.q, sim.v
         record.before(t, q, v)
         try:

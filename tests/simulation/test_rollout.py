@@ -421,3 +421,9 @@ def test_the_force_of_a_foot_is_found_by_its_name_and_of_a_flat_foot_is_the_resu
         record.force("left_sole")
     with pytest.raises(FloatbaseError, match="unknown kind of force 'wished'"):
         record.force("left_sole_link", "wished")
+
+
+def test_a_bar_shows_how_far_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    for progress in (True, False):
+        fb.rollout(fb.Simulation(judges.load("go2")), judges.limp, 0.02, progress=progress)
+        assert ("20/20" in capsys.readouterr().err) == progress
