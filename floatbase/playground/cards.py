@@ -21,25 +21,34 @@ _ON_FACET = 1e-4  # of the normal force: closer to a facet is on it
 _SLIDES = 0.3  # m, twice as far as it comes with what it believes at first
 _ROLLED = 0.012  # m that every foot of the seventh card is to travel
 _SLIP = 0.004  # m, that creeps under a foot which rolls
+_ROUNDING = 1e-9  # N, of a force that is made of its size and its direction
+_ONE = "That was more than one push: reset, and push once."
 _STAY = 2.0  # s that a robot must stay on its feet after a push
 _PLENTY = 19.2  # N·s: forwards it takes 19.5, sideways 18.5, backwards 22.5
+_CHOSEN = 1.0  # s that a number must stay: a slider on its way passes all of them
 
 
 class Judge:
-    """Watches a run: `see` gets every slice, `pushed` every push, `ended` why a run stopped. `says` tells the state of play."""
+    """Watches a run from one reset to the next: `see` gets every slice, `ended` why it stopped. `says` is the state of play.
+
+    `pushes` are those seen so far. `spoilt` says what was changed that may not be: there is nothing to win any more.
+    """
 
     def __init__(self, card: Card):
         self.card = card
         self.won = False
-        self.says = ""
+        self.says = self.spoilt = ""
+        self.pushes: list[fb.Push] = []
         self.memory: dict[str, Any] = {}
 
-    def pushed(self, push: fb.Push) -> None:
-        """A push is requested."""
-        self.memory["push"] = push
+    @property
+    def hardest(self) -> float | None:
+        """The largest force of a push, N; None before the first one."""
+        return max((float(np.linalg.norm(push.force)) for push in self.pushes), default=None)
 
     def see(self, record: fb.Rollout, session: Session) -> None:
         """A slice has been run."""
+        self.pushes += [push for push in record.pushes if all(push is not seen for seen in self.pushes)]
         self._take(self.card.watch(self, record, session), session)
 
     def ended(self, status: str, session: Session) -> None:
@@ -51,9 +60,10 @@ class Judge:
         """True wins, a text tells the state of the play. Who has won has won."""
         if self.won:
             return
-        touched = [name for name in self.card.fixed if getattr(session.settings, name) != getattr(self.card.start, name)]
-        if touched:
-            self.says = f"{' and '.join(touched)} may not be changed in this challenge: reset to begin anew."
+        if touched := self.card.touched(session.settings):
+            self.spoilt = f'{" and ".join(touched)} may not be changed in this challenge: press "all as at first".'
+        if self.spoilt:
+            self.says = self.spoilt
         elif verdict is True:
             self.won, self.says = True, f"Solved. {self.memory.get('score', '')}".strip()
         elif isinstance(verdict, str):
@@ -71,6 +81,7 @@ class Card:
     watch: looks at each slice; True when it is solved, else the state of the play.
     start: settings to begin with.
     fixed: names of settings that may not be changed.
+    world: names of pairs of settings of which the true one may not be changed.
     end: looks at why a run stopped, where that may solve it.
     """
 
@@ -80,11 +91,17 @@ class Card:
     watch: Watch
     start: Settings = field(default_factory=Settings)
     fixed: tuple[str, ...] = ()
+    world: tuple[str, ...] = ()
     end: Callable[[Judge, str, Session], bool | str] | None = None
 
     def judge(self) -> Judge:
         """A new judge."""
         return Judge(self)
+
+    def touched(self, settings: Settings) -> list[str]:
+        """What differs from the start and may not, in words."""
+        fixed = [name for name in self.fixed if getattr(settings, name) != getattr(self.start, name)]
+        return fixed + [f"true {name}" for name in self.world if getattr(settings, name)[1] != getattr(self.start, name)[1]]
 
 
 def _normals(record: fb.Rollout) -> dict[str, Array]:
@@ -112,10 +129,9 @@ def _two_feet(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
 
 
 def _survive(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
-    if (push := judge.memory.get("push")) is None:
+    if (size := judge.hardest) is None:
         return "Push it with 300 N, in any direction."
-    size = float(np.linalg.norm(push.force))
-    if size < 300.0:
+    if size < 300.0 - _ROUNDING:
         return f"{size:.0f} N is not enough."
     held = _seconds(judge, record, True)
     return held >= _STAY or f"On its feet for {held:.1f} s."
@@ -168,7 +184,8 @@ def _quick(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
 
 
 def _travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
-    if min(float(force.min()) for force in _normals(record).values()) < _LOADED:
+    normals = _normals(record)
+    if len(normals) < len(session.sim.point_names) or min(float(force.min()) for force in normals.values()) < _LOADED:
         judge.memory.clear()
         return "A foot was lifted: it begins anew."
     places, rolled = record.foot_positions, record.rolled()
@@ -183,12 +200,12 @@ def _travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
 
 
 def _ice(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
-    if (push := judge.memory.get("push")) is None:
-        return "Push it with 10 N."
-    if float(np.linalg.norm(push.force)) < 10.0:
-        return "10 N, at least."
-    start = judge.memory.setdefault("feet", np.array(record.foot_positions[0]))
-    moved = float(np.linalg.norm(record.foot_positions[-1] - start, axis=1).max())
+    feet, size = session.sim.contact_positions(), judge.hardest
+    start = judge.memory.setdefault("feet", feet)
+    if size is None or size < 10.0 - _ROUNDING:
+        judge.memory["feet"] = feet
+        return "Push it with 10 N." if size is None else "10 N, at least."
+    moved = float(np.linalg.norm(feet - start, axis=1).max())
     if moved > 0.01:
         return f"A foot has slipped by {1e3 * moved:.0f} mm: reset."
     held = _seconds(judge, record, True)
@@ -197,33 +214,40 @@ def _ice(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
 
 def _facets(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
     n = session.settings.facets
+    if judge.memory.get("facets") != n:
+        judge.memory = {"facets": n}
     lost = 1.0 - math.cos(math.pi / n)
     if lost > 0.03:
         return f"{n} facets: the weakest direction has lost {100 * lost:.1f} % of its friction."
-    fewer = 1.0 - math.cos(math.pi / (n - 1))
-    return fewer > 0.03 or f"{n} facets lose {100 * lost:.1f} %; fewer would do."
+    if 1.0 - math.cos(math.pi / (n - 1)) <= 0.03:
+        return f"{n} facets lose {100 * lost:.1f} %; fewer would do."
+    return _seconds(judge, record, True) >= _CHOSEN or f"{n} facets lose {100 * lost:.1f} %: leave it there for a second."
 
 
 def _topple(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
-    return "One push, with as little force as topples it."
+    return _ONE if len(judge.pushes) > 1 else "One push, with as little force as topples it."
 
 
 def _fallen(judge: Judge, status: str, session: Session) -> bool | str:
-    push = judge.memory.get("push")
-    if not status.startswith("fell") or push is None:
+    if not status.startswith("fell") or not judge.pushes:
         return "It must fall by a push."
+    if len(judge.pushes) > 1:
+        return _ONE
+    (push,) = judge.pushes
     impulse = float(np.linalg.norm(push.force)) * push.duration
     judge.memory["score"] = f"{impulse:.1f} N·s."
     return impulse <= _PLENTY or f"{impulse:.1f} N·s topple it; {_PLENTY:.0f} do, from the right side."
 
 
 _WORLD = ("mass", "true_off", "believed_off", "slope")
+_STANCE = ("shift", "lifted", "nod", "gait", "catches")
+_PROGRAM = ("facets", "torque", "least_force", "weights")
 CARDS = (
     Card("Stand on two feet", "Lift FR and RL, and stand on FL and RR for a second.", _two_feet, fixed=_WORLD),
     Card("Survive 300 N", "Push it with 300 N from any side; 2 s later it must be on its feet.", _survive, fixed=_WORLD),
     Card(
         "Down an icy slope", "The ground falls by 20° and is slippery. Slide 30 cm without falling.", _slide,
-        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "true_off", "believed_off"),
+        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "true_off", "believed_off"), ("slope", "friction"),
     ),
     Card("On an edge", "Bring a foot's planned force onto an edge of its polyhedron: two active facets.", _edge, fixed=_WORLD),
     Card(
@@ -240,7 +264,7 @@ CARDS = (
     ),
     Card(
         "On ice", "The ground has a friction of 0.05. Push with 10 N; no foot may slip by 1 cm for 2 s.", _ice,
-        Settings(friction=(0.7, 0.05)), (*_WORLD, "gait"),
+        Settings(friction=(0.7, 0.05)), (*_WORLD, "gait"), ("friction",),
     ),
     Card(
         "How many facets?", "The fewest facets with which no direction loses more than 3 % of the cone's friction.", _facets,
@@ -248,6 +272,6 @@ CARDS = (
     ),
     Card(
         "The weakest side", "Topple the standing robot with one push of at most 19 N·s.", _topple,
-        fixed=(*_WORLD, "friction", "facets", "shift", "lifted", "weights", "bandwidth", "gait", "nod"), end=_fallen,
+        fixed=(*_WORLD, "friction", "bandwidth", *_STANCE, *_PROGRAM), end=_fallen,
     ),
 )  # fmt: skip

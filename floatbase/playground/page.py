@@ -115,16 +115,19 @@ class Playground:
         force_now = self.force * np.array([math.cos(angle), math.sin(angle), 0.0])
         self._last_push = fb.Push(force_now, frame=self.pushed)
         self.run.push(self._last_push.force, frame=self.pushed)
-        if self.judge is not None:
-            self.judge.pushed(self._last_push)
         self._write()
 
     def set(self, **changes: Any) -> None:
-        """Change settings, fields of `Settings`; the run takes them over before its next slice."""
+        """Change settings, fields of `Settings`; the run takes them over before its next slice.
+
+        Raises `TypeError` for a name that is none.
+        """
+        _changed(self.session.settings, changes)
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
         if not self.run.moves:
+            self.run.close()  # its last slice may still go on
             self._take_over()
         elif not waiting:
             self.run.soon(self._take_over)
@@ -175,8 +178,9 @@ class Playground:
     def _restart(self) -> None:
         """After a reset of the simulation, in the run's thread."""
         self.session.restart()
-        if self.card is not None:
-            self.judge = self.card.judge()
+        card = self.card
+        if card is not None:
+            self.judge = card.judge()
         self._hand_over()
 
     def _add_controls(self) -> None:
@@ -275,7 +279,9 @@ class Playground:
             self._draw_again()
 
     def _follow_settings(self) -> None:
-        """Show the session's settings at the controls."""
+        """Show the session's settings at the controls, which only a floating robot has."""
+        if not self.robot.is_floating:
+            return
         s, view = self.session.settings, self.view
         values: dict[str, Any] = {"facets": s.facets, "nod and turn": s.nod, "torque limits [×]": s.torque}
         values["least force [N]"] = s.least_force
@@ -295,10 +301,11 @@ class Playground:
 
     def _write(self) -> None:
         """The texts of the panel: the challenge, and the program."""
+        judge = self.judge  # a challenge may be chosen meanwhile
         with suppress(ViewerError):
-            if self.card is not None and self.judge is not None:
-                self.view.note("card", f"{self.card.text}\n{self.judge.says}")
-            elif self.card is None and self.robot.is_floating:
+            if judge is not None:
+                self.view.note("card", f"{judge.card.text}\n{judge.says}")
+            elif self.robot.is_floating:
                 self.view.note("card", "")
             code = self.session.settings.code(self.robot, self.session.period, self._last_push)
             self.view.note("code", code, "as Python", code=True)
@@ -306,8 +313,9 @@ class Playground:
     def _tell(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
         self.outcome = "" if status == "running" else advice(status)
-        if self.judge is not None and status not in ("running", "paused"):
-            self.judge.ended(status, self.session)
+        judge = self.judge
+        if judge is not None and status not in ("running", "paused"):
+            judge.ended(status, self.session)
             self._write()
         self._draw_again()
 
@@ -319,10 +327,11 @@ class Playground:
     def _show(self, record: fb.Rollout) -> None:
         """What the run hands over: draw it, and judge it."""
         self.session.see(record)
-        if self.judge is not None and self.run.status == "running":  # who has fallen is only drawn
-            before = self.judge.says
-            self.judge.see(record, self.session)
-            if self.judge.says != before:
+        judge = self.judge  # a challenge may be chosen or left meanwhile
+        if judge is not None and self.run.status == "running":  # who has fallen is only drawn
+            before = judge.says
+            judge.see(record, self.session)
+            if judge.says != before:
                 self._write()
         self._draw(record)
         if self.robot.is_floating:

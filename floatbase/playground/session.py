@@ -32,12 +32,14 @@ _GROWING = 1.5  # s in which the ellipse grows from nothing
 class BaseMotors:
     """A controller around another one that drives motors of the base which no robot has: S without its zeros.
 
-    At each tick `sim.base_wrench` becomes the base's rows of (7), M q̈ + h - Jᵀ λ, of what the controller plans: zero, but for
-    rounding, unless it believes in such motors.
+    At each tick `sim.base_wrench` becomes the base's rows of (7), M q̈ + h - Jᵀ λ, of what the controller plans, with M, h and J
+    as it believes them: zero, but for rounding, unless it believes in such motors.
+
+    belief: the controller's; the truth by default.
     """
 
-    def __init__(self, controller: Controller, sim: AlteredSimulation):
-        self.controller, self.sim = controller, sim
+    def __init__(self, controller: Controller, sim: AlteredSimulation, belief: Belief | None = None):
+        self.controller, self.sim, self.belief = controller, sim, Belief() if belief is None else belief
 
     @property
     def contacts(self) -> Contacts:
@@ -48,7 +50,7 @@ class BaseMotors:
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick."""
         command: Command = self.controller(q, v, t)  # type: ignore[arg-type]
-        eom = equations_of_motion(State(self.sim.robot, q, v), self.contacts)
+        eom = self.belief.equations(equations_of_motion(State(self.sim.robot, q, v), self.contacts))
         self.sim.base_wrench = (eom.M @ command.qdd + eom.h - eom.J.T @ command.forces)[:6]
         return command
 
@@ -89,7 +91,8 @@ class Session:
 
     robot: as from `fb.load`. settings: those at first.
     `sim`, `controller` and `actuators` are what `rollout` takes, made by the very lines that `settings.code` shows. `period` is
-    what fits this machine, s. `last` is the newest record, which `see` is told of. `note` says why a change was refused.
+    what fits this machine, s. `last` is the newest record, which `see` is told of. `note` says why a change was refused, and
+    then `settings` stay as they were.
     """
 
     def __init__(self, robot: Robot, settings: Settings | None = None):
@@ -138,22 +141,27 @@ class Session:
     def change(self, **changes: Any) -> bool:
         """Change settings; returns whether the robot was put back on its feet for it, as another slope asks for."""
         before, self.settings = self.settings, replace(self.settings, **changes)
-        now, new_ground = self.settings, self.settings.slope[1] != self._ground
+        refused, new_ground = self.settings, self.settings.slope[1] != self._ground
         try:
-            if new_ground:
-                self.last = None
-                self._make_world()
-            else:
-                names = _NAMES | {"robot": self.robot}
-                world: World = eval(now.world(self.robot), names)
-                self.sim.world = replace(world, friction=now.friction[1])
-                if now.bandwidth[1] != before.bandwidth[1]:
-                    self._make_actuators()
+            self._change_world(before)
             self._renew_controller(before)
             self.note = ""
         except fb.FloatbaseError as error:
-            self.note = str(error)
+            self.note, self.settings = str(error), before
+            self._change_world(refused)
         return new_ground
+
+    def _change_world(self, before: Settings) -> None:
+        """World and actuators of the settings: a new world where the slope is another one, else the same, changed."""
+        now = self.settings
+        if now.slope[1] != self._ground:
+            self.last = None
+            self._make_world()
+            return
+        world: World = eval(now.world(self.robot), _NAMES | {"robot": self.robot})
+        self.sim.world = replace(world, friction=now.friction[1])
+        if now.bandwidth[1] != before.bandwidth[1]:
+            self._make_actuators()
 
     def _renew_controller(self, before: Settings) -> None:
         """The controller of the settings; a walk whose velocity or gait alone changes goes on."""
@@ -168,10 +176,12 @@ class Session:
                 walk.gait = self._controller(now, self.home).gait  # type: ignore[attr-defined]
             return
         self.controller = self._controller(now, self._standing_here())
+        if self.robot.is_floating:
+            self.sim.base_wrench = np.zeros(6)  # of motors that may be there no more
         self.period = self._fitting_period()
 
     def restart(self) -> None:
-        """After a reset of the simulation: schedules count from the clock's new beginning, and actuators hold the robot."""
+        """After a reset of the simulation: schedules count from the clock's new beginning, and actuators begin at no torque."""
         self.last = None
         self.settings = replace(self.settings, begin=0.0)
         self._make_actuators()

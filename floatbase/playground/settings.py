@@ -131,7 +131,7 @@ class Settings(Value):
         else:
             lines += self._standing_lines(options)
         if "zeros" in self.true_off:
-            lines.append("controller = BaseMotors(controller, sim)")
+            lines.append(f"controller = BaseMotors(controller, sim{', ' + belief if belief else ''})")
         return lines
 
     def _standing_lines(self, options: str) -> list[str]:

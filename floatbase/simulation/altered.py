@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, flag, of_kind, positive, texts
+from floatbase._arrays import Array, Value, checked, cross, flag, of_kind, positive, texts
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.build import Ground
@@ -23,10 +23,11 @@ class World(Value):
 
     mass: all masses and inertias as a multiple of the robot's own, M and h.
     gravity: whether there is gravity.
-    velocity_forces: whether there are Coriolis and centrifugal forces; else they are cancelled at every timestep.
+    velocity_forces: whether there are Coriolis and centrifugal forces, the part of h that grows with the velocity, in the
+        coordinates of (7); else they are cancelled at every timestep.
     friction: coefficient of all feet on the ground; None leaves the ground's.
     untouched: names of contact points that go through the ground, so that Jᵀ λ lacks them.
-    magnets: N, with which the ground pulls each foot that touches it: so much nᵀ λ may be negative.
+    magnets: N, with which the ground pulls each contact point that touches it: so much nᵀ λ may be negative.
     """
 
     mass: float = 1.0
@@ -116,15 +117,25 @@ class AlteredSimulation(Simulation):
         super().advance(tau, pushes)
 
     def _velocity_forces(self) -> Array:
-        """Coriolis and centrifugal forces now, in MuJoCo's coordinates: its bias forces less those at rest."""
+        """The forces, as MuJoCo takes them, that cancel what h of (7) has because of the velocity.
+
+        MuJoCo's bias forces less those at rest are that for its own coordinates, in which the base's velocity is along world
+        axes. In (7) it is along the base's own, which turn: M times ω × v of the base comes to it.
+        """
         scratch = self._scratch
         scratch.qpos[:], scratch.qvel[:] = self.data.qpos, self.data.qvel
         mujoco.mj_fwdPosition(self.model, scratch)
         mujoco.mj_fwdVelocity(self.model, scratch)
-        moving = np.array(scratch.qfrc_bias)
+        moving, turning = np.array(scratch.qfrc_bias), np.zeros(self.model.nv)
+        if self.robot.is_floating:
+            R = np.empty(9)
+            mujoco.mju_quat2Mat(R, scratch.qpos[3:7])
+            acceleration = np.zeros(self.model.nv)
+            acceleration[:3] = cross(R.reshape(3, 3) @ scratch.qvel[3:6], scratch.qvel[:3])
+            mujoco.mj_mulM(self.model, scratch, turning, acceleration)
         scratch.qvel[:] = 0.0
         mujoco.mj_fwdVelocity(self.model, scratch)
-        return moving - scratch.qfrc_bias
+        return moving - scratch.qfrc_bias + turning
 
     def _pull_feet(self, applied: Array) -> None:
         """Add the pull of the magnets on each ball that touched in the last step."""

@@ -54,7 +54,6 @@ def play(card: Card, script: list[tuple[float, Act]], seconds: float = 8.0) -> J
             made = waiting.pop(0)[1](session)
             if made is not None:
                 pushes.append(made)
-                judge.pushed(made)
         acting = [p for p in pushes if session.sim.time < p.start + p.duration]
         duration = max(1, round(SLICE / session.period)) * session.period
         record = fb.rollout(
@@ -107,6 +106,49 @@ def test_nearly_is_not_enough(title: str) -> None:
     card = next(card for card in CARDS if card.title == title)
     judge = play(card, NEARLY[title], 4.0)
     assert not judge.won, judge.says
+
+
+CHEATS = {
+    "on grippy ground": ("On ice", [(0.0, change(friction=(0.7, 1.0))), (0.5, push(10.0, 0.0))]),
+    "on level ground": (
+        "Down an icy slope",
+        [(0.0, change(slope=(0.0, 0.0), friction=(0.7, 1.0))), (0.1, change(gait="trot", velocity=(0.4, 0.0, 0.0)))],
+    ),
+    "pushed three times": ("The weakest side", [(0.3, push(215.0, 0.0)), (0.45, push(150.0, 0.0)), (0.6, push(150.0, 0.0))]),
+    "on weak motors": ("The weakest side", [(0.0, change(torque=0.5)), (0.3, push(190.0, 90.0))]),
+    "past the number": ("How many facets?", [(0.1 * i, change(facets=3 + i)) for i in range(14)]),
+    "without weight for a while": (
+        "Stand on two feet",
+        [
+            (0.0, change(shift=(-0.02, 0.0, 0.0))),
+            (0.5, change(lifted=("FR_foot", "RL_foot"), mass=(0.9, 0.9))),
+            (1.2, change(mass=(1.0, 1.0))),
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("how", CHEATS)
+def test_nobody_wins_by_a_trick(how: str) -> None:
+    title, script = CHEATS[how]
+    judge = play(next(card for card in CARDS if card.title == title), script, 7.0)
+    assert not judge.won, judge.says
+
+
+@pytest.mark.parametrize("title", [card.title for card in CARDS])
+def test_a_judge_watches_a_robot_whose_stance_changes(title: str) -> None:
+    lift, lower = change(lifted=("FL_foot",)), change(lifted=())
+    judge = play(next(card for card in CARDS if card.title == title), [(0.1, push(12.0, 0.0)), (0.3, lift), (0.6, lower)], 0.9)
+    assert judge.says
+
+
+def test_a_push_of_300_n_counts_in_every_direction() -> None:
+    judge, session = next(card for card in CARDS if card.title == "Survive 300 N").judge(), Session(GO2)
+    record = fb.rollout(session.sim, session.controller, 0.008, control_period=4e-3)
+    for angle in np.deg2rad(np.arange(-180.0, 181.0, 5.0)):
+        judge.pushes = [fb.Push(300.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))]
+        judge.see(record, session)
+        assert judge.says.startswith("On its feet")
 
 
 def test_a_start_is_a_setting_that_the_card_itself_allows() -> None:

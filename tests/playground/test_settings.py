@@ -67,6 +67,34 @@ def test_what_cannot_be_is_told_and_the_robot_goes_on() -> None:
     assert session.note == "" and session.controller is not before
 
 
+def test_the_program_is_what_runs_after_a_change_was_refused() -> None:
+    """Nothing of a refused change stays, in the world or on the page, and a reset after it finds its controller."""
+    session = Session(GO2)
+    for changes in ({"facets": 2, "mass": (1.0, 1.3)}, {"facets": 2, "slope": (10.0, 10.0)}):
+        assert session.change(**changes) == ("slope" in changes)
+        assert session.note and np.isclose(session.sim.model.body_mass.sum(), GO2.mass)
+        session.sim.reset()
+        session.restart()
+        here = fb.rollout(session.sim, session.controller, 0.2, control_period=4e-3, actuators=session.actuators)
+        there = run_of(session.settings.code(GO2, 4e-3))
+        assert np.array_equal(here.q, there.q[: len(here)])
+
+
+def test_motors_of_the_base_that_are_taken_away_push_no_more() -> None:
+    session = Session(GO2, Settings(believed_off=("zeros",), true_off=("zeros",)))
+    fb.rollout(session.sim, session.controller, 0.1, control_period=4e-3)
+    assert session.sim.base_wrench[2] > 0.5 * GO2.weight
+    session.change(believed_off=(), true_off=())
+    assert not session.sim.base_wrench.any()
+
+
+@pytest.mark.parametrize("believed", ["gravity", "forces", "velocity"])
+def test_motors_of_the_base_do_not_mend_what_else_a_controller_mistakes(believed: str) -> None:
+    session = Session(GO2, Settings(believed_off=(believed,), true_off=("zeros",), leg="FR_foot"))
+    fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
+    assert np.abs(session.sim.base_wrench).max() < 1e-6 * GO2.weight
+
+
 def test_motors_of_the_base_do_nothing_unless_the_controller_believes_in_them() -> None:
     """With them and without gravity in its plan's torques, the base carries itself: joints need next to nothing."""
     used = {}

@@ -78,6 +78,19 @@ def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
     assert change[True] > 0.05
 
 
+def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes() -> None:
+    """(7) is written in them: with M q̈ = 0 a base that turns flies around a bend, and does not go straight on."""
+    sim = AlteredSimulation(GO2, timestep=1e-4, world=World(gravity=False, velocity_forces=False))
+    in_the_air(sim)
+    v = np.random.default_rng(1).normal(size=GO2.nv)
+    sim.reset(sim.state.replace(v=v))
+    for _ in range(200):
+        sim.step(np.zeros(12))
+    turned = 0.02 * float(np.linalg.norm(np.cross(v[3:6], v[:3])))  # m/s
+    assert turned > 0.01
+    assert np.abs(sim.v - v).max() < 0.02 * turned
+
+
 def test_magnets_let_the_ground_pull() -> None:
     """Pulled up with 1.5 weights by a controller whose feet may pull, feet on magnets stay; without them they do not."""
     up = 1.5 * GO2.weight

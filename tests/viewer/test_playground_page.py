@@ -91,3 +91,39 @@ def test_in_a_notebook_it_shows_itself_and_runs() -> None:
         assert shown.robot.name == "solo12" and isinstance(shown.session.last, fb.Rollout)
     finally:
         shown.close()
+
+
+def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None:
+    """The push puts the robot back on its feet, and a judge begins with it."""
+    field.choose(next(card for card in CARDS if card.title == "The weakest side"))
+    until(lambda: field.session.last is not None and field.session.last.time[-1] < 1.0)
+    for size in (240.0, 220.0):
+        field.push(size, 90.0)
+        until(lambda seen=size: field.judge.hardest == seen and field.run.status == "fell")
+        until(lambda seen=size: f"{0.1 * seen:.1f} N·s topple it" in field.judge.says)
+
+
+def test_a_challenge_is_chosen_and_left_while_it_runs(field: Playground) -> None:
+    for card in (CARDS[0], None, *CARDS[6:9], None):
+        field.choose(card)
+        before = field.session.sim.time
+        until(lambda start=before: field.run.status == "running" and field.session.sim.time != start)
+    assert field.run.error is None
+
+
+def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(field: Playground) -> None:
+    with pytest.raises(TypeError, match="frction"):
+        field.set(frction=(0.5, 0.5))
+    field.run.pause()
+    field.set(facets=6)  # while its last slice may still run
+    assert field.session.settings.facets == 6 and field.run.status == "paused"
+
+
+def test_an_arm_is_set_back_as_it_was_at_first() -> None:
+    arm = Playground(fb.load("ur5"))
+    try:
+        arm.start().undo()
+        until(lambda: arm.session.last is not None and arm.run.status == "running")
+        assert arm.run.error is None
+    finally:
+        arm.close()
