@@ -181,7 +181,7 @@ class Session:
         self.period = self._fitting_period()
 
     def restart(self) -> None:
-        """After a reset of the simulation: schedules count from the clock's new beginning, and actuators begin at no torque."""
+        """After a reset of the simulation: schedules count from the clock's new beginning, and actuators hold the robot."""
         self.last = None
         self.settings = replace(self.settings, begin=0.0)
         self._make_actuators()
