@@ -26,8 +26,8 @@ AGAINST = {
     "normal": "the feet stand in a plane, and its normal is the one that was told.",
     "mass": "with M and h of the data sheet, the plan (q̈, τ, λ) satisfies the first line of (7) in every row.",
     "drift": "A q̈ of the plan is b, which is not zero, while all feet hold.",
-    "slow motors": "there is no lag after which the orders would be the torques that the motion needed.",
-    "swapped motors": "no exchange of two orders makes them the torques that the motion needed.",
+    "slow motors": "no lag brings the orders much nearer to the torques that the motion needed.",
+    "swapped motors": "no exchange of two orders brings them nearer to the torques that the motion needed.",
     NOTHING: "a sound robot twists like that to the end, and the first six rows say that nobody touched this one.",
 }
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
