@@ -356,10 +356,9 @@ class Playground:
     def _extra(self, record: fb.Rollout) -> Picture:
         """Arrows of the terms, and marks of a walk."""
         picture: Picture = {}
-        missing = {"gravity", "velocity"} & set(self.session.settings.true_off)  # the world does not have them
         for term, shown in self._shown.items():
-            if shown and term not in missing:
-                picture |= arrows(term, record, self.view.scale)
+            if shown:
+                picture |= arrows(term, record, self.view.scale, self.session.settings.true_off)
         walk = self.session.walk
         return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
 

@@ -19,13 +19,20 @@ _LEVER = 0.3  # m, of the force that a torque is drawn as
 _SHORTEST = 5e-3  # m: shorter arrows are not drawn
 
 
-def arrows(term: str, record: fb.Rollout, scale: float) -> Picture:
+def arrows(
+    term: str,
+    record: fb.Rollout,
+    scale: float,
+    off: tuple[str, ...] = (),
+) -> Picture:
     """The arrows of a term of `SYMBOLS` at the last row of a record; forces and cones are drawn by the viewer itself.
 
     scale: m/N, as the viewer draws forces.
+    off: terms that the world does not have: gravity and C q̇ have no arrow then.
     """
     made = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity, "zeros": _torques, "drift": _drift}
-    return below(f"term {term}", made[term](record, scale)) if term in made else {}
+    lacking = term in off and term in ("gravity", "velocity")
+    return below(f"term {term}", made[term](record, scale)) if term in made and not lacking else {}
 
 
 def _arrow(name: str, at: Array, vector: Array, words: str, colour: tuple[float, float, float] = COM) -> Picture:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.playground import BaseMotors, Session, Settings, nodding
+from floatbase.playground import BaseMotors, Session, Settings, arrows, nodding
 
 GO2 = judges.load("go2")
 EACH = {
@@ -105,6 +105,13 @@ def test_motors_of_the_base_do_nothing_unless_the_controller_believes_in_them() 
         assert record.outcome == "completed"
         used[believed] = float(np.abs(session.sim.base_wrench).max())
     assert used[()] < 1e-6 * GO2.weight < 0.5 * GO2.weight < used[("zeros",)]
+
+
+def test_gravity_has_no_arrow_where_the_world_has_none() -> None:
+    session = Session(GO2)
+    record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
+    assert arrows("gravity", record, 1e-3) and not arrows("gravity", record, 1e-3, ("gravity",))
+    assert arrows("zeros", record, 1e-2, ("zeros",)), "torques are there with motors of the base, too"
 
 
 def test_nodding_has_the_velocity_and_acceleration_that_differences_have() -> None:

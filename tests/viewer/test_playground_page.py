@@ -127,13 +127,3 @@ def test_an_arm_is_set_back_as_it_was_at_first() -> None:
         assert arm.run.error is None
     finally:
         arm.close()
-
-
-def test_a_term_that_the_world_does_not_have_has_no_arrow(field: Playground) -> None:
-    until(lambda: field.session.last is not None)
-    field.run.pause()
-    field._show_term("gravity", True)
-    record = field.session.last
-    assert any("m g" in name for name in field._extra(record))
-    field.set(true_off=("gravity",))
-    assert not any("m g" in name for name in field._extra(record))
