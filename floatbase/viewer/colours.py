@@ -46,7 +46,7 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("push", PUSH, "push"),
     ("cone", CALM, "friction cone: force inside"),
     ("cone", WARNING, "friction cone: surface reached"),
-    ("cone", ALARM, "friction cone: force outside (dark rim)"),
+    ("cone", ALARM, "friction cone: outside (rim)"),
     ("idle cone", IDLE, "friction cone: no force"),
     ("price", PUSH, "price of a limit: its multiplier"),
     ("support", SUPPORT, "support region"),

@@ -331,7 +331,7 @@ def legend(viewer: Viewer) -> list[str]:
 
 def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     viewer.show(standing, contacts, forces, planned=forces, support=True, push=("base", [0, 30.0, 0]), ghost=standing)
-    cone = ["friction cone: force inside", "friction cone: surface reached", "friction cone: force outside (dark rim)"]
+    cone = ["friction cone: force inside", "friction cone: surface reached", "friction cone: outside (rim)"]
     assert legend(viewer) == [
         "measured force", "planned force", "centre of mass", "push", *cone, "support region", "desired posture",
     ]  # fmt: skip
