@@ -16,7 +16,9 @@ function startViewer() {
     set_follow: camera.follow,
     set_views: manners.views,
     set_title: (command) => {
-      part("title").textContent = command.text;
+      const title = part("title");
+      title.textContent = command.text;
+      part("board").style.top = `${title.offsetTop + title.offsetHeight + 6}px`;
       manners.describe(command.text);
     },
     set_legend: (command) => { legend.show(command.items); },
@@ -109,6 +111,7 @@ function spot(colour, symbol = "patch") {
 const LAG = 0.3;  // s by which the camera is behind what it follows, so that it does not shake with every step
 const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
 const WIDE = 1.2;  // width over height of a picture into which the robot fits; a narrower one shows it smaller
+const LEAST = 0.2;  // zoom, in the smallest window
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
@@ -122,7 +125,7 @@ function startCamera(viewer, panel) {
   // while the panel is open, the middle of the picture is left of it by so many pixels
   const aside = () => panel.width() / 2;
   // and above it where the player would hide the feet
-  const above = () => part("player").offsetHeight / 2;
+  const above = () => (part("player").offsetHeight + panel.height()) / 2;
 
   // Go with what is followed, at the same height; the scale goes with the camera. Returns whether it is still on its way.
   function go() {
@@ -144,7 +147,8 @@ function startCamera(viewer, panel) {
   viewer.render = () => {
     const moving = path.length > 0 && go();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-    const zoom = Math.min(1, (w - 2 * aside()) / h / WIDE);
+    const high = h - panel.height();  // of what is left of the picture
+    const zoom = Math.max(LEAST, Math.min(1, (w - 2 * aside()) / h / WIDE, high / h));
     if (zoom != viewer.camera.zoom) {
       viewer.camera.zoom = zoom;
       viewer.camera.updateProjectionMatrix();

@@ -16,6 +16,7 @@ function startPanel(viewer) {
     viewer.set_dirty();
   };
 
+  const isBelow = () => root.offsetWidth >= innerWidth;
   function section(name) {
     if (!sections.has(name)) {
       const made = document.createElement(name ? "details" : "div");
@@ -122,7 +123,9 @@ function startPanel(viewer) {
   }
 
   return {
-    width: () => root.offsetWidth,
+    // what it takes of the picture: on a phone it lies below, else at the right
+    width: () => isBelow() ? 0 : root.offsetWidth,
+    height: () => isBelow() ? root.offsetHeight : 0,
     add(command) {
       const {name, value, min, choices, term: symbol} = command;
       const old = controls[name];

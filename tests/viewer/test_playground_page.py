@@ -127,3 +127,11 @@ def test_an_arm_is_set_back_as_it_was_at_first() -> None:
         assert arm.run.error is None
     finally:
         arm.close()
+
+
+def test_on_a_phone_the_panel_lies_below_and_the_robot_is_seen(page, field: Playground) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    opened(page, field)
+    page.wait_for_function("viewer.camera.zoom > 0.3 && viewer.camera.zoom < 1")
+    assert page.evaluate("document.getElementById('panel').getBoundingClientRect().top") > 400
+    picture(page, "playground_phone")
