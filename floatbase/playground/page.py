@@ -85,6 +85,7 @@ class Playground:
         )  # fmt: skip
         self.run.on_status(self._tell)
         self.pace = Pace()
+        self.view.stand_on(session.sim.ground)
         self._add_controls()
         self._write()
 
@@ -135,8 +136,7 @@ class Playground:
     def choose(self, card: Card | None) -> None:
         """Begin a challenge, or play freely."""
         self.card, self.judge = card, None if card is None else card.judge()
-        if card is not None:
-            self._restart_with(card.start)
+        self._restart_with(self._first if card is None else card.start)
         self._write()
 
     def undo(self) -> None:
@@ -172,8 +172,9 @@ class Playground:
     def _hand_over(self) -> None:
         session = self.session
         self.run.use(session.controller, sim=session.sim, actuators=session.actuators, control_period=session.period)
+        self.view.stand_on(session.sim.ground)  # the true one, whatever the controller believes
         if self.view.painter.facets not in (None, session.settings.facets):
-            self.view.painter = self.view.painter.replace(session.settings.facets)
+            self.view.painter = self.view.painter.replace(facets=session.settings.facets)
 
     def _restart(self) -> None:
         """After a reset of the simulation, in the run's thread."""

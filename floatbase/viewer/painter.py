@@ -124,9 +124,9 @@ class Painter:
             raise InputError(f"extra must be a picture, path -> item, as shapes and marks make them, not {said(extra)}.")
         return picture | dict(extra or {})
 
-    def replace(self, facets: int | None) -> Painter:
-        """A painter with another number of facets. It shares what this one has computed for the robot."""
-        other = replace(self, facets=facets)
+    def replace(self, **changes: Any) -> Painter:
+        """A painter with other facets or another ground. It shares what this one has computed for the robot."""
+        other = replace(self, **changes)
         for name in ("home", "box", "feet_box", "size", "scale", "_meshes", "_shapes", "_ghosts", "_scale_bars"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]

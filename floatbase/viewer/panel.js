@@ -190,7 +190,8 @@ function startStrip(section) {
     draw.beginPath();
     for (const [when, y] of points) draw.lineTo(w * (1 - (t - when) / HISTORY), h - 4 - (h - 8) * y / most);
     draw.stroke();
-    label.textContent = `${name}: ${value.toPrecision(2)} ${unit} (up to ${most.toPrecision(2)} in ${HISTORY} s)`;
+    const said = (x) => x < 0.05 ? "0" : x < 10 ? x.toFixed(1) : x.toFixed(0);
+    label.textContent = `${name}: ${said(value)} ${unit} (up to ${said(most / 1.1)} in ${HISTORY} s)`;
     canvas.setAttribute("aria-label", label.textContent);
   };
 }

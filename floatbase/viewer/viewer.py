@@ -100,6 +100,10 @@ class Viewer(Controls):
         """Length of a drawn force, m/N, the same for forces and cones."""
         return self.painter.scale
 
+    def stand_on(self, ground: Ground | npt.ArrayLike | None) -> None:
+        """Draw another ground from the next picture on. ground: as for the viewer."""
+        self.painter = self.painter.replace(ground=_ground(ground))
+
     def show(
         self,
         state: State,

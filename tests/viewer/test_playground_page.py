@@ -135,3 +135,9 @@ def test_on_a_phone_the_panel_lies_below_and_the_robot_is_seen(page, field: Play
     page.wait_for_function("viewer.camera.zoom > 0.3 && viewer.camera.zoom < 1")
     assert page.evaluate("document.getElementById('panel').getBoundingClientRect().top") > 400
     picture(page, "playground_phone")
+
+
+def test_the_true_slope_is_drawn_whatever_is_believed(field: Playground) -> None:
+    field.set(slope=(0.0, 20.0))
+    until(lambda: field.session.settings.slope == (0.0, 20.0) and field.view.painter.ground is not None)
+    until(lambda: abs(field.view.painter.ground.normal[0] + 0.342) < 1e-3)  # sin 20°: it rises forwards
