@@ -24,7 +24,7 @@ _SLIP = 0.004  # m, that creeps under a foot which rolls
 _ROUNDING = 1e-9  # N, of a force that is made of its size and its direction
 _ONE = "That was more than one push: reset, and push once."
 _STAY = 2.0  # s that a robot must stay on its feet after a push
-_PLENTY = 19.2  # N·s: forwards it takes 19.5, sideways 18.5, backwards 22.5
+_PLENTY = 19.2  # N·s: forwards it takes 19.5, sideways less, backwards 22.5
 _CHOSEN = 1.0  # s that a number must stay: a slider on its way passes all of them
 
 

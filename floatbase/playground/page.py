@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
 
@@ -123,7 +124,7 @@ class Playground:
 
         Raises `TypeError` for a name that is none.
         """
-        _changed(self.session.settings, changes)
+        replace(self.session.settings, **changes)
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
@@ -147,12 +148,11 @@ class Playground:
         """Put the robot back on its feet under these settings."""
         with self._lock:
             self._requested = {}
-        start = {name: getattr(settings, name) for name in Settings.__dataclass_fields__}
-        self.run.soon(lambda: self._begin(start))
+        self.run.soon(lambda: self._begin(settings))
         self.run.reset()
 
-    def _begin(self, start: dict[str, Any]) -> None:
-        self.session.change(**start)
+    def _begin(self, settings: Settings) -> None:
+        self.session.change(**asdict(settings))
         self._follow_settings()
         self._hand_over()
         self._write()
@@ -252,7 +252,7 @@ class Playground:
     def _wanted(self) -> Settings:
         """The settings with what is still requested."""
         with self._lock:
-            return _changed(self.session.settings, self._requested)
+            return replace(self.session.settings, **self._requested)
 
     def _set_part(self, attribute: str, i: int, value: float) -> None:
         values = list(getattr(self._wanted, attribute))
@@ -386,12 +386,6 @@ def gap(record: fb.Rollout) -> float:
 def _planned(record: fb.Rollout) -> Any:
     """The planned forces at the last row, None where there are none."""
     return record.planned[-1] if np.isfinite(record.planned[-1]).all() else None
-
-
-def _changed(settings: Settings, changes: dict[str, Any]) -> Settings:
-    from dataclasses import replace
-
-    return replace(settings, **changes)
 
 
 class Pace:
