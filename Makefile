@@ -106,7 +106,7 @@ lock: | python
 	"$(BASE)" -m venv build/uv
 	build/uv/bin/python -m pip --disable-pip-version-check install -q uv
 	build/uv/bin/uv pip compile -q --universal --python-version 3.11 --fork-strategy fewest \
-		--extra course --extra test --extra cluster --extra meshes --extra video --extra pages --no-annotate --no-emit-index-url \
+		--extra course --extra test --extra cluster --extra meshes --extra video --extra pages --extra site --extra hub --no-annotate --no-emit-index-url \
 		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
 
 clean:
