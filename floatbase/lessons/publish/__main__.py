@@ -25,7 +25,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     paged.add_argument("--to", type=Path, default=PAGES, metavar="FOLDER", help=f"where to write, {PAGES} by default")
     rosed = commands.add_parser("roses", help="measure the push roses of lessons, such as 05, anew")
     rosed.add_argument("lessons", nargs="+", metavar="LESSON")
-    commands.add_parser("workspace", help="bring the learner's copy in notebooks/my up to date")
+    laid = commands.add_parser("workspace", help="bring the learner's copy of the course up to date")
+    laid.add_argument("--to", type=Path, default=None, metavar="FOLDER", help="where that is, notebooks/my by default")
 
     given = parser.parse_args(arguments)
     try:
@@ -38,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "roses":
             _roses(given.lessons)
         else:
-            for line in prepare():
+            for line in prepare(mine=given.to):
                 print(line)
     except InputError as error:
         parser.exit(2, f"{error}\n")
