@@ -19,8 +19,8 @@ def printed_by(package: Path, folder: Path) -> str:
     """What the README's first program prints with this package, run in a folder with nothing in it."""
     venv.create(folder / "venv", with_pip=True)
     python, place = folder / "venv" / "bin" / "python", folder / "empty"
-    pip = [python, "-m", "pip", "--disable-pip-version-check", "install", "-q", "-c", ROOT / "environment.txt", package]
-    subprocess.run(pip, check=True)
+    pip = [str(python), "-m", "pip", "--disable-pip-version-check", "install", "-q", "-c", str(ROOT / "environment.txt")]
+    subprocess.run([*pip, str(package)], check=True)
     place.mkdir()
     program = _block("python")
     return subprocess.run([python, "-I", "-c", program], check=True, capture_output=True, text=True, cwd=place).stdout

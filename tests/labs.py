@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+import socket
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,7 @@ def _idle_sliders(page: Any, name: str, number: str, sliders: list[str], moved: 
         after = once_new(lambda: (frame.evaluate(SCENE), cell.evaluate(SAID)), before)
         idle += [slider] if after == before else []
     end = once_new(lambda: frame.evaluate(SCENE), start)  # what the panel says may be there before the picture
+    cell.locator("iframe").first.scroll_into_view_if_needed()
     screenshot(page, f"{name.split('_')[0]}_panel_{number}")
     assert end != start, f"{name}, cell {number}: no slider moves the picture"
     moved |= _changed(start, end)
@@ -192,6 +194,21 @@ def address_in(log: Path, words: str = "") -> str:
             return found.group(1)
         time.sleep(0.2)
     raise AssertionError(f"no server started:\n{log.read_text()}")
+
+
+def free_ports(n: int) -> list[int]:
+    """Ports that nothing listens on now."""
+    with ExitStack() as open_ones:
+        sockets = [open_ones.enter_context(socket.socket()) for _ in range(n)]
+        for one in sockets:
+            one.bind(("127.0.0.1", 0))
+        return [one.getsockname()[1] for one in sockets]
+
+
+def answers(port: int) -> bool:
+    """Whether something listens there."""
+    with socket.socket() as one:
+        return one.connect_ex(("127.0.0.1", port)) == 0
 
 
 def screenshot(page: Any, name: str) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import urllib.request
@@ -26,7 +25,9 @@ from browsers import browser_of_a_file, needs_chromium
 from labs import (
     HEIGHT,
     LONG,
+    answers,
     answers_to_sliders,
+    free_ports,
     lesson_opened,
     only,
     picture_in,
@@ -111,7 +112,7 @@ def listening(process: psutil.Process) -> list[int]:
 def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hub]:
     """A hub that has started."""
     folder = tmp_path_factory.mktemp("hub")
-    address, *others = _free_ports(3)
+    address, *others = free_ports(3)
     configuration = folder / "jupyterhub_config.py"
     configuration.write_text(TEST.format(address, *others, configuration=str(CONFIGURATION), folder=folder, proxy=PROXY))
     log = folder / "hub.log"
@@ -119,7 +120,7 @@ def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hub]:
         command = [sys.executable, "-m", "jupyterhub", "--config", str(configuration)]
         started = subprocess.Popen(command, cwd=folder, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True)
     try:
-        until(lambda: _answers(address) or started.poll() is not None)
+        until(lambda: answers(address) or started.poll() is not None)
         assert started.poll() is None, log.read_text()
         yield Hub(f"http://127.0.0.1:{address}", folder, psutil.Process(started.pid))
     finally:
@@ -231,16 +232,3 @@ def test_lesson_03_moves_its_robot_arrows_and_veil(hub: Hub, class_: list[Studen
     finally:
         screenshot(page, "03_on_a_hub")
         page.close()
-
-
-def _free_ports(n: int) -> list[int]:
-    with ExitStack() as open_ones:
-        sockets = [open_ones.enter_context(socket.socket()) for _ in range(n)]
-        for one in sockets:
-            one.bind(("127.0.0.1", 0))
-        return [one.getsockname()[1] for one in sockets]
-
-
-def _answers(port: int) -> bool:
-    with socket.socket() as one:
-        return one.connect_ex(("127.0.0.1", port)) == 0
