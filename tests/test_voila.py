@@ -1,6 +1,6 @@
 """Voilà in a real browser: lesson 00 and a playground as a page without code, whose pictures move.
 
-The browser reaches Voilà's own address and nothing else. Voilà's own template asks for icons from another; it does without them.
+The browser reaches Voilà's own address and nothing else. Its own template asks for icons elsewhere, and does without them.
 """
 
 from __future__ import annotations
