@@ -8,7 +8,11 @@ FROM python:3.12-slim
 
 # Code is compiled here for any processor of this kind, so that the first start is as quick as the next.
 ENV NUMBA_CPU_NAME=generic OPENBLAS_NUM_THREADS=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PATH=/opt/venv/bin:$PATH
+# what was predicted and solved lies with the lessons, in the volume
+ENV FLOATBASE_HOME=/home/learner/floatbase/.floatbase
 
+# Pinocchio needs libgomp1, which this small system lacks
+RUN apt-get update && apt-get install -y --no-install-recommends libgomp1 && rm -rf /var/lib/apt/lists/*
 RUN useradd --create-home --uid 1000 learner && install -d -o learner /home/learner/floatbase
 COPY . /opt/floatbase
 WORKDIR /opt/floatbase
