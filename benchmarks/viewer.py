@@ -67,7 +67,7 @@ def shows(view: fb.Viewer, calls: int, pause: float = 0.0) -> Iterator[Row]:
     contacts = fb.Contacts.points(robot, 0.6)
     home = robot.standing().q
     for facets in (None, 4) if not pause else (None,):
-        view.painter = view.painter.replace(facets)
+        view.painter = view.painter.replace(facets=facets)
         states = [fb.State(robot, home + np.r_[np.zeros(7), random.normal(0, 0.03, robot.nq - 7)]) for _ in range(calls)]
         lean = random.normal(0, 0.25, (calls, 2, 4, 3)) * [1, 1, 0.3]
         forces = 0.25 * robot.weight * (lean + [0.0, 0.0, 1.0])
