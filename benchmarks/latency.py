@@ -49,7 +49,8 @@ FRAMES = """() => {
   let n = viewer.num_messages_received, waits = false;
   const now = () => performance.timeOrigin + performance.now(), render = viewer.render.bind(viewer);
   window.frames_at = [], window.drawn_at = [];
-  Object.defineProperty(viewer, "num_messages_received", {get: () => n, set: (v) => { n = v; waits = true; frames_at.push(now()); }});
+  const put = (number) => { n = number; waits = true; frames_at.push(now()); };
+  Object.defineProperty(viewer, "num_messages_received", {get: () => n, set: put});
   viewer.render = () => { render(); if (waits) drawn_at.push(now()); waits = false; };
 }"""
 
@@ -61,7 +62,7 @@ def lab(copy: Path) -> Iterator[str]:
         cell = nbformat.v4.new_code_cell(CELL)
         kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
         nbformat.write(nbformat.v4.new_notebook(cells=[cell], metadata=kernel), Path(home) / "slider.ipynb")
-        places = {name: home for name in ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "HOME")}
+        places = dict.fromkeys(("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "HOME"), home)
         command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--ip=127.0.0.1", "--port=0", "--allow-root"]
         command += ["--IdentityProvider.token=t", "--LabApp.expose_app_in_browser=True", "--LabApp.news_url=None", home]
         log = Path(home) / "log"

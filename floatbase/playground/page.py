@@ -115,6 +115,11 @@ class Playground:
         elif not waiting:
             self.run.soon(self._take_over)
 
+    def nod(self, size: float) -> None:
+        """Let the base describe an ellipse in pitch and yaw; one under way keeps its phase. size: rad, half its width."""
+        wanted = self.wanted
+        self.set(nod=size, begin=wanted.begin if wanted.nod else self.session.sim.time)
+
     def choose(self, card: Card | None) -> None:
         """Begin a challenge, or play freely."""
         self.card, self.judge = card, None if card is None else card.judge()

@@ -70,7 +70,7 @@ class Panel:
             view.checkbox(f"on {foot.frame}", partial(self._stand_on, foot.frame), True, "its stance")
         for i, axis in enumerate("xyz"):
             view.slider(f"CoM {axis} [m]", partial(self._set_part, "shift", i), 0.0, -0.08, 0.08, 0.005, "its stance")
-        view.slider("nod and turn", self._nod, 0.0, 0.0, 0.35, 0.01, "its stance")
+        view.slider("nod and turn", self._play.nod, 0.0, 0.0, 0.35, 0.01, "its stance")
 
     def _add_walk(self) -> None:
         view, gaits = self._play.view, self._gaits
@@ -110,11 +110,6 @@ class Panel:
     def _walk(self, number: int) -> None:
         gait = ["", "", *self._gaits][number] or None
         self._play.set(gait=gait, catches=number == 1, begin=self._play.session.sim.time)
-
-    def _nod(self, size: float) -> None:
-        """Another size of the ellipse; one that is under way keeps its phase."""
-        begin = self._play.wanted.begin if self._play.wanted.nod else self._play.session.sim.time
-        self._play.set(nod=size, begin=begin)
 
     def _switch(self, attribute: str, term: str, on: bool) -> None:
         off = tuple(name for name in getattr(self._play.wanted, attribute) if name != term)

@@ -142,11 +142,10 @@ def test_an_ellipse_that_grows_keeps_its_phase() -> None:
     try:
         playground.set(nod=0.1, begin=0.5)
         playground.session.sim.data.time = 2.0
-        move = playground.view._controls["nod and turn"]
-        move(0.2)
+        playground.nod(0.2)
         assert (playground.session.settings.nod, playground.session.settings.begin) == (0.2, 0.5)
-        move(0.0)
-        move(0.3)
+        playground.nod(0.0)
+        playground.nod(0.3)
         assert (playground.session.settings.nod, playground.session.settings.begin) == (0.3, 2.0)
     finally:
         playground.close()
