@@ -99,7 +99,7 @@ class _Frame:
     def ticks(self) -> str:
         """Lines at round torques, the one of no torque thicker, and at the tenths of a second."""
         drawn = f'<text x="{EDGE - 6}" y="{HEIGHT + 12}" font-size="11" text-anchor="end">N·m</text>'
-        for torque in MaxNLocator(5).tick_values(self.low, self.high).tolist():
+        for torque in np.asarray(MaxNLocator(5).tick_values(self.low, self.high)).tolist():
             if self.low <= torque <= self.high:
                 y, width = float(self.up(torque)), 0.2 if torque else 0.5
                 ends = f'x1="{EDGE}" y1="{y:.1f}" x2="{WIDTH - EDGE}" y2="{y:.1f}"'
