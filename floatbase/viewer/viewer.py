@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from floatbase.robots import Robot, State
 from floatbase.viewer import film, marks, page, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
-from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
+from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, RGB, SYMBOLS, hexadecimal
 from floatbase.viewer.controls import Controls
 from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, below, kinds
@@ -202,8 +203,7 @@ class Viewer(Controls):
         if self._moving:
             self.window.put([self._following(ROBOT), *wire.end_animation()])
             self._moving = False
-        self.canvas.draw(picture)
-        self._caption(kinds(picture), title, ghost_name)
+        self.canvas.draw(picture, *self._caption(kinds(picture), title, ghost_name))  # at once: a second frame would wait
 
     def play(
         self,
@@ -276,7 +276,7 @@ class Viewer(Controls):
         """
         moving = recording.animate(times, pictures, ROOT, positive("speed", speed), paused)
         self.draw(moving.first, title)
-        self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name)
+        self.canvas.set(*self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name))
         self.window.put([moving.command])
         self._moving = True
         return self
@@ -398,15 +398,21 @@ class Viewer(Controls):
             wire.page_command("set_theme", name=background),
         )
 
-    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
-        """Set the title, and the legend of the colours in the picture."""
-        colours = dict.fromkeys(("push", "price", "zmp"), self.painter.text)
-        items = [
-            [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text, SYMBOLS.get(kind, "patch")]
-            for kind, colour, text in LEGEND
-            if kind in shown
-        ]
-        self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
+    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[wire.Update, wire.Update]:
+        """The commands for the title, and for the legend of the colours in the picture."""
+        return wire.page_command("set_title", text=title or ""), _legend(frozenset(shown), ghost_name, self.painter.text)
+
+
+@lru_cache(maxsize=64)  # most pictures show what the one before did
+def _legend(shown: frozenset[str], ghost_name: str, text: RGB) -> wire.Update:
+    """The command for the legend of these kinds of items. text: colour of what is drawn as texts are."""
+    colours = dict.fromkeys(("push", "price", "zmp"), text)
+    items = [
+        [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else words, SYMBOLS.get(kind, "patch")]
+        for kind, colour, words in LEGEND
+        if kind in shown
+    ]
+    return wire.page_command("set_legend", items=items)
 
 
 def _check_flags(**flags: bool) -> None:
