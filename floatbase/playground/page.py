@@ -33,7 +33,7 @@ class Playground:
     settings: those at first.
     background: "white", "light" or "dark".
     height: of the picture in a notebook, pixels.
-    port: of the page; 0 for a free one.
+    port: of the page; 0 for a free one, opened once `url` is asked for.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Playground:
 
     @property
     def url(self) -> str:
-        """Address of the page."""
+        """Address of the page, which has no port before this is asked for."""
         return self.view.url
 
     def start(self) -> Playground:
@@ -249,7 +249,8 @@ class Playground:
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
-        return f"Playground({self.robot.name}, {self.url})"
+        address = f", {self.url}" if self.view.window.listens else ""
+        return f"Playground({self.robot.name}{address})"
 
 
 def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> Playground:

@@ -53,7 +53,7 @@ class Viewer(Controls):
     ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin; None takes the plane that the
         contacts stand on when they share a normal, else a level ground.
     follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it otherwise.
-    port: port of the page; 0 takes a free one.
+    port: port of the page; 0 takes a free one once `url` is asked for, so a picture in a notebook has none.
     Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
 
     In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs: its frames come as a slider's
@@ -93,7 +93,10 @@ class Viewer(Controls):
 
     @property
     def url(self) -> str:
-        """Address of the live page. It can be opened on the machine of this process only."""
+        """Address of the live page. It can be opened on the machine of this process only, by every user of it.
+
+        The page has no port before this is asked for. Raises `ViewerError` when the viewer was closed before.
+        """
         return self.window.web_url
 
     @property
@@ -381,7 +384,8 @@ class Viewer(Controls):
         return f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" style="{style}"></iframe>'
 
     def __repr__(self) -> str:
-        return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"
+        address = f", {self.url}" if self.window.listens else ""
+        return f"Viewer({self.robot.name}{address}{'' if self.window.is_open else ', closed'})"
 
     def _set_stage(self, background: str) -> None:
         """Set the background, and hide meshcat's own grid and axes."""
