@@ -21,7 +21,7 @@ from floatbase.playground.session import Session
 from floatbase.playground.settings import GAITS, IDEAL, Settings
 from floatbase.playground.terms import SYMBOLS, arrows
 from floatbase.robots import Robot
-from floatbase.simulation import SEEN, Live, advice
+from floatbase.simulation import GOES_ON, SEEN, Live, advice
 from floatbase.viewer import Picture, push_at
 
 _HARDEST = 2.5  # times the weight: a push that asks for steps
@@ -41,6 +41,7 @@ _OFF = {  # term: (switch in the belief, switch in the world)
 }
 _WEIGHTS = ("motion", "posture", "effort")
 _FREE = "play freely"
+_SHOWN = ("forces", "cones")  # terms that are drawn at first
 
 
 class Playground:
@@ -69,13 +70,14 @@ class Playground:
         self.view = fb.Viewer(robot, background=background, port=port, facets=facets, follow=True, height=height)
         self.session = Session(robot, settings)
         self._first = self.session.settings
-        self.force, self.towards = 0.1 * robot.weight, 0.0  # N, and degrees: 0 forwards, 90 to the left
+        self.force, self.towards = self._gentle, 0.0  # N, and degrees: 0 forwards, 90 to the left
         self.pushed = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
         self.outcome = ""
         self.card: Card | None = None
         self.judge: Judge | None = None
         self._last_push: fb.Push | None = None
-        self._shown: dict[str, bool] = dict.fromkeys(SYMBOLS, False) | {"forces": True, "cones": True}
+        self._shown = {term: term in _SHOWN for term in SYMBOLS}
+        self._begins_paused = False  # the present challenge, until its first slice has been drawn
         self._requested: dict[str, Any] = {}
         self._lock = threading.Lock()  # over what is requested
         self._drawing = threading.Lock()  # the run draws, and so does who pauses it
@@ -94,6 +96,11 @@ class Playground:
     def url(self) -> str:
         """Address of the page."""
         return self.view.url
+
+    @property
+    def _gentle(self) -> float:
+        """The push at first, N."""
+        return 0.1 * self.robot.weight
 
     def start(self) -> Playground:
         """Show the robot and let it run."""
@@ -137,11 +144,20 @@ class Playground:
     def choose(self, card: Card | None) -> None:
         """Begin a challenge, or play freely."""
         self.card, self.judge = card, None if card is None else card.judge()
+        self._begins_paused = card is not None and card.paused
         self._restart_with(self._first if card is None else card.start)
         self._write()
 
     def undo(self) -> None:
-        """Set everything as it was at first, and put the robot back on its feet."""
+        """Set everything as it was at first, the push, the speed and what is shown too, and put the robot back on its feet."""
+        self.force, self.towards, self._last_push = self._gentle, 0.0, None
+        self.run.slow_motion(1.0)
+        for name, value in {"speed": 1.0, "push [N]": self.force, "towards [°]": self.towards}.items():
+            self.view.move(name, value)
+        for term in SYMBOLS if self.robot.is_floating else ():
+            self._shown[term] = term in _SHOWN
+            self.view.move(f"show {term}", self._shown[term])
+        self._begins_paused = self.card is not None and self.card.paused
         self._restart_with(self._first if self.card is None else self.card.start)
 
     def _restart_with(self, settings: Settings) -> None:
@@ -200,7 +216,8 @@ class Playground:
         for name, (attribute, low, high, step) in _PAIRS.items():
             for i, column in enumerate(("believed", "true")):
                 value, changed = getattr(s, attribute)[i], partial(self._set_part, attribute, i)
-                view.slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column)
+                word = "perfect" if high == IDEAL else ""
+                view.slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column, word)
         self._add_stance()
         self._add_walk()
         where = "its quadratic program"
@@ -315,7 +332,7 @@ class Playground:
         """Show what stopped the run, if anything did, over the last picture."""
         self.outcome = "" if status == "running" else advice(status)
         judge = self.judge
-        if judge is not None and status not in ("running", "paused"):
+        if judge is not None and status not in GOES_ON:
             judge.ended(status, self.session)
             self._write()
         self._draw_again()
@@ -335,6 +352,9 @@ class Playground:
             if judge.says != before:
                 self._write()
         self._draw(record)
+        if self._begins_paused:
+            self._begins_paused = False
+            self.run.pause()
         if self.robot.is_floating:
             self.view.strip("planned and measured forces differ by", float(record.time[-1]), gap(record), "N")
 
@@ -346,11 +366,9 @@ class Playground:
             pace = "" if speed is None else f", {speed:.0%} of real time"
             gait = f", {session.settings.gait}" if session.settings.gait else ""
             headline = f"{self.robot.name}{gait}, {now:.1f} s{pace}, control every {1e3 * session.period:g} ms"
-            forces = self._shown["forces"]
             self.view.show(
-                record.final, record.contacts, record.measured[-1] if forces else None,
-                _planned(record) if forces else None, push=push_at(record, -1, SEEN), cones=self._shown["cones"],
-                support=True, extra=self._extra(record),
+                record.final, record.contacts, record.measured[-1], _planned(record), push=push_at(record, -1, SEEN),
+                cones=self._shown["cones"], arrows=self._shown["forces"], support=True, extra=self._extra(record),
                 title="\n".join(filter(None, [headline, self.outcome, session.note])),
             )  # fmt: skip
 

@@ -60,6 +60,11 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("steady", WARNING, "theory: steady push"),
     ("compass", COM, "reachable horizontal force"),
     ("ghost", GHOST, GHOST_NAME),
+    ("term inertia", COM, "m a, mass times acceleration"),
+    ("term velocity", COM, "C q̇, Coriolis and centrifugal force"),
+    ("term gravity", COM, "m g, weight"),
+    ("term zeros", MEASURED, "τ, torques of the joints"),
+    ("term drift", COM, "J̇ q̇, drift of the feet"),
 )
 
 # how the legend marks what is not a patch of its colour: first part of the item's path -> a class of the page's style
@@ -74,6 +79,15 @@ BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
     "white": (_rgb("#FFFFFF"), _rgb("#FFFFFF"), _rgb("#DDDDDD"), _rgb("#222222")),
     "light": (_rgb("#FBFCFE"), _rgb("#DFE5EC"), _rgb("#BCC5CF"), _rgb("#222222")),
     "dark": (_rgb("#1E2227"), _rgb("#33393F"), _rgb("#59616A"), _rgb("#F2F2F2")),
+}
+
+# colour -> its shade on a dark background, for those that would hide there
+NIGHT = {
+    MEASURED: _rgb("#1C80C0"),
+    PLANNED: _rgb("#8CCBF2"),
+    COM: _rgb("#CD5A9B"),
+    PATCH: _rgb("#C4C9CF"),
+    GREYS[0]: _rgb("#DDE3EA"),
 }
 
 

@@ -9,7 +9,7 @@ function startViewer() {
   const player = startPlayer(viewer);
   const panel = startPanel(viewer);
   const camera = startCamera(viewer, panel);
-  const legend = startLegend(viewer, camera);
+  const legend = startLegend(camera, (colour) => theme.colour(colour)), theme = startTheme(viewer, legend);
   const manners = startManners(viewer, camera);
   const commands = {
     set_camera: camera.look,
@@ -23,7 +23,8 @@ function startViewer() {
     },
     set_legend: (command) => { legend.show(command.items); },
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
-    set_theme: (command) => { document.body.className = command.name; },
+    set_theme: theme.ask,
+    set_ending: (command) => { part("notice").textContent = command.text; },
     set_animation: (command) => { meshcat(command); player.load(command); },
     set_control: panel.add,
     move_control: panel.move,
@@ -33,6 +34,7 @@ function startViewer() {
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
     (commands[command.type] || meshcat)(command);
+    theme.after(command);
     viewer.set_dirty();
   };
   return viewer;
@@ -62,9 +64,10 @@ function viewerOrText() {
 
 // The legend, at the lower left. Where it would cover what the camera looks at, it is folded into a button: pointing at it
 // or reaching it by the keyboard opens it, a click keeps it open, Escape closes it.
-function startLegend(viewer, camera) {
+// shade: the colour that a colour has in the present theme.
+function startLegend(camera, shade) {
   const legend = part("legend"), lines = part("lines"), button = legend.querySelector("button");
-  let kept = false;
+  let kept = false, shown = [];
   const open = (now) => {
     legend.classList.toggle("open", now);
     button.setAttribute("aria-expanded", now);
@@ -87,17 +90,18 @@ function startLegend(viewer, camera) {
   button.onclick = () => keep(!kept);
   const sizes = new ResizeObserver(fold);
   for (const one of [part("meshcat-pane"), part("player"), part("panel")]) sizes.observe(one);
-  return {
-    show(items) {
-      lines.replaceChildren(...items.map(([colour, text, symbol]) => {
-        const line = document.createElement("div");
-        line.append(spot(colour, symbol), text);
-        return line;
-      }));
-      button.firstChild.replaceChildren(...Array.from(new Set(items.map(([colour]) => colour)), (colour) => spot(colour)));
-      fold();
-    },
-  };
+  function show(items) {
+    shown = items;
+    const seen = items.map(([colour, ...rest]) => [shade(colour), ...rest]);
+    lines.replaceChildren(...seen.map(([colour, text, symbol]) => {
+      const line = document.createElement("div");
+      line.append(spot(colour, symbol), text);
+      return line;
+    }));
+    button.firstChild.replaceChildren(...Array.from(new Set(seen.map(([colour]) => colour)), (colour) => spot(colour)));
+    fold();
+  }
+  return {show, again: () => show(shown)};
 }
 
 // A patch of a colour, or one of the style's symbols in it: a disc, a ring, a diamond, a line.

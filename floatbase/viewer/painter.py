@@ -75,6 +75,7 @@ class Painter:
         *,
         com: bool = True,
         cones: bool = True,
+        arrows: bool = True,
         support: bool = False,
         wrench: npt.ArrayLike | None = None,
         push: tuple[str, npt.ArrayLike] | None = None,
@@ -99,7 +100,7 @@ class Painter:
         picture = {"ground": ground.lines(self.lines, state.com)} | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
             stands = [contact.name not in lifted for contact in contacts for _ in contact.point_names]
-            picture |= self._contacts(contacts, positions, both, cones, stands)
+            picture |= self._contacts(contacts, positions, both, cones, stands, arrows)
             if support:
                 picture |= below("support", marks.support_region(positions[stands], 0.004 * self.size, ground))
             if labels:
@@ -204,7 +205,9 @@ class Painter:
         poses = state.joint_transforms
         return {f"{root}/{name}": Item(look, poses[joint]) for (joint, name), look in zip(self._paths, looks, strict=True)}
 
-    def _contacts(self, contacts: Contacts, positions: Array, forces: Forces, cones: bool, stands: list[bool]) -> Picture:
+    def _contacts(
+        self, contacts: Contacts, positions: Array, forces: Forces, cones: bool, stands: list[bool], arrows: bool
+    ) -> Picture:
         """Forces at every point, and patches and cones at the points that stand on the ground."""
         picture: Picture = {}
         height = self.cone_height(contacts)
@@ -216,7 +219,7 @@ class Painter:
             if cones and stands[i]:
                 force = None if forces.judged is None else forces.judged[i]
                 picture |= below(f"cone/{at}", self._cone(position, normal, float(mu), height, force))
-            for kind, vectors, colour in forces.kinds:
+            for kind, vectors, colour in forces.kinds if arrows else ():
                 if vectors is not None and not self._is_quiet(vectors[i]):
                     vector = self.scale * vectors[i]
                     picture[f"{kind}/{at}"] = shapes.arrow(position, vector, colour, self.size, halo=kind == "planned")

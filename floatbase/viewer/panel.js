@@ -61,7 +61,12 @@ function startPanel(viewer) {
   const digits = (step) => Math.max(0, Math.min(6, Math.ceil(-Math.log10(step || 1))));
   function slider({name, ...given}, line) {
     const input = Object.assign(document.createElement("input"), {type: "range"}), shown = document.createElement("output");
-    const set = (now) => { input.value = now; shown.textContent = Number(now).toFixed(digits(input.step)); };
+    const say = () => {
+      const words = given.at_most && Number(input.value) >= Number(input.max) ? given.at_most : "";
+      shown.textContent = words || Number(input.value).toFixed(digits(input.step));
+      if (given.at_most) input.setAttribute("aria-valuetext", shown.textContent);
+    };
+    const set = (now) => { input.value = now; say(); };
     const remake = ({value, min, max, step}) => { Object.assign(input, {min, max, step}).dataset.home = value; set(value); };
     input.setAttribute("aria-label", name);
     remake(given);

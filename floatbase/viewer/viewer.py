@@ -44,7 +44,7 @@ class Viewer(Controls):
 
     robot: the robot to draw.
     height: height of the picture in a notebook, pixels.
-    background: "white", "light" or "dark".
+    background: "white" or "light", both of which are dark where the page around the picture is, or the browser; or "dark".
     scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's weight about twice as long as
         its centre of mass is high.
     facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
@@ -113,6 +113,7 @@ class Viewer(Controls):
         *,
         com: bool = True,
         cones: bool = True,
+        arrows: bool = True,
         support: bool = False,
         wrench: npt.ArrayLike | None = None,
         push: tuple[str, npt.ArrayLike] | None = None,
@@ -132,6 +133,7 @@ class Viewer(Controls):
             `planned`.
         com: whether to draw the centre of mass and its projection on the ground.
         cones: whether to draw the friction cones.
+        arrows: whether to draw the forces; where not, they still colour the cones.
         support: whether to draw the convex hull of the contact points.
         wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a ring around its axis; its
             radius is that of a force which has this moment at a lever of half the diagonal of the robot's bounding box.
@@ -145,10 +147,10 @@ class Viewer(Controls):
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
         `ViewerError` when the window is closed.
         """
-        _check_flags(com=com, cones=cones, support=support, labels=labels)
+        _check_flags(com=com, cones=cones, arrows=arrows, support=support, labels=labels)
         _check_texts(title=title, ghost_name=ghost_name)
         picture = self.painter.picture(
-            state, contacts, forces, planned, com=com, cones=cones, support=support, wrench=wrench, push=push,
+            state, contacts, forces, planned, com=com, cones=cones, arrows=arrows, support=support, wrench=wrench, push=push,
             ghost=ghost, frames=frames, labels=labels, extra=extra,
         )  # fmt: skip
         self.draw(picture, title, ghost_name)
@@ -346,6 +348,10 @@ class Viewer(Controls):
         """The scene as it is now, as one HTML page that needs neither server nor network."""
         _check_texts(title=title)
         return page.file_page(self.window.scene.file_commands(), title or self.robot.name)
+
+    def ending(self, words: str) -> None:
+        """What the page says when this viewer has been closed. words: the text."""
+        self.canvas.set(wire.page_command("set_ending", text=text("words", words)))
 
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
