@@ -249,7 +249,8 @@ CARDS = (
     Card("Survive 300 N", "Push it with 300 N from any side; 2 s later it must be on its feet.", _survive, fixed=_WORLD),
     Card(
         "Down an icy slope", "The ground falls by 20° and is slippery. Press run, and slide 30 cm without falling.", _slide,
-        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "true_off", "believed_off"), ("slope", "friction"), paused=True,
+        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "true_off", "believed_off"), ("slope", "friction"),
+        paused=True,
     ),
     Card("On an edge", "Bring a foot's planned force onto an edge of its polyhedron: two active facets.", _edge, fixed=_WORLD),
     Card(

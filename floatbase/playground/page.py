@@ -19,7 +19,7 @@ from floatbase.errors import ViewerError
 from floatbase.playground.cards import CARDS, Card, Judge
 from floatbase.playground.session import Session
 from floatbase.playground.settings import GAITS, IDEAL, Settings
-from floatbase.playground.terms import SYMBOLS, arrows
+from floatbase.playground.terms import MEANINGS, SYMBOLS, arrows
 from floatbase.robots import Robot
 from floatbase.simulation import GOES_ON, SEEN, Live, advice
 from floatbase.viewer import Picture, push_at
@@ -253,6 +253,8 @@ class Playground:
 
     def _add_terms(self) -> None:
         view = self.view
+        for term, (colour, meaning) in MEANINGS.items():
+            view.explain(f"term {term}", colour, meaning)
         for term, symbol in SYMBOLS.items():
             view.term(f"show {term}", partial(self._show_term, term), self._shown[term], symbol, "shown")
             believed, true = _OFF.get(term, ("", ""))
@@ -377,7 +379,7 @@ class Playground:
         picture: Picture = {}
         for term, shown in self._shown.items():
             if shown:
-                picture |= arrows(term, record, self.view.scale, self.session.settings.true_off)
+                picture |= arrows(term, record, self.view.scale, self.view.painter.size, self.session.settings.true_off)
         walk = self.session.walk
         return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
 

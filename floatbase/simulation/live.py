@@ -40,8 +40,8 @@ class Live:
     after_reset: called after each reset, in that thread, to reset what has a memory of its own, such as the actuators.
     idle: s without any call here after which the run pauses by itself, so that a forgotten page costs nothing.
 
-    `status` is "running", "paused", `IDLE` where it has paused by itself, or why the run stopped: "fell", "diverged", "controller failed: …", "stopped: …" for an
-    exception, which `error` holds. A fall or a failure is told at once; slices go on with the controller off, as `settle`
+    `status` is "running", "paused", `IDLE` where it has paused by itself, or why the run stopped: "fell", "diverged",
+    "controller failed: …", "stopped: …" for an exception, which `error` holds. A fall or a failure is told at once; slices go on with the controller off, as `settle`
     of `rollout` says, until the robot lies still, or for 1.5 s at most. Calls act between slices, and none but `close` waits.
     """
 

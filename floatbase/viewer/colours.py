@@ -60,15 +60,13 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("steady", WARNING, "theory: steady push"),
     ("compass", COM, "reachable horizontal force"),
     ("ghost", GHOST, GHOST_NAME),
-    ("term inertia", COM, "m a, mass times acceleration"),
-    ("term velocity", COM, "C q̇, Coriolis and centrifugal force"),
-    ("term gravity", COM, "m g, weight"),
-    ("term zeros", MEASURED, "τ, torques of the joints"),
-    ("term drift", COM, "J̇ q̇, drift of the feet"),
 )
 
 # how the legend marks what is not a patch of its colour: first part of the item's path -> a class of the page's style
-SYMBOLS = {"com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line"}
+SYMBOLS = {
+    "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line", "cone": "cone", "idle cone": "cone",
+    "support": "tile", "wrench": "curl",
+}  # fmt: skip
 
 # status of a friction cone -> its colour and its opacity
 CONE = {"idle": IDLE, "inside": CALM, "active": WARNING, "outside": ALARM}

@@ -104,7 +104,7 @@ function startLegend(camera, shade) {
   return {show, again: () => show(shown)};
 }
 
-// A patch of a colour, or one of the style's symbols in it: a disc, a ring, a diamond, a line.
+// A patch of a colour, or one of the style's symbols in it: a disc, a ring, a diamond, a line, a cone, a tile, a curl.
 function spot(colour, symbol = "patch") {
   const made = document.createElement("i");
   made.className = symbol;

@@ -114,7 +114,7 @@ def _colours() -> str:
 
 def _page(scripts: str, title: str) -> str:
     return (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,"><title>{html.escape(title)}'
-        f"</title><style>{_own('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
+        f"<title>{html.escape(title)}</title><style>{_own('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
     )

@@ -254,12 +254,18 @@ class Painter:
         return (VISIBLE * self.robot.weight) ** 2
 
     def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
-        """The name of every contact point, beside it and away from the robot."""
+        """The name of every contact, beside it and away from the robot; of a flat foot also the numbers of its corners."""
         picture: Picture = {}
-        for name, position in zip(contacts.point_names, positions, strict=True):
-            away = (position - state.com) * [1.0, 1.0, 0.0]
-            at = position + 0.12 * self.size * away / max(float(np.linalg.norm(away)), 1e-6)
-            picture[f"label/{plain(name)}"] = shapes.label(at, name, 0.06 * self.size)
+        for contact in contacts:
+            rows = [list(contacts.point_names).index(name) for name in contact.point_names]
+            middle = positions[rows].mean(axis=0)
+            away = (middle - state.com) * [1.0, 1.0, 0.0]
+            towards = away / max(float(np.linalg.norm(away)), 1e-6)
+            beyond = 0.12 * self.size + float(np.linalg.norm(positions[rows] - middle, axis=1).max())
+            picture[f"label/{plain(contact.name)}"] = shapes.label(middle + beyond * towards, contact.name, 0.06 * self.size)
+            for i, row in enumerate(rows if len(rows) > 1 else ()):
+                at = positions[row] + 0.25 * (positions[row] - middle)
+                picture[f"label/{plain(contacts.point_names[row])}"] = shapes.label(at, str(i), 0.035 * self.size)
         return picture
 
     def _wrench(self, state: State, value: npt.ArrayLike) -> Picture:

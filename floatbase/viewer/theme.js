@@ -1,6 +1,7 @@
 // Light or dark. A picture that was asked for "white" or "light" is dark where the page around it is, or the browser. BACKGROUNDS
 // and NIGHT come from colours.py: what the backgrounds are, and colours that a dark one needs in another shade.
 
+const GLOW = 0x2c3036;  // that robots have of their own in the dark, where black parts would not be seen
 const RETRY = 400;  // ms after a change of the page around, whose style may come later than its mark
 
 // Whether the words around this page's frame are lighter than its paper; of a page on its own, what the browser prefers.
@@ -35,6 +36,7 @@ function startTheme(viewer, legend) {
     if (material.type == "SpriteMaterial") return paintLabel(material, kept);
     if (material.type == "MeshBasicMaterial" && material.vertexColors) return paintCorners(geometry.attributes.color, kept);
     kept.own ??= material.color.getHex();
+    if (material.emissive && material.vertexColors) material.emissive.setHex(dark ? GLOW : 0);
     if (kept.own != 0xffffff && shades().has(kept.own)) material.color.setHex(shade(kept.own));  // white is no colour of its own
   }
   function paintCorners(colours, kept) {

@@ -21,7 +21,7 @@ from floatbase.robots import Robot, State
 from floatbase.viewer import film, marks, page, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
-from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
+from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, RGB, SYMBOLS, hexadecimal
 from floatbase.viewer.controls import Controls
 from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, below, kinds
@@ -87,6 +87,7 @@ class Viewer(Controls):
         self.canvas = Canvas(self.window)
         self._moving, self._follow = False, flag("follow", follow)
         self._last: State | None = None
+        self._own: dict[str, tuple[RGB, str]] = {}  # kinds of items that the legend explains beside its own
         super().__init__()
         self._set_stage(background)
 
@@ -159,6 +160,13 @@ class Viewer(Controls):
             self.canvas.set(*self._looking(View()))
         self._last = state
         return self
+
+    def explain(self, kind: str, colour: RGB, meaning: str) -> None:
+        """Let the legend explain items of one's own, from the next picture on that has any.
+
+        kind: first part of their paths. colour: RGB. meaning: what the legend says.
+        """
+        self._own[text("kind", kind)] = colour, text("meaning", meaning)
 
     def prices(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
         """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle, of a normal force on top.
@@ -405,7 +413,7 @@ class Viewer(Controls):
         colours = dict.fromkeys(("push", "price", "zmp"), self.painter.text)
         items = [
             [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text, SYMBOLS.get(kind, "patch")]
-            for kind, colour, text in LEGEND
+            for kind, colour, text in (*LEGEND, *((kind, *own) for kind, own in self._own.items()))
             if kind in shown
         ]
         self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
