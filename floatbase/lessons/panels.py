@@ -27,10 +27,10 @@ class SliderPanel(widgets.VBox):
     """
 
     def __init__(self, view: Viewer | None, sliders: dict[str, widgets.FloatSlider], beside: bool):
-        width, flex = ("62%", "0 0 auto") if beside else ("auto", None)  # a long note beside it wraps, and takes nothing of it
-        self._picture = widgets.VBox(layout=widgets.Layout(width=width, flex=flex))
-        note = widgets.HTML()
-        top = [note] if view is None else [widgets.HBox([self._picture, note])] if beside else [self._picture, note]
+        self._picture = widgets.VBox(layout=_wide(62, 380) if beside else None)
+        note = widgets.HTML(layout=_wide(30, 270) if beside else None)
+        row = widgets.HBox([self._picture, note], layout=widgets.Layout(flex_flow="row wrap"))
+        top = [note] if view is None else [row] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])
         self.view, self.sliders, self.note = view, sliders, note
 
@@ -38,6 +38,11 @@ class SliderPanel(widgets.VBox):
         """The picture is put in only here: by now the camera has been placed, and a still picture keeps that view."""
         self._picture.children = [self.view.widget()] if self.view else []
         return with_image(super()._repr_mimebundle_(**kwargs), *self._picture.children)
+
+
+def _wide(share: int, least: int) -> widgets.Layout:
+    """A part of a row that takes its share of the width, %, and a line of its own where that is less than `least` pixels."""
+    return widgets.Layout(flex=f"1 1 {share}%", min_width=f"min({least}px, 100%)")
 
 
 def slider_panel(

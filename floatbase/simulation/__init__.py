@@ -12,6 +12,6 @@ from floatbase.simulation.sweep import sweep
 from floatbase.simulation.table import Table
 
 __all__ = [
-    "GOES_ON", "IDLE", "SEEN", "Actuators", "AlteredSimulation", "Controller", "Conversion", "Ground", "Live", "Push", "PushRose",
-    "Rollout", "Simulation", "Table", "World", "advice", "push_rose", "rollout", "sweep",
+    "GOES_ON", "IDLE", "SEEN", "Actuators", "AlteredSimulation", "Controller", "Conversion", "Ground", "Live", "Push",
+    "PushRose", "Rollout", "Simulation", "Table", "World", "advice", "push_rose", "rollout", "sweep",
 ]  # fmt: skip

@@ -41,8 +41,9 @@ class Live:
     idle: s without any call here after which the run pauses by itself, so that a forgotten page costs nothing.
 
     `status` is "running", "paused", `IDLE` where it has paused by itself, or why the run stopped: "fell", "diverged",
-    "controller failed: …", "stopped: …" for an exception, which `error` holds. A fall or a failure is told at once; slices go on with the controller off, as `settle`
-    of `rollout` says, until the robot lies still, or for 1.5 s at most. Calls act between slices, and none but `close` waits.
+    "controller failed: …", "stopped: …" for an exception, which `error` holds. A fall or a failure is told at once; slices go
+    on with the controller off, as `settle` of `rollout` says, until the robot lies still, or for 1.5 s at most. Calls act
+    between slices, and none but `close` waits.
     """
 
     def __init__(

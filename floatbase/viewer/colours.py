@@ -76,7 +76,7 @@ CONE_ALPHA = {"idle": 0.12, "inside": 0.28, "active": 0.28, "outside": 0.28}
 BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
     "white": (_rgb("#FFFFFF"), _rgb("#FFFFFF"), _rgb("#DDDDDD"), _rgb("#222222")),
     "light": (_rgb("#FBFCFE"), _rgb("#DFE5EC"), _rgb("#BCC5CF"), _rgb("#222222")),
-    "dark": (_rgb("#1E2227"), _rgb("#33393F"), _rgb("#59616A"), _rgb("#F2F2F2")),
+    "dark": (_rgb("#1E2227"), _rgb("#282C32"), _rgb("#4B525A"), _rgb("#F2F2F2")),
 }
 
 # colour -> its shade on a dark background, for those that would hide there
