@@ -27,8 +27,8 @@ class SliderPanel(widgets.VBox):
     """
 
     def __init__(self, view: Viewer | None, sliders: dict[str, widgets.FloatSlider], beside: bool):
-        self._picture = widgets.VBox(layout=_wide(62, 380) if beside else None)
-        note = widgets.HTML(layout=_wide(30, 270) if beside else None)
+        self._picture = widgets.VBox(layout=_wide(62, 380) if beside else widgets.Layout())
+        note = widgets.HTML(layout=_wide(30, 270) if beside else widgets.Layout())
         row = widgets.HBox([self._picture, note], layout=widgets.Layout(flex_flow="row wrap"))
         top = [note] if view is None else [row] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])

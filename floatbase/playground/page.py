@@ -77,7 +77,7 @@ class Playground:
         self.judge: Judge | None = None
         self._last_push: fb.Push | None = None
         self._shown = {term: term in _SHOWN for term in SYMBOLS}
-        self._begins_paused = False  # the present challenge, until its first slice has been drawn
+        self._waits = [False, False]  # for the reader to press run: after the next reset, after the next slice
         self._requested: dict[str, Any] = {}
         self._lock = threading.Lock()  # over what is requested
         self._drawing = threading.Lock()  # the run draws, and so does who pauses it
@@ -144,7 +144,6 @@ class Playground:
     def choose(self, card: Card | None) -> None:
         """Begin a challenge, or play freely."""
         self.card, self.judge = card, None if card is None else card.judge()
-        self._begins_paused = card is not None and card.paused
         self._restart_with(self._first if card is None else card.start)
         self._write()
 
@@ -157,7 +156,6 @@ class Playground:
         for term in SYMBOLS if self.robot.is_floating else ():
             self._shown[term] = term in _SHOWN
             self.view.move(f"show {term}", self._shown[term])
-        self._begins_paused = self.card is not None and self.card.paused
         self._restart_with(self._first if self.card is None else self.card.start)
 
     def _restart_with(self, settings: Settings) -> None:
@@ -168,6 +166,7 @@ class Playground:
         self.run.reset()
 
     def _begin(self, settings: Settings) -> None:
+        self._waits[0] = self.card is not None and self.card.paused
         self.session.change(**asdict(settings))
         self._follow_settings()
         self._hand_over()
@@ -195,6 +194,7 @@ class Playground:
     def _restart(self) -> None:
         """After a reset of the simulation, in the run's thread."""
         self.session.restart()
+        self._waits = [False, self._waits[0]]
         card = self.card
         if card is not None:
             self.judge = card.judge()
@@ -354,8 +354,8 @@ class Playground:
             if judge.says != before:
                 self._write()
         self._draw(record)
-        if self._begins_paused:
-            self._begins_paused = False
+        if self._waits[1]:
+            self._waits[1] = False
             self.run.pause()
         if self.robot.is_floating:
             self.view.strip("planned and measured forces differ by", float(record.time[-1]), gap(record), "N")
