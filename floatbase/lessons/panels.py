@@ -29,6 +29,7 @@ class SliderPanel(widgets.VBox):
     def __init__(self, view: Viewer | None, sliders: dict[str, widgets.FloatSlider], beside: bool):
         self._picture = widgets.VBox(layout=_wide(62, 380) if beside else widgets.Layout())
         note = widgets.HTML(layout=_wide(30, 270) if beside else widgets.Layout())
+        note.layout.padding = "0 0 0 10px" if beside else None
         row = widgets.HBox([self._picture, note], layout=widgets.Layout(flex_flow="row wrap"))
         top = [note] if view is None else [row] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])

@@ -26,7 +26,8 @@ MEANINGS = {  # term: (colour of its arrows, what they are)
     "zeros": (MEASURED, "τ, torques of the joints"),
     "drift": (COM, "J̇ q̇, drift of the feet"),
 }
-_LIFTED = {"inertia": 0.3, "velocity": 0.45, "gravity": 0.6, "zeros": 0.75, "drift": 0.9}  # of words that stand for no arrow
+_ROWS = {"inertia": 0.25, "velocity": 0.37, "gravity": 0.49, "zeros": 0.61, "drift": 0.73}  # of words, over the robot's size
+_BEHIND = 1.1  # times its size behind its centre of mass, where no arrow stands
 
 
 def arrows(
@@ -38,7 +39,7 @@ def arrows(
 ) -> Picture:
     """The arrows of a term of `SYMBOLS` at the last row of a record; forces and cones are drawn by the viewer itself.
 
-    A term that is too small to be seen, or that the world does not have, is told in words over the robot.
+    A term that is too small to be seen, or that the world does not have, is told in words behind the robot.
     scale: m/N, as the viewer draws forces.
     size: of the robot, m.
     off: terms that the world does not have.
@@ -51,7 +52,7 @@ def arrows(
     if drawn:
         return below(f"term {term}", drawn)
     words = MEANINGS[term][1].split(",")[0] + (": switched off" if lacking else " ≈ 0")
-    at = np.array(record.final.com) + [0.0, 0.0, _LIFTED[term] * size]
+    at = np.array(record.final.com) + [-_BEHIND * size, 0.0, _ROWS[term] * size]
     return {f"word {term}": shapes.label(at, words, _TEXT * size)}
 
 

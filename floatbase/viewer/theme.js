@@ -1,7 +1,7 @@
 // Light or dark. A picture that was asked for "white" or "light" is dark where the page around it is, or the browser. BACKGROUNDS
 // and NIGHT come from colours.py: what the backgrounds are, and colours that a dark one needs in another shade.
 
-const GLOW = 0x2c3036;  // that robots have of their own in the dark, where black parts would not be seen
+const GLOW = 0x181b1f;  // that robots have of their own in the dark, where black parts would not be seen
 const RETRY = 400;  // ms after a change of the page around, whose style may come later than its mark
 
 // Whether the words around this page's frame are lighter than its paper; of a page on its own, what the browser prefers.
