@@ -123,8 +123,8 @@ def test_a_challenge_that_asks_for_it_begins_paused_and_goes_on_by_run(field: Pl
     until(lambda: field.session.sim.time > 0.2)
 
 
-def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(field: Playground) -> None:
-    first = (field.force, field.towards, dict(field._shown))
+def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(page, field: Playground) -> None:
+    first = (field.force, field.towards)
     controls = ("speed", "push [N]", "show forces", "show gravity")
 
     def shown() -> list:
@@ -133,16 +133,15 @@ def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(field: Play
         return [(moved or made)["value"] for moved, made in said]
 
     before = shown()
-    field.push(200.0, 90.0)
-    for term in ("forces", "gravity"):
-        field._show_term(term, not field._shown[term])
-        field.view.move(f"show {term}", field._shown[term])
-    field.view.move("push [N]", 200.0)
-    field.run.slow_motion(0.1)
-    field.view.move("speed", 0.1)
-    assert shown() != before
-    field.undo()
-    assert (field.force, field.towards, field._shown) == first and shown() == before and field.run._speed == 1.0
+    opened(page, field)
+    for name, value in (("speed", 0.1), ("push [N]", 200.0), ("show forces", "false"), ("show gravity", "true")):
+        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
+    until(lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old], lambda: page.wait_for_timeout(20))
+    until(lambda: "term gravity/m g" in field.view.canvas.picture, lambda: page.wait_for_timeout(20))
+    page.evaluate("viewer.gui_controllers['all as at first'].fire()")
+    until(lambda: shown() == before and (field.force, field.towards) == first, lambda: page.wait_for_timeout(20))
+    until(lambda: "measured/FL_foot" in field.view.canvas.picture, lambda: page.wait_for_timeout(20))
+    assert "term gravity/m g" not in field.view.canvas.picture
 
 
 def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(field: Playground) -> None:

@@ -9,11 +9,12 @@ import pytest
 
 from floatbase import Contacts
 from floatbase.robots import Robot, State
-from floatbase.viewer import COM, MEASURED, Viewer
-from floatbase.viewer.colours import BACKGROUNDS, GREYS, LEGEND, NIGHT, PATCH, PUSH, RGB, hexadecimal
+from floatbase.viewer import BACKGROUNDS, COM, GREYS, LEGEND, MEASURED, NIGHT, Viewer, hexadecimal
 
 from .looks import picture
 
+RGB = tuple[float, float, float]
+AS_TEXT = ("push", "price", "zmp")  # drawn in the colour of text
 SEEN = 3.0  # contrast that WCAG 2.2 asks for between parts of a picture and what is around them
 READ = 4.5  # and for text
 DRAWN = "window.viewer && viewer.num_messages_received > 0"
@@ -41,7 +42,7 @@ def test_text_is_read_and_what_hides_in_the_dark_has_another_shade_there(backgro
         assert contrast(text, paper) > READ
         assert contrast(text, paper) > 3.0 * contrast(lines, paper)  # the ground keeps behind
     if background == "dark":
-        drawn = ({colour for _, colour, _ in LEGEND} | {*GREYS, PATCH}) - {PUSH}  # a push is drawn as text is
+        drawn = {colour for kind, colour, _ in LEGEND if kind not in AS_TEXT} | {*GREYS, *NIGHT}
         shades = [NIGHT.get(colour, colour) for colour in drawn]
         assert min(contrast(shade, paper) for shade in shades for paper in (top, bottom)) > SEEN
         assert contrast(MEASURED, bottom) < SEEN  # so that the shades are there for something
