@@ -16,6 +16,8 @@ from floatbase.errors import FloatbaseError
 from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
 from floatbase.viewer import Viewer, push_at, with_image
 
+_NARROW = "min(340px, 100%)"  # width below which nothing of a slider is left but its name and its number
+
 # sliders ----------------------------------------------------------------------------------------------------------------
 
 
@@ -98,7 +100,8 @@ def _slider(text: str, low: float, first: float, high: float, step: float, wait:
         readout_format=f".{max(0, -math.floor(math.log10(step)))}f",
         continuous_update=not wait,
         tooltip=text,
-        layout=widgets.Layout(width="60%"),
+        style={"description_width": "8.5em"},
+        layout=widgets.Layout(width="60%", min_width=_NARROW),
     )
 
 
@@ -176,7 +179,9 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
     run.on_status(lambda _: line.tell())
     force.observe(let_go, names="value")
     buttons = [button("run", run.start), button("pause", run.pause), button("reset", reset)]
-    rows = [force, widgets.HBox([towards, _button("push", push)]), speed, widgets.HBox([*buttons, line])]
+    wrapped = widgets.Layout(flex_flow="row wrap")
+    aim, bar = (widgets.HBox(parts, layout=wrapped) for parts in ([towards, _button("push", push)], [*buttons, line]))
+    rows = [force, aim, speed, bar]
     return _PushPanel([view.widget(), *rows])
 
 

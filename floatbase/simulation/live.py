@@ -19,7 +19,7 @@ from floatbase.simulation.settling import lies_still, settled
 _SLICE = 1.0 / 30.0  # s of simulated time in a slice, about: as often as a picture is drawn
 _LONGEST_JOIN = 5.0  # s that `close` waits for a slice: far longer than one takes
 _SETTLING = 1.5  # s after a fall in which a robot comes to lie, at most
-IDLE = "paused by itself, since nothing was touched for a while"  # a status
+IDLE = "paused by itself, untouched for long"  # a status
 GOES_ON = ("running", "paused", IDLE)  # the statuses of a run that nothing has ended
 SEEN = 0.4  # s for which a slice still lists a push that is over: the eye misses an arrow of a tenth of a second
 
