@@ -85,7 +85,7 @@ def slider_panel(
 def _range_slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:
     text = name.replace("_", " ") + (f" [{unit}]" if unit else "")
     made = _slider(text, low, first, high, _round_step(low, first, high), wait)
-    made.style.description_width, made.layout.width = "12em", "80%"
+    made.style.description_width, made.layout.width = "min(12em, 36%)", "80%"
     return made
 
 
@@ -100,7 +100,7 @@ def _slider(text: str, low: float, first: float, high: float, step: float, wait:
         readout_format=f".{max(0, -math.floor(math.log10(step)))}f",
         continuous_update=not wait,
         tooltip=text,
-        style={"description_width": "8.5em"},
+        style={"description_width": "min(8.5em, 36%)"},
         layout=widgets.Layout(width="60%", min_width=_NARROW),
     )
 

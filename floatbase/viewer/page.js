@@ -2,6 +2,7 @@
 // floatbase's page around meshcat's viewer: our own commands, the player, and messages of several commands.
 
 const part = (id) => document.getElementById(id);
+const names = (path) => path.split("/").filter((name) => name);
 
 function startViewer() {
   const viewer = new MeshCat.Viewer(part("meshcat-pane"));
@@ -34,7 +35,9 @@ function startViewer() {
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
     (commands[command.type] || meshcat)(command);
-    theme.after(command);
+    const made = command.type == "set_object" && viewer.scene_tree.find([...names(command.path), "<object>"]).object;
+    if (made) camera.letters(made);
+    theme.after(command, made);
     viewer.set_dirty();
   };
   return viewer;
@@ -116,6 +119,7 @@ const LAG = 0.3;  // s by which the camera is behind what it follows, so that it
 const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
 const WIDE = 1.2;  // width over height of a picture into which the robot fits; a narrower one shows it smaller
 const LEAST = 0.2;  // zoom, in the smallest window
+const LARGER = 2;  // times: labels of a picture that is zoomed out are drawn so much larger, at most
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
@@ -147,6 +151,14 @@ function startCamera(viewer, panel) {
     anew = false;
     return way.sub(step).length() > 0;
   }
+  // Labels keep their size where the window is small.
+  function letters(object) {
+    object.traverse((one) => {
+      if (!one.isSprite) return;
+      one.userData.own ??= one.scale.clone();
+      one.scale.copy(one.userData.own).multiplyScalar(Math.min(1 / viewer.camera.zoom, LARGER));
+    });
+  }
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
     const moving = path.length > 0 && go();
@@ -156,6 +168,7 @@ function startCamera(viewer, panel) {
     if (zoom != viewer.camera.zoom) {
       viewer.camera.zoom = zoom;
       viewer.camera.updateProjectionMatrix();
+      letters(viewer.scene);
     }
     if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
     else viewer.camera.clearViewOffset();
@@ -164,6 +177,7 @@ function startCamera(viewer, panel) {
   };
   return {
     aside,
+    letters,
     look(command) {
       viewer.camera.fov = command.fov;
       viewer.camera.position.fromArray(command.position);
@@ -172,7 +186,7 @@ function startCamera(viewer, panel) {
       anew = true;
     },
     follow(command) {
-      path = command.node.split("/").filter((name) => name);
+      path = names(command.node);
       from.fromArray(command.from);
       begin.fromArray(command.begin);
       smooth = command.smooth;

@@ -76,11 +76,10 @@ function startTheme(viewer, legend) {
   return {
     ask: ({name}) => { asked = name; look(); },
     colour: (code) => dark ? `#${shade(number(code)).toString(16).padStart(6, "0")}` : code,
-    // what a command of meshcat's has changed
-    after({type, path}) {
+    // what a command of meshcat's has changed; made: the object that it has made, if any
+    after({type, path}, made) {
       if (type == "set_property" && path == "/Background" && dark) stage();
-      const parts = path?.split("/").filter((name) => name);
-      if (type == "set_object" && dark) viewer.scene_tree.find([...parts, "<object>"]).object.traverse(paint);
+      if (made && dark) made.traverse(paint);
     },
   };
 }
