@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
-from floatbase._arrays import Array, checked, positive
+from floatbase._arrays import checked, positive
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.qp import RowLabel, Solution
@@ -141,7 +141,7 @@ def _unit_curl(colour: RGB, on_top: bool) -> Shape:
     return lowering.mesh(*geometry.merged([ring, *heads]), colour, on_top=on_top)
 
 
-def _head(angle: float) -> tuple[Array, npt.NDArray[np.int64]]:
+def _head(angle: float) -> geometry.Mesh:
     """A head of an arrow on the ring of radius 1 around z, along it."""
     head, faces = geometry.revolved([(0.0, 0.0), (0.17, 0.0), (0.0, 0.42)])
     at = np.array([np.cos(angle), np.sin(angle), 0.0])

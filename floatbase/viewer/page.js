@@ -119,7 +119,7 @@ const LAG = 0.3;  // s by which the camera is behind what it follows, so that it
 const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
 const WIDE = 1.2;  // width over height of a picture into which the robot fits; a narrower one shows it smaller
 const LEAST = 0.2;  // zoom, in the smallest window
-const LARGER = 2;  // times: labels of a picture that is zoomed out are drawn so much larger, at most
+const LARGER = 1.5;  // times: labels of a picture that is zoomed out are drawn so much larger, at most
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
