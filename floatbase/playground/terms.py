@@ -9,15 +9,10 @@ from floatbase._arrays import Array
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.viewer import COM, MEASURED, Picture, below, marks, shapes
 
-SYMBOLS = {
-    "inertia": "M q̈", "velocity": "+ C q̇", "gravity": "+ g", "zeros": "= S τ", "forces": "+ Jᵀλ", "drift": "J̇ q̇",
-    "cones": "nᵀλ ≥ 0",
-}  # fmt: skip
 _PER_ACCELERATION = 0.03  # m of arrow per m/s², of the feet's drift
 _TEXT = 0.06  # height of letters, over the size of the robot
 _LEVER = 0.3  # m, of the force that a torque is drawn as
 _SHORTEST = 5e-3  # m: shorter arrows are not drawn
-
 
 MEANINGS = {  # term: (colour of its arrows, what they are)
     "inertia": (COM, "m a, mass times acceleration"),
@@ -27,6 +22,7 @@ MEANINGS = {  # term: (colour of its arrows, what they are)
     "drift": (COM, "J̇ q̇, drift of the feet"),
 }
 _ROWS = {"inertia": 0.25, "velocity": 0.37, "gravity": 0.49, "zeros": 0.61, "drift": 0.73}  # of words, over the robot's size
+_OF_MASS = ("inertia", "velocity", "gravity")
 _BEHIND = 1.1  # times its size behind its centre of mass, where no arrow stands
 
 
@@ -36,19 +32,21 @@ def arrows(
     scale: float,
     size: float,
     off: tuple[str, ...] = (),
+    mass: float = 1.0,
 ) -> Picture:
-    """The arrows of a term of `SYMBOLS` at the last row of a record; forces and cones are drawn by the viewer itself.
+    """The arrows of a term of `EQUATION` at the last row of a record; forces and cones are drawn by the viewer itself.
 
     A term that is too small to be seen, or that the world does not have, is told in words behind the robot.
     scale: m/N, as the viewer draws forces.
     size: of the robot, m.
-    off: terms that the world does not have.
+    off: terms that the world does not have: gravity and C q̇ have no arrow then.
+    mass: all masses of the world as a multiple of the data sheet's. M q̈, C q̇ and g are drawn with it, as they truly are.
     """
     if term not in MEANINGS:
         return {}
     made = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity, "zeros": _torques, "drift": _drift}
     lacking = term in off and term in ("gravity", "velocity")
-    drawn = {} if lacking else made[term](record, scale, size)
+    drawn = {} if lacking else made[term](record, scale * (mass if term in _OF_MASS else 1.0), size)
     if drawn:
         return below(f"term {term}", drawn)
     words = MEANINGS[term][1].split(",")[0] + (": switched off" if lacking else " ≈ 0")
@@ -70,13 +68,13 @@ def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
         return {}
     first = record.state(0)
     rate = (state.com_velocity - first.com_velocity) / float(record.time[-1] - record.time[0])
-    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "m a", size)
+    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "true m a", size)
 
 
 def _gravity(record: fb.Rollout, scale: float, size: float) -> Picture:
     """The weight, as an arrow that ends at the centre of mass: below it there is the ground."""
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
-    words = shapes.label(at + [0.0, 0.2 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "m g", _TEXT * size)
+    words = shapes.label(at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "true m g", _TEXT * size)
     return {"/m g": shapes.arrow(at - weight, weight, COM, size), "/m g label": words}
 
 
@@ -85,7 +83,7 @@ def _velocity(record: fb.Rollout, scale: float, size: float) -> Picture:
     state = record.final
     force = (state.h - state.replace(v=np.zeros(state.robot.nv)).h)[:3]
     pose = state.frame_pose("base")
-    return _arrow("C v", np.array(pose.translation), scale * pose.rotation @ force, "C q̇", size)
+    return _arrow("C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇", size)
 
 
 def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
