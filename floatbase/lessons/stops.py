@@ -23,7 +23,7 @@ MOST = 100  # combinations that are computed
 _ALONE, _SLOW = 11, 9  # stops of a slider, about; of one that is slow to draw
 _PAIR = (9, 7, 6, 5)  # the same for two sliders: the first with few enough combinations
 _ROUND = (1.0, 2.0, 2.5, 5.0)  # times a power of ten: from stop to stop
-_NEAR = 0.2  # of the way to the next stop: a round number that is nearer to a bound than this is left out
+_NEAR = 0.22  # of the way to the next stop: a round number that is nearer to a bound than this is left out
 DIRECTIONS = {"forwards": 0.0, "to the left": 90.0, "backwards": 180.0, "to the right": 270.0}  # degrees
 _START, _SEEN = 0.1, 1.5  # s: when a recorded push begins, and how long it is seen from then on
 _RATE = 15.0  # pictures a second of a recorded push
@@ -56,7 +56,8 @@ def _round_gaps(width: float, step: float) -> list[float]:
 def of_panel(panel: SliderPanel) -> dict[str, tuple[float, ...]]:
     """The stops of each slider of a panel: those that the lesson gives, else round ones."""
     many = _PAIR if len(panel.sliders) == 2 else (_ALONE,)
-    found = [{name: _of_slider(slider, panel.stops.get(name), about) for name, slider in panel.sliders.items()} for about in many]
+    sliders = panel.sliders.items()
+    found = [{name: _of_slider(slider, panel.stops.get(name), about) for name, slider in sliders} for about in many]
     return next((stops for stops in found if math.prod(map(len, stops.values())) <= MOST), found[0])
 
 
@@ -90,11 +91,14 @@ def computed(panel: SliderPanel) -> dict[str, Any]:
         note = panel.draw_at({name: values[name][i] for name, i in zip(values, place, strict=True)})
         pack.stop(place, note)
     panel.draw_at(panel.shown())
-    controls = [
-        Control(slider.description.split(" [")[0], tuple(_text(x, slider.readout_format) for x in values[name]), i, unit=_unit(slider))
-        for (name, slider), i in zip(panel.sliders.items(), first, strict=True)
-    ]  # fmt: skip
+    controls = [_control(panel.sliders[name], values[name], i) for name, i in zip(values, first, strict=True)]
     return pack.bundle(controls, together)
+
+
+def _control(slider: Any, values: Sequence[float], first: int) -> Control:
+    """The control of a site for a slider of a panel."""
+    name, _, unit = slider.description.partition(" [")
+    return Control(name, tuple(_text(x, slider.readout_format) for x in values), first, unit=unit.removesuffix("]"))
 
 
 def recorded_pushes(
@@ -124,7 +128,7 @@ def recorded_pushes(
 def _pushed(sim: Simulation, controller: Controller, force: float, towards: float) -> Rollout:
     sim.reset()
     angle = math.radians(towards)
-    push = Push([force * math.cos(angle), force * math.sin(angle), 0.0], _START, 0.1)
+    push = Push(np.array([force * math.cos(angle), force * math.sin(angle), 0.0]), _START, 0.1)
     record = rollout(sim, controller, _START + _SEEN, [push], settle=0.5)
     sim.reset()
     return record
@@ -139,8 +143,3 @@ def _fates(titles: Iterable[str], records: Sequence[Rollout]) -> Iterator[str]:
 
 def _text(value: float, form: str) -> str:
     return format(value + 0.0, form).replace("-", "−")
-
-
-def _unit(slider: Any) -> str:
-    """The unit in a slider's description, "" without one."""
-    return slider.description.partition(" [")[2].removesuffix("]")

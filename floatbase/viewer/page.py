@@ -1,8 +1,8 @@
 """The four pages: the live page, the notebook's page, the file, and the inner page.
 
 The live page and that in a notebook follow a window. The file contains a scene and needs no server. The inner page shows the
-scenes that a page around it gives it, one after the other. All load meshcat's viewer and give it the same messages (see `wire.frame`);
-page.js holds the rest.
+scenes that a page around it gives it, one after the other. All load meshcat's viewer and give it the same messages (see
+`wire.frame`); page.js holds the rest.
 """
 
 from __future__ import annotations

@@ -55,8 +55,8 @@ class Control:
 class Pack:
     """What some viewers show now, and what they show at stops of the controls.
 
-    views: side by side; none where the notes have all there is to see. beside: whether a note stands to their right. words: what
-    stands below, such as that more of it is live only. titles: above each picture.
+    views: side by side; none where the notes have all there is to see. beside: whether a note stands to their right.
+    words: what stands below, such as that more of it is live only. titles: above each picture.
     """
 
     def __init__(
@@ -76,13 +76,15 @@ class Pack:
         self._stops: dict[str, list[Any]] = {}
         self._about = {
             "titles": list(titles), "names": [view.robot.name for view in self._views],
-            "heights": [view.height for view in self._views], "beside": beside, "words": words, "stills": [base64.b64encode(one).decode() for one in self._stills],
-            "first": [[part for entry in first.items() for part in self._numbers(*entry)] for first in self._first],
+            "heights": [view.height for view in self._views], "beside": beside, "words": words,
+            "stills": [base64.b64encode(one).decode() for one in self._stills],
+            "first": [self._changes({}, first) for first in self._first],
         }  # fmt: skip
 
     def stop(self, at: Iterable[int], note: str = "") -> None:
         """What the viewers show now belongs to these stops of the controls, one of each. note: HTML."""
-        changed = [self._changes(first, _entries(view.window.scene)) for first, view in zip(self._first, self._views, strict=True)]
+        scenes = [_entries(view.window.scene) for view in self._views]
+        changed = [self._changes(first, scene) for first, scene in zip(self._first, scenes, strict=True)]
         self._stops[",".join(map(str, at))] = [self._noted(note), *changed]
 
     def bundle(self, controls: Sequence[Control] = (), together: bool = True) -> dict[str, Any]:

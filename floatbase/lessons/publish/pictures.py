@@ -1,7 +1,7 @@
 """Pictures, recordings and panels of a site: what outputs hold of them as HTML, and the files that a browser draws them from.
 
-All share one copy of the viewer, and pictures of a robot one copy of its meshes. Every file but the viewer's is named after what
-it holds, so that files of an earlier build still fit. They are scripts, which a browser also loads where there is no server.
+All share one copy of the viewer, and pictures of a robot one copy of its meshes. Every file but the viewer's is named after
+what it holds, so files of an earlier build still fit. They are scripts, which a browser also loads where there is no server.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NEEDS = "This turns and moves where JavaScript is on."
 
 
 class Pictures:
-    """The pictures of a site. folder: of the built site, from which pictures.js is served; its folder `pictures` gets the files."""
+    """The pictures of a site. folder: that of pictures.js in the built site; the files come into `pictures` inside it."""
 
     def __init__(self, folder: Path):
         self._folder = folder / _FOLDER
@@ -59,7 +59,7 @@ class Pictures:
             self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
     def _groups(self) -> dict[str, list[bytes]]:
-        """Large commands that several pictures have: name of a file -> commands. Each file is for pictures of the same robots."""
+        """Large commands that several pictures have, name of a file -> commands; a file for each set of robots."""
         pictures = [(set(about["names"]), set(commands)) for about, commands in self._placed.values()]
         uses = Counter(command for _, commands in pictures for command in commands if len(command) >= _LEAST)
         robots: dict[bytes, set[str]] = {command: set() for command, times in uses.items() if times > 1}
@@ -110,11 +110,13 @@ def _control(control: dict[str, Any]) -> str:
     if control["kind"] == "switch":
         return f'<label class="floatbase-switch"><input type="checkbox" disabled{" checked" if first else ""}>{named}</label>'
     if control["kind"] == "choice":
-        options = "".join(f"<option{' selected' if i == first else ''}>{html.escape(v)}</option>" for i, v in enumerate(control["values"]))
+        texts = [html.escape(value) for value in control["values"]]
+        options = "".join(f"<option{' selected' if i == first else ''}>{text}</option>" for i, text in enumerate(texts))
         return f"<label><span>{named}</span><select disabled>{options}</select></label>"
     values = html.escape(json.dumps(control["values"], ensure_ascii=False))
     now = html.escape(control["values"][first])
+    last = len(control["values"]) - 1
     return (
-        f'<label><span>{named}</span><input type="range" min="0" max="{len(control["values"]) - 1}" value="{first}" disabled '
-        f'aria-label="{named}" aria-valuetext="{now} {unit}" data-unit="{unit}" data-values="{values}"><output>{now}</output></label>'
+        f'<label><span>{named}</span><input type="range" min="0" max="{last}" value="{first}" disabled aria-label="{named}" '
+        f'aria-valuetext="{now} {unit}" data-unit="{unit}" data-values="{values}"><output>{now}</output></label>'
     )
