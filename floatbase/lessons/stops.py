@@ -29,6 +29,7 @@ _START, _SEEN = 0.1, 1.5  # s: when a recorded push begins, and how long it is s
 _RATE = 15.0  # pictures a second of a recorded push
 _ONLY = "The site has {}; the live lesson has all values between."
 _ONE = " Here one slider moves at a time: the others go back to where they began."
+_FATES = {"completed": "it stands", "fell": "it falls", "controller failed": "its controller finds no answer, and it falls"}
 RECORDED = "Recorded. In the live lesson you push while it runs, in any direction."
 
 
@@ -110,13 +111,13 @@ def recorded_pushes(
     """
     sizes, views = tuple(forces), [view for view, *_ in titles.values()]
     pack = Pack(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
+    for k in range(len(directions)):
+        pack.stop((0, k))
     for (i, force), (k, direction) in product(enumerate(sizes), enumerate(directions)):
         records = [_pushed(sim, controller, force, DIRECTIONS[direction]) for _, sim, controller in titles.values()]
         for view, record in zip(views, records, strict=True):
             view.play(record, rate=_RATE, cones=False)
         pack.stop((i + 1, k), ", ".join(_fates(titles, records)))
-    for k in range(len(directions)):
-        pack.stop((0, k))
     return pack.bundle(
         [
             Control("push", ("0", *(f"{force:.0f}" for force in sizes)), 0, unit="N"),
@@ -137,7 +138,7 @@ def _pushed(sim: Simulation, controller: Controller, force: float, towards: floa
 def _fates(titles: Iterable[str], records: Sequence[Rollout]) -> Iterator[str]:
     """What became of each, in words."""
     for title, record in zip(titles, records, strict=True):
-        fate = {"completed": "it stands", "fell": "it falls"}.get(record.outcome, record.outcome)
+        fate = _FATES.get(record.outcome, record.outcome)
         yield fate if len(records) == 1 else f"{title}: {fate}"
 
 
