@@ -27,7 +27,7 @@ _NEAR = 0.22  # of the way to the next stop: a round number that is nearer to a 
 DIRECTIONS = {"forwards": 0.0, "to the left": 90.0, "backwards": 180.0, "to the right": 270.0}  # degrees
 _START, _SEEN = 0.1, 1.5  # s: when a recorded push begins, and how long it is seen from then on
 _RATE = 15.0  # pictures a second of a recorded push
-_ONLY = "The site has {}; the live lesson has all values between."
+_ONLY = "Computed for these stops; in the live lesson the sliders have all values between."
 _ONE = " Here one slider moves at a time: the others go back to where they began."
 _FATES = {"completed": "it stands", "fell": "it falls", "controller failed": "its controller finds no answer, and it falls"}
 RECORDED = "Recorded. In the live lesson you push while it runs, in any direction."
@@ -85,7 +85,7 @@ def computed(panel: SliderPanel) -> dict[str, Any]:
     now = {name: float(slider.value) for name, slider in panel.sliders.items()}
     first = [stops.index(now[name]) for name, stops in values.items()]
     at, together = places([len(stops) for stops in values.values()], first)
-    words = _ONLY.format("these stops") + ("" if together else _ONE)
+    words = _ONLY + ("" if together else _ONE)
     panel.draw_at(panel.shown())
     pack = Pack([panel.view] if panel.view else [], beside=panel.beside, words=words)
     for place in at:

@@ -112,7 +112,7 @@ def _control(control: dict[str, Any]) -> str:
     if control["kind"] == "choice":
         texts = [html.escape(value) for value in control["values"]]
         options = "".join(f"<option{' selected' if i == first else ''}>{text}</option>" for i, text in enumerate(texts))
-        return f"<label><span>{named}</span><select disabled>{options}</select></label>"
+        return f'<label class="floatbase-choice"><span>{named}</span><select disabled>{options}</select></label>'
     values = html.escape(json.dumps(control["values"], ensure_ascii=False))
     now = html.escape(control["values"][first])
     last = len(control["values"]) - 1

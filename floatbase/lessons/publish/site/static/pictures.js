@@ -140,6 +140,7 @@ const floatbasePictures = (() => {
     const scenes = [...figure.querySelectorAll(".floatbase-scene > div")].map((place) => startScene(place, about));
     const show = (stops) => {
       const [number, ...changes] = about.stops[stops.join(",")] ?? [null, ...first.map(() => [])];
+      note.style.minHeight = `${note.offsetHeight}px`; // so that a shorter note does not move the sliders
       if (number !== null) note.innerHTML = about.notes[number];
       scenes.forEach((scene, i) => scene.show(over(first[i], changes[i])));
     };
