@@ -196,8 +196,8 @@ FORMULAS = (
     ),
     Formula(
         "(28)", "§4.2", "friction cone",
-        r"\alpha_{/\!/} \le \mu\,\alpha_\perp",
-        r"A contact holds as long as the force along the ground, $\alpha_{/\!/}$, is at most μ times the force along the normal, "
+        r"\alpha_\parallel \le \mu\,\alpha_\perp",
+        r"A contact holds as long as the force along the ground, $\alpha_\parallel$, is at most μ times the force along the normal, "
         r"$\alpha_\perp$. All forces that do so form a cone.",
     ),
     Formula(
