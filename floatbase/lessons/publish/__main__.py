@@ -19,8 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stored.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
     commands.add_parser("map", help="write equations.md, conventions.md and the README's table of lessons")
     shown = commands.add_parser("site", help="run the lessons and build the web site")
-    shown.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="those to run; all by default")
-    shown.add_argument("--stored", action="store_true", help="run none but those named; show what the others' notebooks hold")
+    shown.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="those that it has; all by default")
+    shown.add_argument("--stored", action="store_true", help="run none; show what the notebooks hold")
     shown.add_argument("--to", type=Path, metavar="FOLDER", help="where to write, build/site by default")
     rosed = commands.add_parser("roses", help="measure the push roses of lessons, such as 05, anew")
     rosed.add_argument("lessons", nargs="+", metavar="LESSON")
@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "map":
             _map()
         elif given.command == "site":
-            _site(given.lessons if given.lessons or given.stored else None, given.to)
+            _site(given.lessons or None, given.to, given.stored)
         elif given.command == "roses":
             _roses(given.lessons)
         else:
@@ -64,10 +64,10 @@ def _roses(lessons: Sequence[str]) -> None:
         print(f"{lesson}: {measure_rose(lesson)}")
 
 
-def _site(lessons: Sequence[Path] | None, folder: Path | None) -> None:
+def _site(lessons: Sequence[Path] | None, folder: Path | None, stored: bool) -> None:
     from floatbase.lessons.publish import site
 
-    print(site.build(folder or site.SITE, lessons))
+    print(site.build(folder or site.SITE, lessons, stored))
 
 
 if __name__ == "__main__":

@@ -65,9 +65,9 @@ def table() -> str:
     lines = [
         "# The map: equation → function → test → lesson",
         "",
-        "Every equation of the document *Controlling Floating-Based Robots* that the course follows, section by section, in our own",
-        "words. Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish map`; do not edit. A function such as",
-        "`dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
+        "Every equation of the document *Controlling Floating-Based Robots* that the course follows, section by section, in",
+        "our own words. Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish map`; do not edit. A",
+        "function such as `dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
     ]
     for section in SECTIONS:
         lines += ["", f"## {section.number} {section.title}", "", section.about]
@@ -79,7 +79,7 @@ def table() -> str:
 
 
 def _written_out(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:
-    """An equation in lines of Markdown: formula, meaning, functions, lessons, tests. An appendix is its section's only formula."""
+    """An equation in lines of Markdown: formula, meaning, functions, lessons, tests. An appendix has one, unnumbered."""
     appendix = formula.number == formula.section
     tests = sorted({test.split("::")[0] for entry in found for test in entry.tests})
     tag = "" if appendix else f" \\tag{{{formula.number.strip('()')}}}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from nbformat.v4 import new_code_cell, new_notebook
 
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import conventions, equations
@@ -25,6 +25,7 @@ SITE = Path("build/site")
 _OWN = Path(__file__).parent  # texts and static files of the site
 _ROOT = FOLDER.parent
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
+_TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 _ABOUT = {
@@ -39,24 +40,25 @@ _ABOUT = {
 }
 
 
-def build(folder: Path = SITE, lessons: Sequence[Path] | None = None) -> Path:
+def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
     """Write the site into `folder`; the path of its first page.
 
-    lessons: those to run; the others are shown with what their notebooks hold. All by default. Raises `InputError` when there is
-    no such lesson, `FloatbaseError` when Sphinx finds a fault.
+    lessons: those that it has, all by default. stored: run none of them, and show what their notebooks hold. Raises
+    `InputError` when there is no such lesson, `FloatbaseError` when Sphinx finds a fault.
     """
     known = sorted(FOLDER.glob("*.ipynb"))
-    chosen = known if lessons is None else [path.resolve() for path in lessons]
-    for path in chosen:
+    shown = known if lessons is None else sorted(path.resolve() for path in lessons)
+    for path in shown:
         if path not in known:
             raise InputError(f"there is no lesson {path}; the course's lessons are in {FOLDER}.")
     folder = folder.resolve()
     source, kept = folder.with_name(f"{folder.name}-source"), folder.with_name(f"{folder.name}-run")
     shutil.rmtree(source, ignore_errors=True)
     shutil.copytree(_OWN, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-    ran = run_all([*chosen, _scene(kept)], kept)
+    *notebooks, scene = run_all([*([] if stored else shown), _scene(kept)], kept).values()
     pictures = Pictures(source / "static")
-    _lessons(source / "lessons", known, ran, pictures)
+    _lessons(source, dict(zip(shown, notebooks or map(read, shown), strict=True)), pictures)
+    _first_page(source, shown, _picture(scene, pictures))
     _texts(source)
     (source / "api").mkdir()
     for name, text in reference.pages().items():
@@ -80,28 +82,42 @@ def _scene(kept: Path) -> Path:
     return path
 
 
-def _lessons(target: Path, known: Sequence[Path], ran: dict[Path, Any], pictures: Pictures) -> None:
-    """The lessons, the page of each, and the picture of the first page."""
-    addresses = {path.name.split("_")[0]: path.name for path in known}
-    target.mkdir()
-    for path in known:
-        nbformat.write(prepared(ran[path] if path in ran else read(path), pictures, addresses), target / path.name)
-    first = target.parent / "index.md"
-    (scene,) = (notebook for path, notebook in ran.items() if path not in known)
-    text = first.read_text(encoding="utf-8")
-    first.write_text(text.replace("{scene}", _picture(scene, pictures, target)).replace("{lessons}", _table(known)), "utf-8")
+def _lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures) -> None:
+    """The page of each lesson."""
+    addresses = {path.name.split("_")[0]: path.name for path in notebooks}
+    (source / "lessons").mkdir()
+    for path, notebook in notebooks.items():
+        nbformat.write(prepared(notebook, pictures, addresses), source / "lessons" / path.name)
 
 
-def _picture(notebook: Any, pictures: Pictures, target: Path) -> str:
-    """The first picture of a notebook as Markdown."""
+def _picture(notebook: Any, pictures: Pictures) -> str:
+    """The first picture of a notebook, as Markdown; an image where it cannot be placed."""
     data = next(output.data for cell in notebook.cells for output in cell.outputs if "data" in output)
     placed = pictures.place(data)
-    return f"```{{raw}} html\n{placed}\n```" if placed else "![A go2 stands on four feet](first_page.png)"
+    image = f'<img alt="go2 stands on four feet" src="data:image/png;base64,{data.get("image/png")}">'
+    return f"```{{raw}} html\n{placed or image}\n```"
+
+
+def _first_page(source: Path, lessons: Sequence[Path], scene: str) -> None:
+    """The texts of the first page, with its picture and the lists of lessons."""
+    listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
+    listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
+    toctrees = [
+        "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *(f"lessons/{path.stem}" for path in paths), "```"])
+        for caption, paths in listed.items()
+    ]
+    text = (source / "index.md").read_text(encoding="utf-8")
+    for name, part in {"scene": scene, "lessons": _table(lessons), "toctrees": "\n\n".join(toctrees)}.items():
+        text = text.replace(f"{{{name}}}", part)
+    (source / "index.md").write_text(text, encoding="utf-8")
+    for path in source.glob("*.md"):
+        addresses = {lesson.name.split("_")[0]: f"lessons/{lesson.name}" for lesson in lessons}
+        path.write_text(linked(path.read_text(encoding="utf-8"), addresses), encoding="utf-8")
 
 
 def _table(known: Iterable[Path]) -> str:
     rows = [f"| [{title_of(path)}](lessons/{path.name}) | {equations_of(path)} |" for path in known]
-    return linked("\n".join(["| lesson | equations |", "|---|---|", *rows]), {})
+    return "\n".join(["| lesson | equations |", "|---|---|", *rows])
 
 
 def _texts(source: Path) -> None:
@@ -113,9 +129,10 @@ def _texts(source: Path) -> None:
         "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace("(notebooks/", "(lessons/"),
         **{f"benchmarks/{path.name}": path.read_text(encoding="utf-8") for path in _ROOT.glob("benchmarks/*.md")},
     }
+    shown = {path.name.split("_")[0]: path.name for path in (source / "lessons").glob("*.ipynb")}
     for name, text in texts.items():
         about = f'---\nmyst:\n  html_meta:\n    description: "{_ABOUT[Path(name).stem]}"\n---\n'
-        (source / name).write_text(about + linked(text, {}), encoding="utf-8")
+        (source / name).write_text(about + linked(text, shown), encoding="utf-8")
     for path in _ROOT.glob("benchmarks/*.png"):
         shutil.copy(path, source / "benchmarks")
 
@@ -128,6 +145,13 @@ def _with_anchors(page: str) -> str:
         address = known.get(f"floatbase.{match[1]}")
         return f"{{py:obj}}`{match[1]} <{address}>`" if address else match[0]
 
+    def fold(match: re.Match[str]) -> str:
+        files = match[1].replace("`", "").split(", ")
+        listed = " ".join(f"<code>{file}</code>" for file in files)
+        count = "1 file" if len(files) == 1 else f"{len(files)} files"
+        return f'- <details class="tests"><summary>tests that use them, in {count}</summary>{listed}</details>'
+
+    page = _TESTS.sub(fold, page)
     page = page.replace("## Notes of the document", f"({NOTES})=\n## Notes of the document")
     return _FUNCTIONS.sub(link, _HEADINGS.sub(lambda match: f"({anchor(match[1])})=\n{match[0]}", page))
 

@@ -43,6 +43,7 @@ html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
     "use_download_button": False,
+    "navbar_persistent": [],  # search stands in the side bar
     "use_fullscreen_button": False,
     "show_navbar_depth": 1,
     "home_page_in_toc": True,

@@ -1,10 +1,11 @@
-"""The package's docstrings, which are plain text, as what Sphinx reads: lists of parameters, links, code, nothing else special."""
+"""The package's docstrings, which are plain text, as what Sphinx reads: lists of parameters, links, code, and no more."""
 
 from __future__ import annotations
 
 import inspect
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 from floatbase.lessons.publish.site.reference import addresses
@@ -24,10 +25,8 @@ def process_docstring(app: Any, what: str, name: str, value: Any, options: Any, 
 def parameters(value: Any) -> set[str]:
     """The names that a docstring may explain: parameters of a function, of a class and its fields."""
     names = set(getattr(value, "__annotations__", ()))
-    try:
+    with suppress(TypeError, ValueError):  # a module or a property takes nothing
         names |= set(inspect.signature(value).parameters)
-    except (TypeError, ValueError):
-        pass  # a module or a property takes nothing
     return names - {"self", "return"}
 
 

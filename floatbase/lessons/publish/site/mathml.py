@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import logging
 import re
 from collections.abc import Iterable
 from importlib.util import find_spec
@@ -16,6 +17,7 @@ from latex2mathml.converter import convert
 from floatbase.errors import ViewerError
 
 FONT = "formulas.woff"  # in the site's static files
+logging.getLogger("fontTools").setLevel(logging.WARNING)  # it tells each step
 _TAG = re.compile(r"\\tag\{(.*?)\}")
 _MATHML = re.compile(r"<math.*?</math>", re.DOTALL)
 # what the converter leaves out: brackets grow with their own matrix only, dots stand near, and what is below min stands below

@@ -1,4 +1,4 @@
-"""Lessons as they stand on the site: run, with pictures that need no kernel, and words in place of what only a kernel can do."""
+"""Lessons as they stand on the site: run, with pictures that need no kernel, and words in place of what needs one."""
 
 from __future__ import annotations
 
@@ -67,7 +67,11 @@ def _run(path: Path, file: Path) -> Path:
 
 def _digest_of_package() -> bytes:
     package = Path(floatbase.__file__).parent
-    files = (path for path in sorted(package.rglob("*.*")) if "publish" not in path.parts and path.suffix in (".py", ".json", ".js", ".html"))
+    files = (
+        path
+        for path in sorted(package.rglob("*.*"))
+        if "publish" not in path.parts and path.suffix in (".py", ".json", ".js", ".html")
+    )
     return b"".join(path.read_bytes() for path in files)
 
 
@@ -121,15 +125,17 @@ def _live(text: str) -> str:
 
 def _question(cell: Any) -> str:
     """What a prediction asks for, in words."""
-    call = next(node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict")
+    call = next(
+        node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
+    )
     given = {keyword.arg: ast.literal_eval(keyword.value) for keyword in call.keywords}
     if "choices" in given:
         wanted = " or ".join(f"*{choice}*" for choice in given["choices"])
     else:
         count, unit = given.get("count", 1), given.get("unit", "")
         wanted = ("a number" if count == 1 else f"{count} numbers") + (f", in {unit}" if unit else "")
-    name = ast.literal_eval(call.args[0])
-    return f":::{{div}} live\n**{name}**, your prediction: {wanted}. Typing it in needs [the live lesson]({LIVE}); here, think first.\n:::"
+    asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
+    return f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({LIVE}); here, think first.\n:::"
 
 
 def _shown(output: Any, pictures: Placing) -> list[Any]:

@@ -41,9 +41,9 @@ def pages() -> dict[str, str]:
 
 
 _FRONT = (
-    "``import floatbase as fb`` has the names that most programs need; everything else is imported from its room. Each page lists "
-    "what its room exports. A number such as :ref:`(9) <eq-9>` leads to the equation; symbols, frames, signs and units are those of "
-    ":doc:`the conventions </lessons/conventions>`."
+    "``import floatbase as fb`` has the names that most programs need; everything else is imported from its room. Each page "
+    "lists what its room exports. A number such as :ref:`(9) <eq-9>` leads to the equation; symbols, frames, signs and units "
+    "are those of :doc:`the conventions </lessons/conventions>`."
 )
 
 
@@ -87,13 +87,17 @@ def _explains(member: Any) -> bool:
     return is_code and bool(inspect.getdoc(member))
 
 
+def _is_code(value: Any) -> bool:
+    return inspect.isclass(value) or inspect.isroutine(value) or hasattr(value, "__wrapped__")
+
+
 def _page(room: str) -> str:
     head = f"{_meta(room)}{_title(room)}.. automodule:: {room}\n   :no-members:\n\n"
     if room == "floatbase":
         known = addresses()
         return head + _table([(f"fb.{name}", known[name], getattr(floatbase, name)) for name in floatbase.__all__])
     things = [(name, f"{room}.{name}", value) for name, value in exported(room)]
-    shown = [(name, address, value) for name, address, value in things if callable(value) or isinstance(value, ModuleType)]
+    shown = [(name, address, value) for name, address, value in things if _is_code(value) or isinstance(value, ModuleType)]
     return head + _table(shown) + "\n".join(_entry(*thing) for thing in things)
 
 
@@ -123,8 +127,12 @@ def _entry(name: str, address: str, value: Any) -> str:
         return head + "\n".join(_entry(inner, f"{address}.{inner}", each) for inner, each in exported(value.__name__))
     if inspect.isclass(value):
         kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
-        return f".. {kind}:: {address}\n   :members: {', '.join(members(value)) or '__none__'}\n" if members(value) else f".. {kind}:: {address}\n"
-    if inspect.isroutine(value) or hasattr(value, "__wrapped__"):
+        return (
+            f".. {kind}:: {address}\n   :members: {', '.join(members(value)) or '__none__'}\n"
+            if members(value)
+            else f".. {kind}:: {address}\n"
+        )
+    if _is_code(value):
         return f".. autofunction:: {address}\n"
     text = repr(value)
     shown = f"\n   :value: {text}" if len(text) <= _LONGEST and "\n" not in text and " at 0x" not in text else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 from floatbase.lessons.publish.formulas import FORMULAS, SECTIONS
 
@@ -13,9 +14,10 @@ _SECTIONS = {section.number for section in SECTIONS}
 # what is left as it is: code, formulas, links, headings, HTML, fences
 _KEPT = r"```.*?```|`[^`\n]*`|\$\$.+?\$\$|\$[^$\n]+?\$|!?\[[^\]\n]*\]\([^)\n]*\)|^#.*?$|<[^>\n]+>"
 NAMED = re.compile(
-    r"(?<![\w\]])(?P<equation>\(\d{1,2}\))|(?P<section>§\d(?:\.\d)?)|(?P<appendix>App(?:\.|endix) [ABC])\b|(?P<note>\bnotes? \d+)"
-    r"|(?P<lesson>\b[Ll]esson (?:\d\d|[A-Z])\b)"
+    r"(?<![\w\]])(?P<equation>\(\d{1,2}\))|(?P<section>§\d(?:\.\d)?)|(?P<appendix>App(?:\.|endix) [ABC])\b"
+    r"|(?P<note>\bnotes? \d+)|(?P<lesson>\b[Ll]esson (?:\d\d|[A-Z])\b)"
 )
+_TO_LESSON = re.compile(r"\[([^\]]*)\]\((?:lessons/)?([^:()/]+\.ipynb)\)")
 _IN_MARKDOWN = re.compile(f"(?P<kept>{_KEPT})|{NAMED.pattern}", re.DOTALL | re.MULTILINE)
 
 
@@ -35,15 +37,17 @@ def place(match: re.Match[str]) -> str:
 
 
 def linked(markdown: str, lessons: Mapping[str, str]) -> str:
-    """Markdown with links to the map and to lessons. lessons: number -> address, such as "05" -> "05_centre_of_mass.ipynb"."""
+    """Markdown with links to the map and to lessons; what links to a lesson that is not there is text.
+
+    lessons: number -> address, such as "05" -> "05_centre_of_mass.ipynb".
+    """
+    names = {Path(address).name for address in lessons.values()}
 
     def link(match: re.Match[str]) -> str:
         if match["kept"]:
-            return match[0]
-        if match["lesson"]:
-            address = lessons.get(match["lesson"].split()[1])
-        else:
-            address = f"#{place(match)}" if place(match) else None
-        return f"[{match[0]}]({address})" if address else match[0]
+            to_lesson = _TO_LESSON.fullmatch(match[0])
+            return to_lesson[1] if to_lesson and to_lesson[2] not in names else match[0]
+        address = lessons.get(match["lesson"].split()[1], "") if match["lesson"] else f"#{place(match)}"
+        return f"[{match[0]}]({address})" if len(address) > 1 else match[0]
 
     return _IN_MARKDOWN.sub(link, markdown)
