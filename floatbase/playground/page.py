@@ -22,7 +22,7 @@ from floatbase.playground.settings import GAITS, IDEAL, Settings
 from floatbase.playground.terms import SYMBOLS, arrows
 from floatbase.robots import Robot
 from floatbase.simulation import SEEN, Live, advice
-from floatbase.viewer import Picture, push_at
+from floatbase.viewer import Picture, published, push_at
 
 _HARDEST = 2.5  # times the weight: a push that asks for steps
 _PAIRS = {  # name: (attribute, low, high, step)
@@ -41,6 +41,7 @@ _OFF = {  # term: (switch in the belief, switch in the world)
 }
 _WEIGHTS = ("motion", "posture", "effort")
 _FREE = "play freely"
+_STILL = "The playground needs the live lesson: here its robot stands still."
 
 
 class Playground:
@@ -364,6 +365,9 @@ class Playground:
         return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        if published.display() == "site":
+            self.view.show(self.session.sim.state, self.session.sim.feet)
+            return published.Pack([self.view], words=_STILL).bundle()
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
