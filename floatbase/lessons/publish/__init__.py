@@ -8,13 +8,13 @@ from floatbase.lessons.publish.notebooks import execute, read, run, solved
 from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare
 
 if TYPE_CHECKING:
-    from floatbase.lessons.publish import conventions, equations, pages, prose
+    from floatbase.lessons.publish import conventions, equations, site
 
-_PARTS = ("conventions", "equations", "pages", "prose")  # imported at first use; the last two need the extra `pages`
+_PARTS = ("conventions", "equations", "site")  # imported at first use; the last needs the extra `site`
 
 __all__ = [
-    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "lesson_table", "pages", "prepare", "prose", "read",
-    "readme_with_table", "run", "solved", "title_of",
+    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "lesson_table", "prepare", "read",
+    "readme_with_table", "run", "site", "solved", "title_of",
 ]  # fmt: skip
 
 
