@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import floatbase
-from floatbase.lessons.publish.site.docstrings import process_docstring
+from floatbase.lessons.publish.site.docstrings import process_docstring, process_signature
 from floatbase.lessons.publish.site.mathml import visit_displaymath, visit_math
 
 project = "floatbase"
@@ -54,4 +54,5 @@ def setup(app: Any) -> dict[str, Any]:
     """What Sphinx calls first."""
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_displaymath, None))
     app.connect("autodoc-process-docstring", process_docstring)
+    app.connect("autodoc-process-signature", process_signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

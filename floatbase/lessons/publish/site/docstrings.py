@@ -8,11 +8,14 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
+from sphinx.util.inspect import stringify_signature
+
 from floatbase.lessons.publish.site.reference import addresses
 from floatbase.lessons.publish.site.words import NAMED, place
 
 _SPAN = re.compile(r"``?([^`]+)``?")
 _SPECIAL = re.compile(r"([\\*_|])")
+_NAME = re.compile(r"\b(npt\.|np\.|fb\.)?([A-Z]\w*)\b")
 _LINE = re.compile(r"^(?:-+|=+)$")
 
 
@@ -22,12 +25,34 @@ def process_docstring(app: Any, what: str, name: str, value: Any, options: Any, 
     lines[:] = restructured("\n".join(lines), parameters(value), own).splitlines() + [""]
 
 
+def process_signature(app: Any, what: str, name: str, value: Any, options: Any, signature: Any, returns: Any) -> Any:
+    """Sphinx's event autodoc-process-signature: types as the source writes them, "Array" and not what stands behind it."""
+    if getattr(value, "_is_protocol", False):
+        return "", None
+    if signature is None or what in ("property", "attribute", "data"):
+        return signature, returns
+    found = inspect.signature(value)
+    given = list(found.parameters.values())
+    shown = given[1:] if what == "method" and given and given[0].name in ("self", "cls") else given
+    typed = [one.replace(annotation=_typed(one.annotation)) for one in shown]
+    returned = None if what == "class" or found.return_annotation is found.empty else _typed(found.return_annotation)
+    return stringify_signature(inspect.Signature(typed)).replace("<factory>", "…"), returned
+
+
+def _typed(annotation: Any) -> Any:
+    """A type as its source writes it, with the names that have a place in the site linked."""
+    if not isinstance(annotation, str):
+        return annotation
+    known = addresses()
+    return _NAME.sub(lambda match: f"~{known[match[2]]}" if match[2] in known else match[2], annotation)
+
+
 def parameters(value: Any) -> set[str]:
-    """The names that a docstring may explain: parameters of a function, of a class and its fields."""
-    names = set(getattr(value, "__annotations__", ()))
+    """The names that a docstring may explain: parameters of a function, those of a class, its fields and its members."""
+    names = {*getattr(value, "__annotations__", ())} | {*(vars(value) if inspect.isclass(value) else ())}
     with suppress(TypeError, ValueError):  # a module or a property takes nothing
         names |= set(inspect.signature(value).parameters)
-    return names - {"self", "return"}
+    return {name for name in names if not name.startswith("_")} - {"self", "return"}
 
 
 def restructured(text: str, names: Iterable[str], own: str = "") -> str:
