@@ -1,15 +1,15 @@
-# `make lab` opens the course, `make test` checks everything, `make pages` writes the lessons as HTML. All first make .venv, from
-# the exact lock in environment.txt.
+# `make lab` opens the course, `make test` checks everything, `make site` builds the web site. All first make .venv, from the exact
+# lock in environment.txt.
 #
 #   PYTHON=…       the Python to use, such as python3.12 or a path; without it that of .venv, or the first of python3, python3.13, …
 #                  that fits
 #   LAB_ARGS=…     more options for JupyterLab, such as --no-browser or --port=9000
-#   PAGES_ARGS=…   options for the pages, such as "--to DIR" or "notebooks/01_floating_base.ipynb"
+#   SITE_ARGS=…    options for the site, such as "--to DIR" or "notebooks/01_floating_base.ipynb"
 #   PYTEST_ARGS=…  more options for pytest, such as "-k friction", tests/control, "--seed 1" or "-n 4"
 #   LOCK_ARGS=…    more options for `uv pip compile`, such as --upgrade
 
 .DEFAULT_GOAL := help
-.PHONY: help lab test pages setup lock clean python
+.PHONY: help lab test site setup lock clean python
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -48,7 +48,7 @@ PROGRESS := n=0; while read -r what which rest; do case "$$what $$which" in \
 help:
 	@echo "make lab     open the course in JupyterLab"
 	@echo "make test    run ruff, mypy, the tests and the notebooks"
-	@echo "make pages   write each lesson as one HTML page, into build/pages"
+	@echo "make site    run the lessons and build the web site, into build/site"
 	@echo "make setup   only make .venv"
 	@echo "make lock    write environment.txt anew from pyproject.toml"
 	@echo "make clean   remove .venv and everything else that was made"
@@ -66,8 +66,8 @@ test: $(VENV)/tests-$(KEY)
 	$(BIN)/mypy
 	$(BIN)/python -m pytest $(WORKERS) --durations=30 $(PYTEST_ARGS)
 
-pages: $(VENV)/tests-$(KEY)
-	$(BIN)/python -m floatbase.lessons.publish pages $(PAGES_ARGS)
+site: $(VENV)/tests-$(KEY)
+	$(BIN)/python -m floatbase.lessons.publish site $(SITE_ARGS)
 
 setup: $(VENV)/ready-$(KEY)
 
@@ -87,9 +87,9 @@ $(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 	@$(BIN)/python -m floatbase compile >/dev/null 2>&1 || $(BIN)/python -m floatbase compile
 	@touch $@
 
-# what only tests and pages need
+# what only tests and the site need
 $(VENV)/tests-$(KEY): $(VENV)/ready-$(KEY)
-	@echo "Adding to $(VENV) what only tests need."
+	@echo "Adding to $(VENV) what only tests and the site need."
 	@$(PIP) install -q -r environment.txt
 	@touch $@
 
@@ -106,7 +106,7 @@ lock: | python
 	"$(BASE)" -m venv build/uv
 	build/uv/bin/python -m pip --disable-pip-version-check install -q uv
 	build/uv/bin/uv pip compile -q --universal --python-version 3.11 --fork-strategy fewest \
-		--extra course --extra test --extra cluster --extra meshes --extra video --extra pages --extra site --extra hub --no-annotate --no-emit-index-url \
+		--extra course --extra test --extra cluster --extra meshes --extra video --extra site --extra hub --no-annotate --no-emit-index-url \
 		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
 
 clean:

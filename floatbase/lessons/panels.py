@@ -5,16 +5,18 @@ Nothing here waits: a slider calls a quick function, a run has a thread of its o
 
 from __future__ import annotations
 
+import html
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import ipywidgets as widgets
 
 from floatbase.errors import FloatbaseError
+from floatbase.lessons.stops import DIRECTIONS, computed, recorded_pushes
 from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
-from floatbase.viewer import Viewer, push_at, with_image
+from floatbase.viewer import Viewer, published, push_at, with_image
 
 _NARROW = "min(340px, 100%)"  # width below which nothing of a slider is left but its name and its number
 
@@ -25,20 +27,47 @@ class SliderPanel(widgets.VBox):
     """A live picture with sliders, as `slider_panel` makes it.
 
     view: the `Viewer` of the picture, None where the note has all there is to see. sliders: the slider of each name. note: the
-    HTML that tells what a position means.
+    HTML that tells what a position means. beside: whether it stands beside the picture. stops: as for `slider_panel`.
     """
 
-    def __init__(self, view: Viewer | None, sliders: dict[str, widgets.FloatSlider], beside: bool):
+    def __init__(
+        self,
+        view: Viewer | None,
+        draw: Callable[..., str | None],
+        sliders: dict[str, widgets.FloatSlider],
+        beside: bool,
+        stops: Mapping[str, Sequence[float]],
+    ):
         self._picture = widgets.VBox(layout=_wide(62, 380) if beside else widgets.Layout())
         note = widgets.HTML(layout=_wide(30, 270) if beside else widgets.Layout())
         note.layout.padding = "0 0 0 10px" if beside else None
         row = widgets.HBox([self._picture, note], layout=widgets.Layout(flex_flow="row wrap"))
         top = [note] if view is None else [row] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])
-        self.view, self.sliders, self.note = view, sliders, note
+        self.view, self.sliders, self.note, self.beside, self.stops = view, sliders, note, beside, stops
+        self._draw = draw
+        for slider in sliders.values():
+            slider.observe(self._redraw, names="value")
+        self._redraw()
+
+    def shown(self) -> dict[str, float]:
+        """The value of each slider, as it shows it."""
+        return {name: _shown(slider) for name, slider in self.sliders.items()}
+
+    def draw_at(self, values: Mapping[str, float]) -> str:
+        """Draw the picture for these values of the sliders, which stay where they are; the note, HTML."""
+        try:
+            return self._draw(**values) or ""
+        except FloatbaseError as error:
+            return html.escape(str(error))
+
+    def _redraw(self, _: Any = None) -> None:
+        self.note.value = self.draw_at(self.shown())
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The picture is put in only here: by now the camera has been placed, and a still picture keeps that view."""
+        if published.display() == "site":
+            return computed(self)
         self._picture.children = [self.view.widget()] if self.view else []
         return with_image(super()._repr_mimebundle_(**kwargs), *self._picture.children)
 
@@ -53,6 +82,7 @@ def slider_panel(
     draw: Callable[..., str | None],
     wait: bool = False,
     beside: bool = False,
+    stops: Mapping[str, Sequence[float]] | None = None,
     **ranges: tuple[float, float, float] | tuple[float, float, float, str],
 ) -> SliderPanel:
     """The live picture of `view` with one slider for each of `ranges`, in the order in which they are given.
@@ -62,24 +92,14 @@ def slider_panel(
         thread; it draws on `view` and should take a few milliseconds. It may return a note, HTML or plain text.
     wait: call `draw` only when a slider is let go, for a function that takes longer.
     beside: the note stands to the right of the picture; otherwise between the picture and the sliders.
+    stops: name -> values at which the picture is computed for a site, where no kernel draws; round ones by default.
     ranges: name=(lowest, first, highest) or name=(lowest, first, highest, unit). "_" in a name shows as a blank. The step of
         a slider is round and meets all three.
 
     Where `draw` raises an error of the package, its text is the note.
     """
     sliders = {name: _range_slider(name, *bounds, wait=wait) for name, bounds in ranges.items()}
-    panel = SliderPanel(view, sliders, beside)
-
-    def redraw(_: Any = None) -> None:
-        try:
-            panel.note.value = draw(**{name: _shown(slider) for name, slider in sliders.items()}) or ""
-        except FloatbaseError as error:
-            panel.note.value = str(error)
-
-    for slider in sliders.values():
-        slider.observe(redraw, names="value")
-    redraw()
-    return panel
+    return SliderPanel(view, draw, sliders, beside, stops or {})
 
 
 def _range_slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:
@@ -182,13 +202,20 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
     wrapped = widgets.Layout(flex_flow="row wrap")
     aim, bar = (widgets.HBox(parts, layout=wrapped) for parts in ([towards, _button("push", push)], [*buttons, line]))
     rows = [force, aim, speed, bar]
-    return _PushPanel([view.widget(), *rows])
+    return _PushPanel(run, view, most, rows)
 
 
 class _PushPanel(widgets.VBox):
     """A live picture with what pushes its robot, as `push_panel` makes it."""
 
+    def __init__(self, run: Live, view: Viewer, most: float, rows: Sequence[widgets.Widget]):
+        super().__init__([view.widget(), *rows])
+        self._run, self._view, self._most = run, view, most
+
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        if published.display() == "site":
+            forces = [self._most * part / 4 for part in (1, 2, 3, 4)]
+            return recorded_pushes({"": (self._view, self._run.sim, self._run.controller)}, forces, list(DIRECTIONS))
         return with_image(super()._repr_mimebundle_(**kwargs), self.children[0])
 
 

@@ -21,8 +21,9 @@ from floatbase.playground.settings import Settings
 from floatbase.playground.terms import arrows
 from floatbase.robots import Robot
 from floatbase.simulation import GOES_ON, SEEN, Live, advice
-from floatbase.viewer import Picture, push_at
+from floatbase.viewer import Picture, published, push_at
 
+_STILL = "The playground needs the live lesson: here its robot stands still."
 _SHOWN = ("forces", "cones")  # terms that are drawn at first
 
 
@@ -261,6 +262,9 @@ class Playground:
         return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        if published.display() == "site":
+            self.view.show(self.session.sim.state, self.session.sim.feet)
+            return published.Pack([self.view], words=_STILL).bundle()
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:

@@ -88,6 +88,11 @@ class Live:
         return self._status
 
     @property
+    def controller(self) -> Controller:
+        """What gives the torques now."""
+        return self._controller
+
+    @property
     def moves(self) -> bool:
         """Whether the thread moves the robot: while the status is "running", and a little longer after a fall or failure."""
         return not self._stop.is_set()

@@ -2,10 +2,10 @@
 
 `Viewer` draws. `View` says from where it looks. `shapes`, `marks` and `props` make further items for a picture, `walks` draws
 what a walk plans, `plots` makes figures of a rollout, `programs` of quadratic programs in the plane, `roses` shows push roses
-and compasses, and `FIGURES` are the document's figures. `page` and `wire` are for programs that write web pages.
+and compasses, and `FIGURES` are the document's figures. `page`, `published` and `wire` are for programs that write web pages.
 """
 
-from floatbase.viewer import geometry, marks, page, plots, programs, props, recording, roses, shapes, walks, wire
+from floatbase.viewer import geometry, marks, page, plots, programs, props, published, recording, roses, shapes, walks, wire
 from floatbase.viewer.camera import PRESETS, View
 from floatbase.viewer.colours import (
     ALARM,
@@ -68,6 +68,7 @@ __all__ = [
     "plots",
     "programs",
     "props",
+    "published",
     "push_at",
     "recording",
     "robot_meshes",

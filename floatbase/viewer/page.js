@@ -295,10 +295,10 @@ function startRest(viewer) {
   };
 }
 
-// Call start() once, when the page is first seen, and manage its context from then on.
-function startWhenSeen(start) {
+// Call start() once, when the page is first seen, and manage its context from then on. sight: what tells of it, as `onSight`.
+function startWhenSeen(start, sight = onSight) {
   let rest = null, blind = false;
-  onSight((seen) => {
+  sight((seen) => {
     if (rest === null && seen && !blind) {
       window.viewer = viewerOrText();
       blind = viewer === null;
@@ -387,19 +387,25 @@ function draw(scene) {
   viewer.set_3d_pane_size();
 }
 
-// The inner page: it says that it is ready, receives {code, scene}, and answers with a picture or an error. The page around
-// it removes it when it is out of sight.
-function waitForScene() {
+// The inner page: it says that it is ready. The page around it says whether it is near the window, {seen}, and what is to
+// change in the picture, see `change`.
+function waitForScenes() {
+  let near = null, waiting = [];
   window.onmessage = ({data}) => {
-    window.onmessage = null;
-    try {
-      load(data.code);
-      window.viewer = startViewer();
-      draw(data.scene);
-      parent.postMessage({picture: viewer.capture_image()}, "*");
-    } catch (error) {
-      parent.postMessage({failed: String(error)}, "*");
-    }
+    if ("seen" in data) near(data.seen);
+    else if (waiting) waiting.push(data);
+    else change(data);
   };
+  startWhenSeen(() => {
+    waiting.forEach(change);
+    waiting = null;
+  }, (changed) => { near = changed; });
   parent.postMessage({ready: true}, "*");
+}
+
+// ended: whether an animation is over. gone: paths of what is no more. frame: commands.
+function change({ended, gone, frame}) {
+  if (ended) viewer.handle_command({type: "set_animation", path: "", animations: [], options: {play: false}});
+  for (const path of gone) viewer.handle_command({type: "delete", path});
+  draw(frame);
 }

@@ -1,8 +1,8 @@
 """The four pages: the live page, the notebook's page, the file, and the inner page.
 
-The live page and that in a notebook follow a window. The file contains a scene and needs no server. The inner page shows one
-scene in a frame of a page with several scenes. All load meshcat's viewer and give it the same messages (see `wire.frame`);
-page.js holds the rest.
+The live page and that in a notebook follow a window. The file contains a scene and needs no server. The inner page shows the
+scenes that a page around it gives it, one after the other. All load meshcat's viewer and give it the same messages (see
+`wire.frame`); page.js holds the rest.
 """
 
 from __future__ import annotations
@@ -64,18 +64,10 @@ def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
     return _page(f"{text}<script>{_scripts()}open();</script>", title)
 
 
-def scene_in(text: str) -> list[bytes]:
-    """The commands in the text of a file page. Raises `ViewerError` for any other text."""
-    found = re.search(r'id="scene">([^<]*)<', text)
-    if found is None:
-        raise ViewerError("this page contains no scene; Viewer.save writes pages that do.")
-    return wire.unframe(gzip.decompress(base64.b64decode(found.group(1))))
-
-
 @cache
-def inner_page() -> str:
-    """A page for a frame inside another page, which gives it the viewer's code and a scene (see page.js)."""
-    return _page(f"<script>{_scripts()}waitForScene();</script>", "floatbase")
+def inner_page(code: str) -> str:
+    """A page for a frame inside another page, which gives it scenes (see page.js). code: address of meshcat's viewer."""
+    return _page(f'<script src="{html.escape(code)}"></script><script>{_scripts()}waitForScenes();</script>', "floatbase")
 
 
 @cache

@@ -92,7 +92,11 @@ class Scene:
 
     def file_commands(self) -> list[bytes]:
         """The commands that a file can hold: all but those of the panel, which needs a program that answers it."""
-        return [command for key, command in self._sorted_entries() if not key[1].endswith(("_control", "_text", "_strip"))]
+        return [command for _, command in self.file_entries()]
+
+    def file_entries(self) -> list[tuple[Key, bytes]]:
+        """The same with their keys."""
+        return [entry for entry in self._sorted_entries() if not entry[0][1].endswith(("_control", "_text", "_strip"))]
 
     def __len__(self) -> int:
         return len(self._entries)

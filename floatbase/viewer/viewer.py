@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import film, legend, marks, page, recording, shapes, still, walks, wire
+from floatbase.viewer import film, legend, marks, page, published, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, RGB
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 UP = (0.0, 0.0, 1.0)
 ROBOT, FOLLOWED = "robot", "followed"  # in the picture: the robot, and where it is on average of a stride
 _MOST_PIXELS = 10_000  # of a picture's height
-_ASKED = "FLOATBASE_VIEWER"  # =static in the environment asks for scenes that need no kernel, as for pages to publish
 
 
 class Viewer(Controls):
@@ -379,7 +377,9 @@ class Viewer(Controls):
         return self.window.widget(self.robot.name, self.height, still.png(self.canvas.picture, self.window.scene, self.height))
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The live picture, and an image of it for wherever no widget can be."""
+        """The live picture, and an image of it for wherever no widget can be; for a site, see `published`."""
+        if published.display() == "site":
+            return published.Pack([self]).bundle()
         if self._is_still:
             return {"text/html": self._frame()}
         picture = self.widget()
@@ -389,7 +389,7 @@ class Viewer(Controls):
     @property
     def _is_still(self) -> bool:
         """Whether a display is a copy of the scene and no more."""
-        return os.environ.get(_ASKED) == "static" or not self.window.is_open
+        return published.display() == "static" or not self.window.is_open
 
     def _frame(self) -> str:
         """HTML of the scene as it is now, which needs no kernel."""

@@ -17,13 +17,15 @@ from matplotlib.figure import Figure
 import floatbase as fb
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.panels import live
+from floatbase.lessons.stops import recorded_pushes
 from floatbase.simulation import Live, Rollout, advice
-from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, shapes, with_image
+from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, published, shapes, with_image
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
 _LIFTED = 0.003  # m above the ground: no flicker with its lines
 _MOST = 600.0  # N: the hardest push of the panel
+_RECORDED = (150.0, 250.0, 350.0)  # N: what both stand, what only steps save, what they save to the side only
 _HALF = widgets.Layout(width="50%")
 
 
@@ -141,7 +143,10 @@ class PushTogether(widgets.VBox):
         super().close()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The pictures are put in only here, as those of a slider panel."""
+        """The pictures are put in only here, as those of a slider panel; a site has some recorded pushes of both."""
+        if published.display() == "site":
+            titles = {title: (self.views[title], run.sim, run.controller) for title, run in self.runs.items()}
+            return recorded_pushes(titles, _RECORDED, ["forwards", "to the left"])
         for title, picture in self._pictures.items():
             picture.children = [self.views[title].widget()]
         return with_image(super()._repr_mimebundle_(**kwargs), *(picture.children[0] for picture in self._pictures.values()))

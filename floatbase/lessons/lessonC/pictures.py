@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
 
 import ipywidgets as widgets
 import matplotlib.pyplot as plt
@@ -13,15 +15,17 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.lessons.lessonC.helpers import corner_table
 from floatbase.lessons.rounding import about
 from floatbase.qp import QP, table_top
-from floatbase.viewer import GREYS, hexadecimal, programs
+from floatbase.viewer import GREYS, hexadecimal, programs, published
 
 _BESIDE = (-4.2, 3.4, -2.3, 3.2)  # what is seen of the table and its walls
+_COLOURS = 48
 _NEAR = 1e-9  # a row broken by less, or a price less negative, is right but for rounding
 PUZZLES = ((0.5, -1.0), (2.5, 2.0), (-4.0, 1.5), (-1.5, -1.5), (-4.0, -1.0))  # lowest points of the bowls to be played
 _STYLES = ("-", "--", ":")
@@ -87,17 +91,41 @@ class Game(widgets.VBox):
         self.clicks += 1
         self._show()
 
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        return self._all_rows() if published.display() == "site" else super()._repr_mimebundle_(**kwargs)
+
+    def _all_rows(self) -> dict[str, Any]:
+        """For a site: what every set of rows shows, in every bowl. The game is left at its beginning."""
+        bowls = tuple(str(i + 1) for i in range(len(self._puzzles)))
+        pack = published.Pack([], words="In the live lesson the clicks are counted.")
+        switches = list(product((0, 1), repeat=len(self.rows)))
+        for self._at, on in product(range(len(bowls)), switches):
+            self.working = tuple(row for row, is_on in zip(self.rows, on, strict=True) if is_on)
+            picture, faults = self._seen()
+            pack.stop((self._at, *on), f"{picture}<div>{_words(faults)}</div>")
+        self._at = 0
+        self._begin()
+        rows = [published.Control(row, ("off", "on"), 0, kind="switch") for row in self.rows]
+        return pack.bundle([published.Control("bowl", bowls, 0, kind="choice"), *rows])
+
+    def _seen(self) -> tuple[str, list[str]]:
+        """The picture of the rows that are on, HTML, and what is wrong with them."""
+        x, faults = verdict(self.qp, self.working)
+        axis = _flat_axis(self.qp, _BESIDE, self.working, x)
+        axis.plot(*self._puzzles[self._at], "x", color=GREYS[1], markersize=9)
+        return _image(axis), faults
+
     def _show(self) -> None:
         for name, button in self.rows.items():
             button.icon, button.style.font_weight = ("check", "bold") if name in self.working else ("", "normal")
-        x, faults = verdict(self.qp, self.working)
+        self._picture.value, faults = self._seen()
         self.solved = not faults
-        axis = _flat_axis(self.qp, _BESIDE, self.working, x)
-        axis.plot(*self._puzzles[self._at], "x", color=GREYS[1], markersize=9)
-        self._picture.value = _image(axis)
         clicks = f"{self.clicks} click{'' if self.clicks == 1 else 's'}"
-        words = "; ".join(faults) if faults else "<b>solved</b>: no row is broken, and none that is on pulls"
-        self._told.value = f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {words}"
+        self._told.value = f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {_words(faults)}"
+
+
+def _words(faults: Sequence[str]) -> str:
+    return "; ".join(faults) if faults else "<b>solved</b>: no row is broken, and none that is on pulls"
 
 
 def verdict(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
@@ -164,8 +192,9 @@ def _flat_axis(qp: QP, box: tuple[float, float, float, float], working: Sequence
 
 
 def _image(axis: Axes) -> str:
-    """The figure of an axis as HTML."""
-    data = io.BytesIO()
-    axis.figure.savefig(data, format="png")  # type: ignore[union-attr]
+    """The figure of an axis as HTML; few colours make it a third as large."""
+    canvas, data = FigureCanvasAgg(axis.figure), io.BytesIO()  # type: ignore[arg-type]
+    canvas.draw()
+    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(_COLOURS).save(data, "png", optimize=True)
     text = base64.b64encode(data.getvalue()).decode()
     return f'<img src="data:image/png;base64,{text}" style="max-width: 100%" alt="a quadratic program in the plane">'

@@ -8,13 +8,13 @@ from floatbase.lessons.publish.notebooks import execute, read, run, solved, writ
 from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare
 
 if TYPE_CHECKING:
-    from floatbase.lessons.publish import conventions, equations, pages, prose
+    from floatbase.lessons.publish import conventions, equations, grades, pictures, site
 
-_PARTS = ("conventions", "equations", "grades", "pages", "prose")  # imported at first use; the last two need the extra `pages`
+_PARTS = ("conventions", "equations", "grades", "pictures", "site")  # imported at first use; the last needs the extra `site`
 
 __all__ = [
-    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "grades", "lesson_table", "pages", "prepare", "prose",
-    "read", "readme_with_table", "run", "solved", "title_of", "write_solutions",
+    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "grades", "lesson_table", "pictures", "prepare", "read",
+    "readme_with_table", "run", "site", "solved", "title_of", "write_solutions",
 ]  # fmt: skip
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from floatbase.errors import InputError
 from floatbase.lessons.publish import FOLDER, README, prepare, readme_with_table, run, write_solutions
 
-PAGES = Path("build/pages")
 SOLUTIONS = Path("build/solutions")
 
 
@@ -21,9 +20,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stored = commands.add_parser("run", help="run lessons and store what they print")
     stored.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
     commands.add_parser("map", help="write equations.md, conventions.md and the README's table of lessons")
-    paged = commands.add_parser("pages", help="write lessons as HTML pages, which need no kernel")
-    paged.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
-    paged.add_argument("--to", type=Path, default=PAGES, metavar="FOLDER", help=f"where to write, {PAGES} by default")
+    shown = commands.add_parser("site", help="run the lessons and build the web site")
+    shown.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="those that it has; all by default")
+    shown.add_argument("--stored", action="store_true", help="run none; show what the notebooks hold")
+    shown.add_argument("--to", type=Path, metavar="FOLDER", help="where to write, build/site by default")
     rosed = commands.add_parser("roses", help="measure the push roses of lessons, such as 05, anew")
     rosed.add_argument("lessons", nargs="+", metavar="LESSON")
     keys = commands.add_parser("solutions", help="write the lessons with solutions in place of exercises, for teachers")
@@ -41,8 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _run(given.lessons or sorted(FOLDER.glob("*.ipynb")))
         elif given.command == "map":
             _map()
-        elif given.command == "pages":
-            _pages(given.lessons or [*sorted(FOLDER.glob("*.ipynb")), *sorted(FOLDER.glob("*.md"))], given.to)
+        elif given.command == "site":
+            _site(given.lessons or None, given.to, given.stored)
         elif given.command == "roses":
             _roses(given.lessons)
         elif given.command == "solutions":
@@ -94,12 +94,10 @@ def _grade(files: Sequence[Path], table: Path | None, code: bool) -> None:
         print(f"All marks: {table}")
 
 
-def _pages(sources: Sequence[Path], folder: Path) -> None:
-    from floatbase.lessons.publish import pages
+def _site(lessons: Sequence[Path] | None, folder: Path | None, stored: bool) -> None:
+    from floatbase.lessons.publish import site
 
-    for source in sources:
-        page = pages.build(source.resolve(), folder)
-        print(f"{page}: {page.stat().st_size / 1e6:.1f} MB")
+    print(site.build(folder or site.SITE, lessons, stored))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; never written by hand.
+"""The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; the formulas stand in `formulas`.
 
 A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as in "App. A: …", stands for
 them. Public is what a room exports. A test counts where it names that function, a lesson where the metadata of a cell says that
@@ -17,42 +17,11 @@ from importlib import import_module
 from pathlib import Path
 
 import floatbase
-from floatbase.lessons.publish.contents import taught_in
+from floatbase.lessons.publish.contents import taught_in, title_of
+from floatbase.lessons.publish.formulas import FORMULAS, NOTES, SECTIONS, Formula
 from floatbase.lessons.publish.workspace import FOLDER
 
-TITLES = {
-    "(1)": "fixed-base equations of motion",
-    "(2)": "configuration: base and joints",
-    "(3)": "actuation matrix S",
-    "(4)": "floating base, forces at points",
-    "(5)": "constraints A q̈ = b",
-    "(6)": "nonholonomic constraints",
-    "(7)": "constrained equations of motion",
-    "(8)": "forces and torques, before solving",
-    "(9)": "forces from torques, ζ",
-    "(10)": "the matrix C",
-    "(11)": "all torques and forces that go together",
-    "(12)": "the matrix B",
-    "(13)": "all motions that are possible",
-    "(14)": "accelerations from torques, η",
-    "(15)": "pullback of a cost",
-    "(16)": "blocks of the space of motions",
-    "(17)": "q̈, τ, λ from β",
-    "(18)": "a cost on all three, seen from β",
-    "(19)": "a cost on β, seen from one of them",
-    "(20)": "net force, G_f",
-    "(21)": "net moment, G_τ",
-    "(22)": "desired wrench as a cost",
-    "(23)": "preference among contact forces",
-    "(24)": "torques and forces as two maps",
-    "(25)": "smallest torques for desired forces",
-    "(26)": "control as a QP: objective",
-    "(27)": "control as a QP: constraints",
-    "(28)": "friction cone",
-    "App. A": "fictitious forces",
-    "App. B": "torque is an abstraction",
-    "App. C": "quadratic programming",
-}
+TITLES = {formula.number: formula.title for formula in FORMULAS}
 _START = re.compile(r"\s*((?:\(\d+\))+|App\. [ABC])")
 _NUMBER = re.compile(r"\(\d+\)|App\. [ABC]")
 _TESTS = Path(floatbase.__file__).parents[1] / "tests"
@@ -96,19 +65,31 @@ def table() -> str:
     lines = [
         "# The map: equation → function → test → lesson",
         "",
-        "Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish map`; do not edit. A function such as",
-        "`dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
-        "",
-        "| equation | what it says | functions | tests that use them | lessons |",
-        "|---|---|---|---|---|",
+        "Every equation of the document *Controlling Floating-Based Robots* that the course follows, section by section, in",
+        "our own words. Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish map`; do not edit. A",
+        "function such as `dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
     ]
-    for equation, title in TITLES.items():
-        here = [entry for entry in found if equation in entry.equations]
-        functions = "<br>".join(f"`{entry.path}`" for entry in here)
-        tests = sorted({test.split("::")[0] for entry in here for test in entry.tests})
-        lessons = ", ".join(f"[{name.split('_')[0]}]({name})" for name, those in taught.items() if equation in those)
-        lines.append(f"| {equation} | {title} | {functions} | {', '.join(tests)} | {lessons} |")
-    return "\n".join(lines) + "\n"
+    for section in SECTIONS:
+        lines += ["", f"## {section.number} {section.title}", "", section.about]
+        for formula in (formula for formula in FORMULAS if formula.section == section.number):
+            lessons = [name for name, those in taught.items() if formula.number in those]
+            lines += _written_out(formula, [entry for entry in found if formula.number in entry.equations], lessons)
+    lines += ["", "## Notes of the document", "", "The lessons name some of them by number.", ""]
+    return "\n".join([*lines, *(f"{number}. {note}" for number, note in NOTES.items())]) + "\n"
+
+
+def _written_out(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:
+    """An equation in lines of Markdown: formula, meaning, functions, lessons, tests. An appendix has one, unnumbered."""
+    appendix = formula.number == formula.section
+    tests = sorted({test.split("::")[0] for entry in found for test in entry.tests})
+    tag = "" if appendix else f" \\tag{{{formula.number.strip('()')}}}"
+    return [
+        *([] if appendix else ["", f"### {formula.number} {formula.title}"]),
+        *("", f"$${formula.latex}{tag}$$", "", formula.meaning, ""),
+        f"- functions: {', '.join(f'`{entry.path}`' for entry in found)}",
+        f"- lessons: {', '.join(f'[{title_of(FOLDER / name)}]({name})' for name in lessons)}",
+        f"- tests that use them: {', '.join(f'`{test}`' for test in tests)}",
+    ]
 
 
 def _public() -> Iterator[tuple[str, str, list[str]]]:

@@ -1,81 +1,125 @@
-"""The 3-D pictures of a page: all share one copy of the viewer and of every command that more than one of them uses.
+"""Pictures, recordings and panels of a site: what outputs hold of them as HTML, and the files that a browser draws them from.
 
-Robots stay the same from picture to picture, so a page of eight pictures of one robot holds its meshes once.
+All share one copy of the viewer, and pictures of a robot one copy of its meshes. Every file but the viewer's is named after
+what it holds, so files of an earlier build still fit. They are scripts, which a browser also loads where there is no server.
 """
 
 from __future__ import annotations
 
+import base64
+import gzip
+import hashlib
 import html
 import json
-import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from floatbase.viewer import page, wire
+from floatbase.viewer import page, published, wire
 
-_FRAME = re.compile(r'<iframe srcdoc="([^"]*)" title="([^"]*)" style="[^"]*?height: (\d+)px[^"]*"></iframe>')
-_CHILD = "IPY_MODEL_"
+_LEAST = 1500  # bytes of a command that pictures share; a smaller one each has itself
+_USUAL = 0.3  # of a robot's pictures
+_FOLDER = "pictures"  # beside pictures.js
+_NEEDS = "This turns and moves where JavaScript is on."
 
 
 class Pictures:
-    """What the pictures of one page are drawn from. `placed` takes them out of HTML, `held` packs them into the page."""
+    """The pictures of a site. folder: that of pictures.js in the built site; the files come into `pictures` inside it."""
 
-    def __init__(self) -> None:
-        self._numbers: dict[bytes, int] = {}  # command -> its number, in the order of first use
-        self._n = 0
+    def __init__(self, folder: Path):
+        self._folder = folder / _FOLDER
+        self._placed: dict[str, tuple[dict[str, Any], list[bytes]]] = {}
 
-    def placed(self, text: str) -> str:
-        """HTML with a place for a picture instead of every frame that holds a scene, as `Viewer` writes them."""
-        return _FRAME.sub(self._place, text)
+    def place(self, data: Mapping[str, Any]) -> str | None:
+        """HTML for the mimebundle of an output that holds a picture, a recording or a panel; None where it holds none."""
+        if published.MIME not in data:
+            return None
+        about = dict(data[published.MIME])
+        commands = published.commands(about)
+        del about["commands"]
+        name = _name("picture", json.dumps(about, sort_keys=True).encode(), *commands)
+        self._placed[name] = about, commands
+        return _figure(name, about)
 
-    def panel(self, widgets: Mapping[str, Any], model: str) -> str:
-        """A panel of ipywidgets as HTML: its picture and its notes, and in words which controls the live lesson has.
+    def write(self) -> None:
+        """Write the files, after all pictures have been placed."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._folder.joinpath("viewer.html").write_text(page.inner_page("viewer.js"), encoding="utf-8")
+        self._folder.joinpath("viewer.js").write_bytes(page.viewer_code())
+        groups = self._groups()
+        for name, commands in groups.items():
+            self._write(name, commands)
+        at = {command: name for name, commands in groups.items() for command in commands}
+        for name, (about, commands) in self._placed.items():
+            shared = sorted({at[command] for command in commands if command in at})
+            own = [command for command in commands if command not in at]
+            numbers = {c: i for i, c in enumerate([*(c for group in shared for c in groups[group]), *own])}
+            kept = {name: about[name] for name in ("keys", "first", "stops", "notes", "together")}
+            head = {**kept, "shared": shared, "at": [numbers[command] for command in commands]}
+            self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
-        widgets: the state of all widgets of a notebook, as nbformat keeps it. model: which of them to show.
+    def _groups(self) -> dict[str, list[bytes]]:
+        """Large commands that several pictures have, name of a file -> commands.
+
+        There is a file for all robots, and for each robot one of what its pictures usually have and one of the rest.
         """
-        controls: list[str] = []
-        shown = self._widget(widgets, model, controls)
-        words = f'<p class="live">In the live lesson this answers to {_listed(controls)}.</p>' if controls else ""
-        return f'<div class="panel">{shown}{words}</div>'
+        pictures = [(set(about["names"]), set(commands)) for about, commands in self._placed.values()]
+        uses = Counter(command for _, commands in pictures for command in commands if len(command) >= _LEAST)
+        robots = {c: set.union(*(names for names, has in pictures if c in has)) for c, times in uses.items() if times > 1}
+        found: dict[str, list[bytes]] = {}
+        for command in sorted(robots):
+            (robot,) = robots[command] if len(robots[command]) == 1 else ("robots",)
+            usual = uses[command] >= _USUAL * sum(robot in names for names, _ in pictures)
+            found.setdefault(robot if usual else f"{robot}-more", []).append(command)
+        return {_name(name, *commands): commands for name, commands in found.items()}
 
-    def held(self) -> str:
-        """Scripts that hold the viewer and the scenes; nothing when there is no picture."""
-        if not self._n:
-            return ""
-        inner = page.held("inner-page", page.inner_page().encode())
-        return page.held_viewer_code() + inner + page.held("commands", wire.frame(self._numbers))
+    def _write(self, name: str, parts: Sequence[bytes]) -> None:
+        packed = base64.b64encode(gzip.compress(wire.frame(parts), 9, mtime=0)).decode()
+        text = f'floatbasePictures.take("{name}","{packed}")\n'
+        self._folder.joinpath(f"{name}.js").write_text(text, encoding="ascii")
 
-    def _place(self, frame: re.Match[str]) -> str:
-        text, title, height = frame.groups()
-        commands = page.scene_in(html.unescape(text))
-        numbers = [self._numbers.setdefault(command, len(self._numbers)) for command in commands]
-        self._n += 1
-        return (
-            f'<figure class="scene" style="--height: {height}px" data-commands="{json.dumps(numbers, separators=(",", ":"))}" '
-            f'data-title="3-D picture of {title}"><p>A 3-D picture of {title} comes here; it needs JavaScript.</p></figure>'
+
+def _name(begin: str, *parts: bytes) -> str:
+    """A name for a file with these contents."""
+    return f"{begin}-{hashlib.sha256(wire.frame(parts)).hexdigest()[:12]}"
+
+
+def _figure(name: str, about: dict[str, Any]) -> str:
+    """The figure as it is until its script comes: images of the first moment, its note, and controls that do not move yet."""
+    scenes = "".join(
+        f'<div class="floatbase-scene" style="--height:{height}px">{f"<b>{html.escape(title)}</b>" if title else ""}'
+        f'<div><img alt="3-D picture of {html.escape(robot)}" src="data:image/png;base64,{image}"></div></div>'
+        for height, robot, image, title in zip(
+            about["heights"], about["names"], about["stills"], about["titles"] or [""] * len(about["names"]), strict=True
         )
-
-    def _widget(self, widgets: Mapping[str, Any], model: str, controls: list[str]) -> str:
-        """A widget and all below it; what is worked by hand goes to `controls` in words."""
-        about = widgets[model]
-        kind, state = about["model_name"].removesuffix("Model"), about["state"]
-        if kind in ("VBox", "HBox"):
-            parts = [self._widget(widgets, child.removeprefix(_CHILD), controls) for child in state["children"]]
-            return f'<div class="{kind.lower()}">{"".join(parts)}</div>'
-        if kind == "HTML":
-            return f"<div>{self.placed(state['value'])}</div>"
-        if kind.endswith("Slider"):
-            low, high, now = (_number(state[name]) for name in ("min", "max", "value"))
-            controls.append(f"the slider <b>{html.escape(state['description'])}</b>, from {low} to {high} (here {now})")
-        elif kind == "Button":
-            controls.append(f"the button <b>{html.escape(state['description'])}</b>")
-        return ""
+    )
+    first = ",".join(str(control["first"]) for control in about["controls"])
+    note = about["notes"][about["stops"][first][0]] if first in about["stops"] else ""
+    controls = "".join(map(_control, about["controls"]))
+    words = f'<p class="floatbase-words">{html.escape(about["words"])}</p>' if about["words"] else ""
+    return (
+        f'<figure class="floatbase-picture{" floatbase-beside" if about["beside"] else ""}" data-picture="{name}">'
+        f'<div class="floatbase-seen">{f"""<div class="floatbase-scenes">{scenes}</div>""" if scenes else ""}'
+        f'<div class="floatbase-note" aria-live="polite">{note}</div></div>'
+        f'<div class="floatbase-controls">{controls}</div>{words}<noscript><p>{_NEEDS}</p></noscript></figure>'
+    )
 
 
-def _number(value: float) -> str:
-    return f"{value:g}".replace("-", "−")
-
-
-def _listed(words: list[str]) -> str:
-    """First, second and third."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+def _control(control: dict[str, Any]) -> str:
+    """A control as the browser's own element. Its value is the number of a stop, its text what that is called."""
+    name, unit, first = html.escape(control["name"]), html.escape(control["unit"]), control["first"]
+    named = f"{name} [{unit}]" if unit else name
+    if control["kind"] == "switch":
+        return f'<label class="floatbase-switch"><input type="checkbox" disabled{" checked" if first else ""}>{named}</label>'
+    if control["kind"] == "choice":
+        texts = [html.escape(value) for value in control["values"]]
+        options = "".join(f"<option{' selected' if i == first else ''}>{text}</option>" for i, text in enumerate(texts))
+        return f'<label class="floatbase-choice"><span>{named}</span><select disabled>{options}</select></label>'
+    values = html.escape(json.dumps(control["values"], ensure_ascii=False))
+    now = html.escape(control["values"][first])
+    last = len(control["values"]) - 1
+    return (
+        f'<label><span>{named}</span><input type="range" min="0" max="{last}" value="{first}" disabled aria-label="{named}" '
+        f'aria-valuetext="{now} {unit}" data-unit="{unit}" data-values="{values}"><output>{now}</output></label>'
+    )

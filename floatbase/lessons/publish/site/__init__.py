@@ -1,0 +1,13 @@
+"""The course as a web site: `make site` runs the lessons, prepares all pages for Sphinx, and builds them into build/site.
+
+`build` does it. `outputs` prepares the lessons, `words` links what texts name, `reference` and `docstrings` make the pages of
+the library, `mathml` draws formulas; `conf` is Sphinx's, and the texts of the site's own pages stand beside it. This needs the
+extra `site`.
+"""
+
+from floatbase.lessons.publish.site import docstrings, mathml
+from floatbase.lessons.publish.site.build import SITE, build
+from floatbase.lessons.publish.site.outputs import prepared
+from floatbase.lessons.publish.site.words import linked
+
+__all__ = ["SITE", "build", "docstrings", "linked", "mathml", "prepared"]

@@ -1,0 +1,165 @@
+"""Builds the site: runs lessons, writes all that Sphinx reads into one folder, and lets it write the pages."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbformat.v4 import new_code_cell, new_notebook
+
+from floatbase.errors import FloatbaseError, InputError
+from floatbase.lessons.publish import conventions, equations
+from floatbase.lessons.publish.contents import equations_of, title_of
+from floatbase.lessons.publish.notebooks import read
+from floatbase.lessons.publish.pictures import Pictures
+from floatbase.lessons.publish.site import mathml, reference
+from floatbase.lessons.publish.site.outputs import prepared, run_all
+from floatbase.lessons.publish.site.words import NOTES, anchor, linked
+from floatbase.lessons.publish.workspace import FOLDER
+
+SITE = Path("build/site")
+_OWN = Path(__file__).parent  # texts and static files of the site
+_ROOT = FOLDER.parent
+_HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
+_TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
+_FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
+
+_ABOUT = {
+    "equations": "Every equation of the course, written out, with the functions, tests and lessons that belong to it.",
+    "conventions": "Symbols, frames, signs, units and tolerances, the same in every function of floatbase.",
+    "how_to": "Where your work is kept, and what to do when something fails.",
+    "changelog": "What changed in floatbase, version by version.",
+    "peers": "The time of floatbase's control tick beside those of TSID and placo, which find the same torques.",
+    "tick": "What a control tick of floatbase takes, part by part, and how it grows.",
+    "rollout": "What a simulated second takes in floatbase's rollout, beside a bare loop.",
+    "walking": "How well robots walk with floatbase, as measured and as required.",
+}
+
+
+def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
+    """Write the site into `folder`; the path of its first page.
+
+    lessons: those that it has, all by default. stored: run none of them, and show what their notebooks hold. Raises
+    `InputError` when there is no such lesson, `FloatbaseError` when Sphinx finds a fault.
+    """
+    known = sorted(FOLDER.glob("*.ipynb"))
+    shown = known if lessons is None else sorted(path.resolve() for path in lessons)
+    for path in shown:
+        if path not in known:
+            raise InputError(f"there is no lesson {path}; the course's lessons are in {FOLDER}.")
+    folder = folder.resolve()
+    source, kept = folder.with_name(f"{folder.name}-source"), folder.with_name(f"{folder.name}-run")
+    shutil.rmtree(source, ignore_errors=True)
+    shutil.copytree(_OWN, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    *notebooks, scene = run_all([*([] if stored else shown), _scene(kept)], kept).values()
+    pictures = Pictures(folder / "_static")
+    _lessons(source, dict(zip(shown, notebooks or map(read, shown), strict=True)), pictures)
+    _first_page(source, shown, _picture(scene, pictures))
+    _texts(source)
+    (source / "api").mkdir()
+    for name, text in reference.pages().items():
+        (source / "api" / name).write_text(text, encoding="utf-8")
+    _sphinx(source, folder)
+    pictures.write()
+    pages = (page.read_text(encoding="utf-8") for page in folder.rglob("*.html"))
+    mathml.write_font(pages, folder / "_static" / mathml.FONT)
+    return folder / "index.html"
+
+
+def _scene(kept: Path) -> Path:
+    """A notebook that draws the picture of the first page: the program of the README, played."""
+    readme = (_ROOT / "README.md").read_text(encoding="utf-8")
+    code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
+    play = 'fb.Viewer(robot, height=420).play(run, title="a push of 30 N to the side")'
+    notebook = new_notebook(cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")])
+    kept.mkdir(parents=True, exist_ok=True)
+    path = kept / "first_page.ipynb"
+    nbformat.write(notebook, path)
+    return path
+
+
+def _lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures) -> None:
+    """The page of each lesson."""
+    addresses = {path.name.split("_")[0]: path.name for path in notebooks}
+    (source / "lessons").mkdir()
+    for path, notebook in notebooks.items():
+        nbformat.write(prepared(notebook, pictures, addresses), source / "lessons" / path.name)
+
+
+def _picture(notebook: Any, pictures: Pictures) -> str:
+    """The first picture of a notebook, as Markdown; an image where it cannot be placed."""
+    data = next(output.data for cell in notebook.cells for output in cell.outputs if "data" in output)
+    placed = pictures.place(data)
+    image = f'<img alt="go2 stands on four feet" src="data:image/png;base64,{data.get("image/png")}">'
+    return f"```{{raw}} html\n{placed or image}\n```"
+
+
+def _first_page(source: Path, lessons: Sequence[Path], scene: str) -> None:
+    """The texts of the first page, with its picture and the lists of lessons."""
+    listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
+    listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
+    toctrees = [
+        "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *(f"lessons/{path.stem}" for path in paths), "```"])
+        for caption, paths in listed.items()
+    ]
+    text = (source / "index.md").read_text(encoding="utf-8")
+    for name, part in {"scene": scene, "lessons": _table(lessons), "toctrees": "\n\n".join(toctrees)}.items():
+        text = text.replace(f"{{{name}}}", part)
+    (source / "index.md").write_text(text, encoding="utf-8")
+    for path in source.glob("*.md"):
+        addresses = {lesson.name.split("_")[0]: f"lessons/{lesson.name}" for lesson in lessons}
+        path.write_text(linked(path.read_text(encoding="utf-8"), addresses), encoding="utf-8")
+
+
+def _table(known: Iterable[Path]) -> str:
+    rows = [f"| [{title_of(path)}](lessons/{path.name}) | {equations_of(path)} |" for path in known]
+    return "\n".join(["| lesson | equations |", "|---|---|", *rows])
+
+
+def _texts(source: Path) -> None:
+    """The map, the conventions, how to use the course, the changelog, and the benchmarks with their figures."""
+    texts = {
+        "lessons/equations.md": _with_anchors(equations.table()),
+        "lessons/conventions.md": conventions.page(),
+        "lessons/how_to.md": (FOLDER / "how_to.md").read_text(encoding="utf-8"),
+        "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace("(notebooks/", "(lessons/"),
+        **{f"benchmarks/{path.name}": path.read_text(encoding="utf-8") for path in _ROOT.glob("benchmarks/*.md")},
+    }
+    shown = {path.name.split("_")[0]: path.name for path in (source / "lessons").glob("*.ipynb")}
+    for name, text in texts.items():
+        about = f'---\nmyst:\n  html_meta:\n    description: "{_ABOUT[Path(name).stem]}"\n---\n'
+        (source / name).write_text(about + linked(text, shown), encoding="utf-8")
+    for path in _ROOT.glob("benchmarks/*.png"):
+        shutil.copy(path, source / "benchmarks")
+
+
+def _with_anchors(page: str) -> str:
+    """The map with places that links lead to, and its functions linked to the pages of the library."""
+    known = reference.addresses()
+
+    def link(match: re.Match[str]) -> str:
+        address = known.get(f"floatbase.{match[1]}")
+        return f"{{py:obj}}`{match[1]} <{address}>`" if address else match[0]
+
+    def fold(match: re.Match[str]) -> str:
+        files = match[1].replace("`", "").split(", ")
+        listed = " ".join(f"<code>{file}</code>" for file in files)
+        count = "1 file" if len(files) == 1 else f"{len(files)} files"
+        return f'- <details class="tests"><summary>tests that use them, in {count}</summary>{listed}</details>'
+
+    page = _TESTS.sub(fold, page)
+    page = page.replace("## Notes of the document", f"({NOTES})=\n## Notes of the document")
+    return _FUNCTIONS.sub(link, _HEADINGS.sub(lambda match: f"({anchor(match[1])})=\n{match[0]}", page))
+
+
+def _sphinx(source: Path, folder: Path) -> None:
+    """Let Sphinx write the pages; a warning is a fault."""
+    from sphinx.cmd.build import build_main
+
+    options = ["-q", "-W", "--keep-going", "-E", "-j", "2", "-c", str(_OWN), "-d", str(source / ".doctrees")]
+    if build_main([*options, str(source), str(folder)]):
+        raise FloatbaseError("Sphinx found faults, named above; the site is not whole.")

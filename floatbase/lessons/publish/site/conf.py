@@ -1,0 +1,58 @@
+"""Sphinx's settings for the site; `floatbase.lessons.publish.site.build` starts it on the folder of prepared pages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import floatbase
+from floatbase.lessons.publish.site.docstrings import process_docstring, process_signature
+from floatbase.lessons.publish.site.mathml import visit_displaymath, visit_math
+
+project = "floatbase"
+author = "The floatbase authors"
+copyright = "the floatbase authors, BSD 3-Clause licence"
+version = release = floatbase.__version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx_design"]
+root_doc = "index"
+exclude_patterns = [".doctrees"]
+add_module_names = False
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+python_use_unqualified_type_names = True
+maximum_signature_line_length = 90
+toc_object_entries_show_parents = "hide"
+
+# lessons are run before Sphinx reads them
+nb_execution_mode = "off"
+nb_merge_streams = True
+nb_ipywidgets_js: dict[str, Any] = {}
+myst_enable_extensions = ["colon_fence", "dollarmath", "amsmath"]
+myst_heading_anchors = 4
+suppress_warnings = ["myst.header"]  # a lesson may begin a part with a small heading
+
+html_theme = "sphinx_book_theme"
+html_title = "floatbase"
+html_math_renderer = "mathml"
+html_static_path = ["static"]
+html_css_files = ["site.css", "pictures.css"]
+html_js_files = [("pictures.js", {"defer": "defer"})]
+html_show_sphinx = False
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "show_toc_level": 2,
+    "use_download_button": False,
+    "navbar_persistent": [],  # search stands in the side bar
+    "use_fullscreen_button": False,
+    "show_navbar_depth": 1,
+    "home_page_in_toc": True,
+}
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """What Sphinx calls first."""
+    app.add_html_math_renderer("mathml", (visit_math, None), (visit_displaymath, None))
+    app.connect("autodoc-process-docstring", process_docstring)
+    app.connect("autodoc-process-signature", process_signature)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,79 @@
+"""Formulas as MathML, which browsers draw themselves, and a font for them: the site needs no script for either."""
+
+from __future__ import annotations
+
+import html
+import logging
+import re
+from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from fontTools import subset
+from latex2mathml.converter import convert
+
+from floatbase.errors import ViewerError
+
+FONT = "formulas.woff"  # in the site's static files
+logging.getLogger("fontTools").setLevel(logging.WARNING)  # it tells each step
+_TAG = re.compile(r"\\tag\{(.*?)\}")
+_MATHML = re.compile(r"<math.*?</math>", re.DOTALL)
+# what the converter leaves out: brackets grow with their own matrix only, dots stand near, and what is below min stands below
+_MATRIX = re.compile(r"<mo>&#x0005B;</mo><mtable>.*?</mtable><mo>&#x0005D;</mo>")
+_DOTTED = re.compile(r"<mover>(<mi>[^<]*</mi><mo>(?:&#x000A8;|&#x002D9;|&#x0007E;)</mo></mover>)")
+_BELOW = re.compile(r"<msub>(<mo>(?:min|max)</mo>(?:<mi>[^<]*</mi>|<mrow>.*?</mrow>))</msub>")
+
+
+def mathml(latex: str, display: str = "inline") -> str:
+    """A formula as MathML. display: "inline" or "block"."""
+    text = _MATRIX.sub(r"<mrow>\g<0></mrow>", str(convert(latex.strip(), display=display)))
+    text = _BELOW.sub(r"<munder>\1</munder>", text) if display == "block" else text
+    return _DOTTED.sub(r'<mover accent="true">\1', text)
+
+
+def visit_math(writer: Any, node: Any) -> None:
+    """Sphinx's formula in a line of text."""
+    writer.body.append(mathml(node.astext()))
+    raise nodes.SkipNode
+
+
+def visit_displaymath(writer: Any, node: Any) -> None:
+    r"""Sphinx's formula on a line of its own, with its \tag at the right."""
+    latex = node.astext()
+    tag = _TAG.search(latex)
+    number = f'<span class="number">({tag[1]})</span>' if tag else ""
+    writer.body.append(f'<div class="equation">{mathml(_TAG.sub("", latex), "block")}{number}</div>')
+    raise nodes.SkipNode
+
+
+def write_font(pages: Iterable[str], target: Path) -> None:
+    """STIX Two Math, which the package ziamath brings, cut down to the formulas in pages of HTML.
+
+    Brackets grow around matrices only in a font made for formulas, and few machines have one.
+    """
+    formulas = (formula for page in pages for formula in _MATHML.findall(page))
+    letters = {letter for formula in formulas for letter in html.unescape(re.sub("<[^>]*>", "", formula))}
+    cutter = subset.Subsetter(subset.Options(layout_features=["ssty"], notdef_outline=True))
+    cutter.populate(unicodes=[ord(letter) for letter in letters | {_slanted(letter) for letter in letters}])
+    with subset.load_font(_font_file(), subset.Options()) as font:
+        cutter.subset(font)
+        font.flavor = "woff"
+        font.save(target)
+
+
+def _font_file() -> str:
+    """Where the font lies; the package around it is not imported."""
+    spec = find_spec("ziamath")
+    if spec is None or not spec.submodule_search_locations:
+        raise ViewerError("ziamath is not installed; the site needs its font. Install it with: pip install floatbase[site]")
+    return str(Path(spec.submodule_search_locations[0]) / "fonts" / "STIXTwoMath-Regular.ttf")
+
+
+def _slanted(letter: str) -> str:
+    """The letter as browsers draw it when it stands alone in a formula: in italics, which are letters of their own."""
+    for first, last, slanted in (("a", "z", 0x1D44E), ("A", "Z", 0x1D434), ("α", "ω", 0x1D6FC)):
+        if first <= letter <= last:
+            return "ℎ" if letter == "h" else chr(slanted + ord(letter) - ord(first))
+    return letter

@@ -1,0 +1,163 @@
+"""Lessons as they stand on the site: run, with pictures that need no kernel, and words in place of what needs one."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import re
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Protocol
+
+import nbformat
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
+
+import floatbase
+from floatbase.lessons.publish.notebooks import execute, read
+from floatbase.lessons.publish.site.words import linked
+
+LIVE = "../run.md"
+AT_ONCE = 2  # lessons
+_SHARP = "%config InlineBackend.figure_format = 'retina'"
+_INLINE = "module://matplotlib_inline.backend_inline"
+_CLAIMS = "claims of the text above, as code that fails if one is wrong"
+_WIDGET = "application/vnd.jupyter.widget-view+json"
+_TERMINAL = re.compile(r"\x1b\[[0-9;]*m")
+_HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+_OF_LEARNER = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)  # what they print is about the learner
+
+
+class Placing(Protocol):
+    """What puts pictures into the site."""
+
+    def place(self, data: Mapping[str, Any]) -> str | None:
+        """HTML for an output's data that hold a picture, None for others."""
+
+
+def run_all(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
+    """The lessons, run: path -> notebook with outputs. Those that are as they were when they ran last are taken from `kept`.
+
+    kept: a folder, which is made, for what was run: a name holds a digest of the lesson and of the package.
+    """
+    kept.mkdir(parents=True, exist_ok=True)
+    source = _digest_of_package()
+    files = {path: kept / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons}
+    new = {path: file for path, file in files.items() if not file.exists()}
+    with ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn")) as pool:
+        for path in pool.map(_run, new, new.values()):
+            print(f"run: {path.name}", flush=True)
+    for path, file in files.items():
+        for former in set(kept.glob(f"{path.stem}-*.ipynb")) - {file}:
+            former.unlink()
+    return {path: read(file) for path, file in files.items()}
+
+
+def _run(path: Path, file: Path) -> Path:
+    notebook = read(path)
+    notebook.cells.insert(0, new_code_cell(_SHARP))
+    execute(notebook, path.parent, FLOATBASE_VIEWER="site", MPLBACKEND=_INLINE)
+    notebook.cells.pop(0)
+    part = file.with_suffix(".part")  # a build that was interrupted leaves no half
+    nbformat.write(notebook, part)
+    part.replace(file)
+    return path
+
+
+def _digest_of_package() -> bytes:
+    package = Path(floatbase.__file__).parent
+    files = (
+        path
+        for path in sorted(package.rglob("*.*"))
+        if "publish" not in path.parts and path.suffix in (".py", ".json", ".js", ".html")
+    )
+    return b"".join(path.read_bytes() for path in files)
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def prepared(notebook: Any, pictures: Placing, lessons: Mapping[str, str]) -> Any:
+    """A lesson as Sphinx reads it. Changes it in place.
+
+    notebook: with outputs. pictures: takes the 3-D pictures. lessons: number -> address.
+    """
+    about, heading = _description(notebook), ""
+    for i, cell in enumerate(notebook.cells):
+        if cell.cell_type == "markdown":
+            heading = (_HEADING.findall(cell.source) or [heading])[-1]
+            cell.source = linked(cell.source, lessons)
+        else:
+            notebook.cells[i] = _code(cell, heading, pictures)
+    notebook.metadata.pop("widgets", None)  # they live on no page without a kernel
+    notebook.metadata["myst"] = {"html_meta": {"description": about}}
+    return notebook
+
+
+def _description(notebook: Any) -> str:
+    """What search engines show of a lesson: its first paragraph."""
+    text = next(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    paragraph = next(part for part in text.split("\n\n")[1:] if part.strip())
+    return " ".join(re.sub(r"\[([^\]]*)\]\([^)]*\)|[*$`\\]", r"\1", paragraph).split())[:200]
+
+
+def _code(cell: Any, heading: str, pictures: Placing) -> Any:
+    tags = cell.metadata.get("tags", [])
+    if "predict" in tags:
+        return new_markdown_cell(_question(cell))
+    if "check" in tags:
+        return new_markdown_cell(_live("The check of your answer, and hints, are in the live lesson"))
+    if _OF_LEARNER.search(cell.source):
+        return new_markdown_cell(_live("This is about what you said and solved, in the live lesson"))
+    if "claims" in tags:
+        cell.metadata["tags"] = [*tags, "hide-input"]
+        cell.metadata["mystnb"] = {"code_prompt_show": _CLAIMS, "code_prompt_hide": _CLAIMS}
+    cell.outputs = [shown for output in cell.outputs for shown in _shown(output, pictures)]
+    _describe_figure(cell, heading)
+    return cell
+
+
+def _live(text: str) -> str:
+    return f":::{{div}} live\n{text}: [how to run it]({LIVE}).\n:::"
+
+
+def _question(cell: Any) -> str:
+    """What a prediction asks for, in words."""
+    call = next(
+        node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
+    )
+    given = {keyword.arg: ast.literal_eval(keyword.value) for keyword in call.keywords}
+    if "choices" in given:
+        wanted = " or ".join(f"*{choice}*" for choice in given["choices"])
+    else:
+        count, unit = given.get("count", 1), given.get("unit", "")
+        wanted = ("a number" if count == 1 else f"{count} numbers") + (f", in {unit}" if unit else "")
+    asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
+    return f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({LIVE}); here, think first.\n:::"
+
+
+def _shown(output: Any, pictures: Placing) -> list[Any]:
+    """An output as a page can show it, in a list; none where it is about the run alone."""
+    if output.output_type == "stream":
+        output.text = _TERMINAL.sub("", output.text)
+        return [output] if output.name == "stdout" else []
+    if output.output_type == "error":
+        return [output]
+    placed = pictures.place(output.data)
+    if placed is not None:
+        return [new_output("display_data", {"text/html": placed})]
+    data = {kind: value for kind, value in output.data.items() if kind != _WIDGET}
+    if _WIDGET in output.data and "image/png" not in data:
+        return []
+    return [new_output("display_data", data, metadata=output.metadata)]
+
+
+def _describe_figure(cell: Any, heading: str) -> None:
+    """Says what a figure shows, for those who cannot see it, and how wide it is, as it has two dots for each pixel."""
+    figures = [output for output in cell.outputs if "image/png" in output.get("data", {}) and "text/html" not in output.data]
+    if figures:
+        image = {"alt": f"Figure: {re.sub(r'[*`$]', '', heading)}"}
+        wide = figures[0].metadata.get("image/png", {}).get("width")
+        cell.metadata["mystnb"] = {"image": {**image, **({"width": f"{wide}px"} if wide else {})}}

@@ -1,0 +1,146 @@
+"""Panels on a site, which has no kernel: what a panel shows is computed before, at stops of its sliders.
+
+Of few stops all combinations are computed, of many one slider at a time, from where all began.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from floatbase.simulation import Controller, Push, Rollout, Simulation, rollout
+from floatbase.viewer.published import Control, Pack
+
+if TYPE_CHECKING:
+    from floatbase.lessons.panels import SliderPanel
+    from floatbase.viewer import Viewer
+
+MOST = 100  # combinations that are computed
+_ALONE, _SLOW = 11, 9  # stops of a slider, about; of one that is slow to draw
+_PAIR = (9, 7, 6, 5)  # the same for two sliders: the first with few enough combinations
+_ROUND = (1.0, 2.0, 2.5, 5.0)  # times a power of ten: from stop to stop
+_NEAR = 0.22  # of the way to the next stop: a round number that is nearer to a bound than this is left out
+DIRECTIONS = {"forwards": 0.0, "to the left": 90.0, "backwards": 180.0, "to the right": 270.0}  # degrees
+_START, _SEEN = 0.1, 1.5  # s: when a recorded push begins, and how long it is seen from then on
+_RATE = 15.0  # pictures a second of a recorded push
+_ONLY = "Computed for these stops; in the live lesson the sliders have all values between."
+_ONE = " Here one slider moves at a time: the others go back to where they began."
+_FATES = {"completed": "it stands", "fell": "it falls", "controller failed": "its controller finds no answer, and it falls"}
+RECORDED = "Recorded. In the live lesson you push while it runs, in any direction."
+
+
+def stops(low: float, first: float, high: float, step: float, about: int = _ALONE) -> tuple[float, ...]:
+    """Some `about` values from `low` to `high`, with both, `first` and round ones between, all multiples of `step` from low."""
+    if not high > low:
+        return (low,)
+    between = min(_round_gaps(high - low, step), key=lambda gap: abs((high - low) / gap + 1 - about))
+    fixed = sorted({low, first, high})
+    inner = between * np.arange(math.ceil(low / between), math.floor(high / between) + 1)
+    far = [float(x) for x in inner if min(abs(x - bound) for bound in fixed) > _NEAR * between]
+    snapped = {low + step * round((x - low) / step) for x in far}
+    digits = max(0, 2 - math.floor(math.log10(step)))
+    return tuple(sorted({*(round(float(x), digits) for x in snapped), *map(float, fixed)}))
+
+
+def _round_gaps(width: float, step: float) -> list[float]:
+    """Round numbers between a step and the whole width; whole numbers of steps, where there are any."""
+    power = math.floor(math.log10(width))
+    gaps = [part * 10.0 ** (power - i) for i in range(4) for part in _ROUND if step <= part * 10.0 ** (power - i) <= width]
+    whole = [gap for gap in gaps if abs(gap / step - round(gap / step)) < 1e-6]
+    return whole or gaps or [step]
+
+
+def of_panel(panel: SliderPanel) -> dict[str, tuple[float, ...]]:
+    """The stops of each slider of a panel: those that the lesson gives, else round ones."""
+    many = _PAIR if len(panel.sliders) == 2 else (_ALONE,)
+    sliders = panel.sliders.items()
+    found = [{name: _of_slider(slider, panel.stops.get(name), about) for name, slider in sliders} for about in many]
+    return next((stops for stops in found if math.prod(map(len, stops.values())) <= MOST), found[0])
+
+
+def _of_slider(slider: Any, given: Sequence[float] | None, about: int) -> tuple[float, ...]:
+    about = about if slider.continuous_update else min(about, _SLOW)
+    values = stops(slider.min, slider.value, slider.max, slider.step, about) if given is None else given
+    return tuple(sorted({*map(float, values), float(slider.value)}))
+
+
+def places(counts: Sequence[int], first: Sequence[int]) -> tuple[list[tuple[int, ...]], bool]:
+    """The combinations to compute, as numbers of stops, and whether these are all of them.
+
+    counts: how many stops each slider has. first: number of the stop at which each begins.
+    """
+    if math.prod(counts) <= MOST:
+        return list(product(*(range(count) for count in counts))), True
+    alone = [(*first[:i], stop, *first[i + 1 :]) for i, count in enumerate(counts) for stop in range(count)]
+    return list(dict.fromkeys(map(tuple, alone))), False
+
+
+def computed(panel: SliderPanel) -> dict[str, Any]:
+    """The mimebundle of a slider panel for a site. The panel is left as it was."""
+    values = of_panel(panel)
+    now = {name: float(slider.value) for name, slider in panel.sliders.items()}
+    first = [stops.index(now[name]) for name, stops in values.items()]
+    at, together = places([len(stops) for stops in values.values()], first)
+    words = _ONLY + ("" if together else _ONE)
+    panel.draw_at(panel.shown())
+    pack = Pack([panel.view] if panel.view else [], beside=panel.beside, words=words)
+    for place in at:
+        note = panel.draw_at({name: values[name][i] for name, i in zip(values, place, strict=True)})
+        pack.stop(place, note)
+    panel.draw_at(panel.shown())
+    controls = [_control(panel.sliders[name], values[name], i) for name, i in zip(values, first, strict=True)]
+    return pack.bundle(controls, together)
+
+
+def _control(slider: Any, values: Sequence[float], first: int) -> Control:
+    """The control of a site for a slider of a panel."""
+    name, _, unit = slider.description.partition(" [")
+    return Control(name, tuple(_text(x, slider.readout_format) for x in values), first, unit=unit.removesuffix("]"))
+
+
+def recorded_pushes(
+    titles: Mapping[str, tuple[Viewer, Simulation, Controller]], forces: Iterable[float], directions: Sequence[str]
+) -> dict[str, Any]:
+    """The mimebundle of recorded runs, one for each force (N) in each direction, for a site.
+
+    titles: what stands above each picture -> its viewer, as it is before any push, and what runs in it.
+    """
+    sizes, views = tuple(forces), [view for view, *_ in titles.values()]
+    pack = Pack(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
+    for k in range(len(directions)):
+        pack.stop((0, k))
+    for (i, force), (k, direction) in product(enumerate(sizes), enumerate(directions)):
+        records = [_pushed(sim, controller, force, DIRECTIONS[direction]) for _, sim, controller in titles.values()]
+        for view, record in zip(views, records, strict=True):
+            view.play(record, rate=_RATE, cones=False)
+        pack.stop((i + 1, k), ", ".join(_fates(titles, records)))
+    return pack.bundle(
+        [
+            Control("push", ("0", *(f"{force:.0f}" for force in sizes)), 0, unit="N"),
+            Control("towards", tuple(directions), 0, kind="choice"),
+        ]
+    )
+
+
+def _pushed(sim: Simulation, controller: Controller, force: float, towards: float) -> Rollout:
+    sim.reset()
+    angle = math.radians(towards)
+    push = Push(np.array([force * math.cos(angle), force * math.sin(angle), 0.0]), _START, 0.1)
+    record = rollout(sim, controller, _START + _SEEN, [push], settle=0.5)
+    sim.reset()
+    return record
+
+
+def _fates(titles: Iterable[str], records: Sequence[Rollout]) -> Iterator[str]:
+    """What became of each, in words."""
+    for title, record in zip(titles, records, strict=True):
+        fate = _FATES.get(record.outcome, record.outcome)
+        yield fate if len(records) == 1 else f"{title}: {fate}"
+
+
+def _text(value: float, form: str) -> str:
+    return format(value + 0.0, form).replace("-", "−")

@@ -1,0 +1,404 @@
+"""Pictures of a site: what panels keep for each stop, which files hold it, and that a browser draws it without a kernel."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numpy as np
+import pytest
+from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
+
+import floatbase as fb
+from floatbase.lessons import ConstantTorques, live, push_panel, slider_panel
+from floatbase.lessons.publish import pictures
+from floatbase.lessons.stops import MOST, places, stops
+from floatbase.viewer import published, wire
+
+Pictures = pictures.Pictures
+STATIC = Path(pictures.__file__).with_name("site") / "static"
+RANGES = [
+    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0, 60, 80, 1.0), (0, 22, 25, 0.5),
+    (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1), (0, 0.003, 0.01, 0.0002), (3, 4, 53, 1.0), (1, 3, 24, 0.2), (0, 0, 5, 0.1),
+]  # fmt: skip
+ANIMATION = "set_animation"
+
+
+@pytest.fixture(autouse=True)
+def for_a_site(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FLOATBASE_VIEWER", "site")
+
+
+@pytest.fixture(scope="module")
+def go2() -> fb.Robot:
+    return fb.load("go2")
+
+
+@pytest.fixture
+def view(go2: fb.Robot) -> Iterator[fb.Viewer]:
+    made = fb.Viewer(go2, height=200)
+    yield made
+    made.close()
+
+
+def squat(view: fb.Viewer, **ranges: Any) -> Any:
+    """A panel that moves the robot, and shows its forces from 20 N on: they come and go, and change their colour."""
+    standing, contacts = view.robot.standing(), fb.Contacts.points(view.robot)
+
+    def draw(down: float, force: float = 0.0) -> str:
+        q = standing.q.copy()
+        q[2] -= down
+        forces = np.tile([0.6 * force - 15.0, 0.0, force], (4, 1)) if force >= 20.0 else None
+        view.show(standing.replace(q=q), contacts, forces, title=f"{down:.2f}")
+        if force > 50.0:
+            raise fb.FloatbaseError("more than 50 < 60")
+        return f"<b>{down:.2f}</b> {force:.0f}"
+
+    return slider_panel(view, draw, **ranges)
+
+
+def data_of(shown: Any) -> dict[str, Any]:
+    return dict(shown._repr_mimebundle_()[published.MIME])
+
+
+def scene_at(data: dict[str, Any], stop: str | None = None, view: int = 0) -> dict[tuple[str, ...], bytes]:
+    """Key -> command of the first scene, or of that of a stop, put together as pictures.js does it."""
+    commands, scene = published.commands(data), {}
+    changes = data["stops"][stop][1 + view] if stop is not None else []
+    for numbers in (data["first"][view], changes):
+        for key, command in zip(numbers[::2], numbers[1::2], strict=True):
+            scene[key] = None if command == published.GONE else commands[command]
+    return {tuple(data["keys"][key]): command for key, command in scene.items() if command is not None}
+
+
+# stops ------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
+def test_stops_are_some_ten_and_go_through_what_the_slider_can_be(low: float, first: float, high: float, step: float) -> None:
+    found = stops(low, first, high, step)
+    assert {low, first, high} <= set(found) and list(found) == sorted(set(found))
+    assert 6 <= len(found) <= 16
+    assert np.allclose([(x - low) / step for x in found], [round((x - low) / step) for x in found], atol=1e-6)
+    assert max(np.diff(found)) < 0.3 * (high - low)
+
+
+def test_a_slider_without_a_range_has_one_stop() -> None:
+    assert stops(2.0, 2.0, 2.0, 1.0) == (2.0,)
+
+
+def test_few_combinations_are_all_computed_and_of_many_one_slider_at_a_time() -> None:
+    assert places([3, 2], [1, 0]) == ([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)], True)
+    alone, together = places([5, 5, 5], [1, 2, 4])
+    assert not together and len(alone) == 13 and len(set(alone)) == 13  # 5 + 5 + 5, the first place once
+    assert all(sum(a != b for a, b in zip(place, (1, 2, 4), strict=True)) <= 1 for place in alone)
+    assert places([MOST], [0])[1] and not places([MOST + 1], [0])[1]
+
+
+# panels -----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more(view: fb.Viewer) -> None:
+    panel = squat(view, stops={"down": (0, 0.05, 0.1), "force": (0, 30, 60)}, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
+    data = data_of(panel)
+    assert data["together"] and set(data["stops"]) == {f"{i},{k}" for i in range(3) for k in range(3)}
+    assert data["stops"]["1,1"][1] == []  # where all began
+    for stop in data["stops"]:
+        down, force = ((0, 0.05, 0.1)[int(stop[0])], (0, 30, 60)[int(stop[2])])
+        note = panel.draw_at({"down": down, "force": force})
+        kept = scene_at(data, stop)
+        assert (
+            data["notes"][data["stops"][stop][0]]
+            == note
+            == ("more than 50 &lt; 60" if force == 60 else f"<b>{down:.2f}</b> {force}")
+        )
+        assert kept == dict(view.window.scene.file_entries())
+    meshes = sum(len(command) for key, command in scene_at(data).items() if "/robot/" in key[0] and key[1] == "set_object")
+    changed = sum(len(published.commands(data)[n]) for stop in data["stops"].values() for n in stop[1][1::2] if n >= 0)
+    assert changed < 0.3 * meshes  # the robot's shape is held once
+
+
+def test_a_panel_for_a_site_is_left_as_it_was_and_names_its_sliders(view: fb.Viewer) -> None:
+    panel = squat(view, down=(0, 0.02, 0.1, "m"))
+    before = dict(view.window.scene.file_entries())
+    data = data_of(panel)
+    assert dict(view.window.scene.file_entries()) == before and panel.sliders["down"].value == 0.02
+    (control,) = data["controls"]
+    assert (control["name"], control["unit"], control["kind"]) == ("down", "m", "range")
+    assert control["values"][control["first"]] == "0.020" and control["values"][-1] == "0.100"
+    assert data["words"] and "one slider" not in data["words"]
+
+
+def test_many_sliders_move_one_at_a_time_and_the_page_says_so(view: fb.Viewer) -> None:
+    def draw(a: float, b: float, c: float) -> str:
+        return view.show(view.robot.standing(), title=f"{a} {b} {c}").robot.name
+
+    panel = slider_panel(view, draw, a=(0, 1, 9), b=(0, 1, 9), c=(0, 1, 9))
+    data = data_of(panel)
+    assert not data["together"] and "one slider moves at a time" in data["words"]
+    first = [control["first"] for control in data["controls"]]
+    assert all(sum(int(i) != k for i, k in zip(stop.split(","), first, strict=True)) <= 1 for stop in data["stops"])
+
+
+def test_a_panel_without_a_view_keeps_its_notes() -> None:
+    data = data_of(slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", stops={"x": (0, 1, 2)}, x=(0, 1, 2)))
+    assert data["notes"] == [f"<img alt='{i}'>" for i in range(3)] and data["first"] == []
+    assert data["stops"] == {"0": [0], "1": [1], "2": [2]}
+
+
+def test_stops_of_a_control_must_be_there() -> None:
+    with pytest.raises(fb.errors.ViewerError, match="stop 3"):
+        published.Control("x", ("0", "1"), 3)
+
+
+def test_a_picture_that_moves_no_more_keeps_no_animation(view: fb.Viewer) -> None:
+    record = fb.rollout(fb.Simulation(view.robot), ConstantTorques(np.zeros(12)), 0.02)
+    assert any(key[1] == ANIMATION for key in scene_at(data_of(view.play(record))))
+    assert not any(key[1] == ANIMATION for key in scene_at(data_of(view.show(view.robot.standing()))))
+
+
+def test_a_push_panel_becomes_recorded_runs(view: fb.Viewer) -> None:
+    sim = fb.Simulation(view.robot)
+    controller = fb.WholeBodyController(view.robot, sim.feet, fb.standing_tasks(sim.state))
+    view.show(sim.state, sim.feet)
+    run = live(sim, controller, view)
+    data = data_of(push_panel(run, view, most=480.0))
+    assert [len(control["values"]) for control in data["controls"]] == [5, 4]
+    assert not any(key[1] == ANIMATION for key in scene_at(data, "0,1"))
+    notes = {stop: data["notes"][about[0]] for stop, about in data["stops"].items()}
+    assert notes["1,0"] == "it stands" and notes["4,1"].endswith("it falls") and notes["0,0"] == ""
+    moving = [
+        {key: c for key, c in scene_at(data, f"{i},{k}").items() if key[1] == ANIMATION} for i in (1, 4) for k in range(4)
+    ]
+    assert all(len(one) == 1 for one in moving) and len({c for one in moving for c in one.values()}) == 8
+    assert run.status == "paused" and sim.time == 0.0
+
+
+# files ------------------------------------------------------------------------------------------------------------------
+
+
+def parts_of(path: Path) -> list[bytes]:
+    found = re.fullmatch(r'floatbasePictures\.take\("([^"]+)","([^"]+)"\)\n', path.read_text(encoding="ascii"))
+    assert found is not None and found.group(1) == path.stem
+    return wire.unframe(gzip.decompress(base64.b64decode(found.group(2))))
+
+
+def placed(html: str) -> str:
+    return re.findall(r'data-picture="([^"]+)"', html)[0]
+
+
+def test_files_hold_what_outputs_held_and_shared_meshes_once(view: fb.Viewer, tmp_path: Path) -> None:
+    made, data, names = Pictures(tmp_path), [], []
+    for title in ("one", "two"):
+        bundle = view.show(view.robot.standing(), title=title)._repr_mimebundle_()
+        data.append(bundle[published.MIME])
+        names.append(placed(made.place(bundle) or ""))
+    made.write()
+    files = {path.stem: path for path in (tmp_path / "pictures").glob("go2-*.js")}
+    assert len(files) == 1 and {path.name for path in (tmp_path / "pictures").glob("viewer.*")} == {"viewer.html", "viewer.js"}
+    (shared,) = (parts_of(path) for path in files.values())
+    for name, about in zip(names, data, strict=True):
+        head, *own = parts_of(tmp_path / "pictures" / f"{name}.js")
+        known = json.loads(head)
+        assert known["shared"] == list(files)
+        assert [[*shared, *own][i] for i in known["at"]] == published.commands(about)
+        assert sum(map(len, own)) < 0.05 * sum(map(len, shared))
+
+
+def test_a_later_build_leaves_files_of_pictures_that_it_did_not_place(view: fb.Viewer, tmp_path: Path) -> None:
+    view.show(view.robot.standing())
+    first, second = Pictures(tmp_path), Pictures(tmp_path)
+    first.place(view._repr_mimebundle_())
+    first.write()
+    before = {path: path.read_bytes() for path in (tmp_path / "pictures").iterdir()}
+    second.place(view.show(view.robot.standing(), title="new")._repr_mimebundle_())
+    second.write()
+    assert all(path.read_bytes() == content for path, content in before.items())
+
+
+def test_what_is_no_picture_is_not_placed_and_texts_are_escaped(tmp_path: Path) -> None:
+    made = Pictures(tmp_path)
+    assert made.place({"text/html": "<b>3</b>"}) is None and made.place({}) is None
+    panel = slider_panel(None, lambda **x: "<i>note</i>", **{"a<b": (0, 1, 2, '"s"')})  # type: ignore[arg-type]
+    html = made.place(panel._repr_mimebundle_())
+    assert html is not None and "<i>note</i>" in html and "a&lt;b" in html and "a<b" not in html and '"s"' not in html
+    assert 'type="range"' in html and "aria-label" in html and "aria-valuetext" in html
+
+
+def test_the_playground_stands_still_and_says_why(go2: fb.Robot) -> None:
+    from floatbase.playground import playground
+
+    field = playground("go2")
+    data = data_of(field)
+    assert "live lesson" in data["words"] and data["controls"] == [] and not field.run.moves
+    assert any("/robot/" in key[0] for key in scene_at(data))
+    field.close()
+
+
+def test_the_game_of_rows_has_every_set_of_rows() -> None:
+    from floatbase.lessons.lessonC import Game
+
+    game = Game()
+    data = data_of(game)
+    bowls = data["controls"][0]["values"]
+    assert len(data["stops"]) == len(bowls) * 2 ** len(game.rows)
+    solved = [stop for stop, (note, *_) in data["stops"].items() if "solved" in data["notes"][note]]
+    assert {stop.split(",")[0] for stop in solved} == {str(i) for i in range(len(bowls))}
+    assert (game.working, game.clicks) == ((), 0)
+
+
+# in a browser -----------------------------------------------------------------------------------------------------------
+
+browser = browser_of_a_file
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *args: Any) -> None:
+        """Say nothing."""
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(folder)))
+    Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.fixture(scope="module")
+def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of a panel, a recording far below it and a note with a slider, one level deep as the pages of the site."""
+    folder = tmp_path_factory.mktemp("site")
+    made, views = Pictures(folder / "_static"), [fb.Viewer(go2, height=240) for _ in range(2)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FLOATBASE_VIEWER", "site")
+        given = {"down": (0, 0.05, 0.1), "force": (0, 30, 60)}
+        panel = squat(views[0], stops=given, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
+        push = fb.Push(np.array([0.0, 40.0, 0.0]), 0.1, 0.05)
+        record = fb.rollout(fb.Simulation(go2), ConstantTorques(np.zeros(12)), 0.2, [push])
+        moving = views[1].play(record, title="falls")
+        note = slider_panel(None, lambda x: f"x is {x:.0f}", stops={"x": (0, 1, 2)}, x=(0, 1, 2))
+        shown = [made.place(one._repr_mimebundle_()) for one in (panel, note, moving)]
+    for one in views:
+        one.close()
+    made.write()
+    for name in ("pictures.js", "pictures.css"):
+        shutil.copy(STATIC / name, folder / "_static" / name)
+    (folder / "lessons").mkdir()
+    head = '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
+    scripts = '<link rel="stylesheet" href="../_static/pictures.css"><script src="../_static/pictures.js"></script>'
+    body = '<div style="height: 4000px"></div>'.join(map(str, (f"{shown[0]}{shown[1]}", shown[2])))
+    text = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">{head}{scripts}</head><body>{body}</body></html>'
+    (folder / "lessons" / "00.html").write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def page(site: Path, browser: Any) -> Iterator[Any]:
+    """The page, served by this machine; it asks nobody else and reports no error."""
+    opened = browser.new_page(viewport={"width": 900, "height": 700}, reduced_motion="reduce")
+    said: list[str] = []
+    requested: list[str] = []
+    opened.on("console", lambda line: said.append(line.text) if line.type == "error" else None)
+    opened.on("pageerror", lambda error: said.append(str(error)))
+    opened.on("request", lambda request: requested.append(request.url))
+    with served(site) as address:
+        opened.goto(f"{address}/lessons/00.html")
+        yield opened
+        assert said == []
+        assert [url for url in requested if not url.startswith((address, "data:", "blob:", "about:"))] == []
+        opened.close()
+
+
+def inside(page: Any, number: int = 0) -> Any:
+    """The frame of a picture, once it has drawn."""
+    place = page.locator(".floatbase-picture:has(.floatbase-scene)").nth(number)
+    place.scroll_into_view_if_needed()
+    place.locator("iframe").wait_for(state="attached", timeout=60_000)
+    frame = place.locator("iframe").element_handle().content_frame()
+    frame.wait_for_function("window.viewer && viewer.num_messages_received > 0", timeout=60_000)
+    return frame
+
+
+SIGNATURE = """() => {
+  const found = {}, walk = (node, path) => {
+    const drawn = node.children["<object>"], {matrix, visible} = node.object;
+    node.object.updateMatrix();
+    found[path] = [...matrix.elements.map((x) => x.toFixed(4)), drawn ? drawn.object.material?.color?.getHex() : null].join();
+    for (const [name, child] of Object.entries(node.children)) if (name !== "<object>") walk(child, `${path}/${name}`);
+  };
+  walk(viewer.scene_tree.find(["meshcat"]), "");
+  return found;
+}"""
+
+
+def set_to(page: Any, number: int, value: int) -> None:
+    page.locator("input[type=range]").nth(number).evaluate(
+        "(one, value) => { one.value = value; one.dispatchEvent(new Event('input')); }", value
+    )
+
+
+@needs_chromium
+def test_a_slider_moves_the_robot_without_a_kernel(page: Any) -> None:
+    frame = inside(page)
+    height = "viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.z"
+    before = frame.evaluate(height)
+    page.locator("input[type=range]").first.focus()
+    page.keyboard.press("ArrowRight")
+    frame.wait_for_function(f"Math.abs({height} - {before} + 0.05) < 1e-4")
+    assert page.locator(".floatbase-note b").first.text_content() == "0.10"
+    assert page.locator("output").first.text_content() == "0.100"
+    assert page.locator("input[type=range]").first.get_attribute("aria-valuetext") == "0.100 m"
+    assert frame.evaluate("document.getElementById('title').textContent") == "0.10"
+    page.locator("input[type=range]").nth(2).focus()  # of the note below
+    page.keyboard.press("End")
+    assert page.locator(".floatbase-note").nth(1).text_content() == "x is 2"
+
+
+@needs_chromium
+def test_a_stop_looks_alike_whatever_was_shown_before(page: Any) -> None:
+    frame = inside(page)
+    seen: dict[int, Any] = {}
+    count = 1
+    for order in ([0, 1, 2, 1, 0], [2, 0, 1, 2]):
+        for force in order:
+            set_to(page, 1, force)
+            count += 1
+            frame.wait_for_function(f"viewer.num_messages_received >= {count}")
+            assert seen.setdefault(force, frame.evaluate(SIGNATURE)) == frame.evaluate(SIGNATURE)
+    arrows = {force: {path for path in found if "/measured/" in path} for force, found in seen.items()}
+    assert not arrows[0] and arrows[1] and seen[1] != seen[2]
+
+
+@needs_chromium
+def test_a_recording_waits_where_motion_is_unwanted_plays_on_request_and_rests_out_of_sight(page: Any) -> None:
+    frame = inside(page, 1)
+    assert frame.evaluate("[viewer.animator.playing, viewer.animator.duration]") == [False, pytest.approx(0.2, abs=0.01)]
+    arrow = "viewer.scene_tree.find(['meshcat', 'push']).object.visible"
+    assert not frame.evaluate(arrow)  # it comes with the push
+    frame.locator("#player button").click()
+    frame.wait_for_function(f"viewer.animator.playing && {arrow}")
+    panel = inside(page, 0)
+    frame.wait_for_function("viewer.resting()", timeout=20_000)
+    panel.wait_for_function("!viewer.resting()", timeout=20_000)
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=str(SCREENSHOTS / "site_picture.png"))
+
+
+@needs_chromium
+def test_a_page_of_pictures_fits_a_phone(page: Any) -> None:
+    page.set_viewport_size({"width": 390, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    for box in (page.locator("input[type=range]").nth(i).bounding_box() for i in range(3)):
+        assert box["width"] > 250 and box["height"] >= 24

@@ -1,0 +1,224 @@
+"""The web site: built without a warning, whole in itself, small, readable without network, and found by its search."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+
+from floatbase.lessons.publish import FOLDER, equations, read
+from floatbase.lessons.publish.site import docstrings, linked, mathml, prepared
+
+pytestmark = pytest.mark.timeout(600)
+SHOWN = ["00_start_here.ipynb", "06_friction_cones.ipynb"]
+MOST = 3e6  # bytes of a page with its images
+browser = browser_of_a_file
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A site of two lessons, as stored; the picture of its first page is run. Faults of Sphinx end it with an error."""
+    folder = tmp_path_factory.mktemp("built") / "site"
+    command = [sys.executable, "-m", "floatbase.lessons.publish", "site", "--stored", "--to", str(folder)]
+    done = subprocess.run([*command, *(str(FOLDER / name) for name in SHOWN)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    return folder
+
+
+class Page(HTMLParser):
+    """What a page links to, loads and is linked by. links: what a reader may click. loaded: what a browser fetches."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links, self.loaded, self.names, self.alts = set[str](), set[str](), set[str](), list[str]()
+        self.described = False
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        given = dict(attributes)
+        self.names.add(given.get("id") or "")
+        self.described |= tag == "meta" and given.get("name") == "description"
+        if tag == "a" or (tag == "link" and given.get("rel") in ("next", "prev", "search", "index")):
+            self.links.add(given.get("href") or "")
+        elif tag in ("link", "script", "img", "iframe"):
+            self.loaded.add(given.get("href" if tag == "link" else "src") or "")
+        if tag == "img":
+            self.alts.append(given.get("alt") or "")
+
+
+@cache
+def page_at(path: Path) -> Page:
+    return Page(path)
+
+
+def pages(folder: Path) -> Iterator[Path]:
+    return (path for path in sorted(folder.rglob("*.html")) if "_static" not in path.parts)
+
+
+def test_every_link_within_the_site_leads_somewhere(built: Path) -> None:
+    wrong = []
+    for path in pages(built):
+        for link in page_at(path).links | page_at(path).loaded:
+            parts = urlsplit(link)
+            if parts.scheme or not link:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            if not target.is_file():
+                wrong.append(f"{path.relative_to(built)}: {link}")
+            elif parts.fragment and target.suffix == ".html" and unquote(parts.fragment) not in page_at(target).names:
+                wrong.append(f"{path.relative_to(built)}: {link} has no such place")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_no_page_loads_anything_from_elsewhere_or_is_large(built: Path) -> None:
+    wrong = []
+    for path in pages(built):
+        loaded = page_at(path).loaded
+        wrong += [f"{path.name} loads {link}" for link in loaded if urlsplit(link).scheme not in ("", "data")]
+        own = [path, *(path.parent / link for link in loaded if "_images" in link)]
+        size = sum(file.stat().st_size for file in own)
+        wrong += [f"{path.name} has {size / 1e6:.1f} MB"] if size > MOST else []
+    assert not wrong, "\n".join(wrong)
+
+
+def test_pages_say_what_they_are_and_figures_what_they_show(built: Path) -> None:
+    made = {"_modules", "genindex.html", "py-modindex.html", "search.html"}
+    texts = [path for path in pages(built) if not made & set(path.parts)]
+    assert len(texts) > 25
+    assert [path.name for path in texts if not page_at(path).described] == []
+    assert [path.name for path in texts if "" in page_at(path).alts] == []
+
+
+def test_equations_and_functions_lead_to_each_other(built: Path) -> None:
+    map_page = page_at(built / "lessons" / "equations.html")
+    for entry in equations.entries():
+        room, name = entry.path.split(".", 1)
+        assert f"../api/floatbase.{room}.html#floatbase.{room}.{name}" in map_page.links
+        back = {f"../lessons/equations.html#{number}" for number in map(anchor, entry.equations)}
+        assert back <= page_at(built / "api" / f"floatbase.{room}.html").links
+    assert {anchor(number) for number in equations.TITLES} <= map_page.names
+    text = (built / "lessons" / "equations.html").read_text(encoding="utf-8")
+    assert text.count('class="equation"') == len(equations.TITLES)
+
+
+def anchor(number: str) -> str:
+    return f"app-{number[-1].lower()}" if number.startswith("App") else f"eq-{number.strip('()')}"
+
+
+@needs_chromium
+def test_pages_ask_nobody_for_anything_and_fit_a_phone(built: Path, browser: Any) -> None:
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    asked, said, wide = [], [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("console", lambda line: said.append(line.text) if line.type == "error" else None)
+    page.on("pageerror", lambda error: said.append(str(error)))
+    for path in pages(built):
+        if "_modules" not in path.parts or path.name == "contacts.html":  # code, page by page alike
+            page.goto(path.as_uri())
+            wide += [path.name] if page.evaluate("document.documentElement.scrollWidth") > 390 else []
+    page.close()
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
+    assert (said, wide) == ([], [])
+
+
+@needs_chromium
+def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.goto((built / "lessons" / "equations.html").as_uri() + "#eq-13")
+    page.evaluate("document.fonts.ready")
+    formula = page.locator(".equation:has-text('(13)') math")
+    bracket, letter = (formula.locator(what).first.bounding_box() for what in ("mo:text-is('[')", "mtd"))
+    assert bracket["height"] > 2.5 * letter["height"]  # it grows around three rows
+    assert page.evaluate("document.fonts.check('16px Formulas')")
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=str(SCREENSHOTS / "site_map.png"))
+    page.close()
+
+
+@needs_chromium
+def test_search_finds_friction_cones(built: Path, browser: Any) -> None:
+    page = browser.new_page()
+    page.goto((built / "search.html").as_uri() + "?q=friction+cone")
+    page.locator("#search-results li a", has_text="06 · Friction cones").first.wait_for(timeout=20_000)
+    page.locator("#search-results li a", has_text="FrictionCone").first.wait_for(timeout=20_000)
+    page.close()
+
+
+class NoPictures:
+    def place(self, data: Mapping[str, Any]) -> str | None:
+        return "<b>a scene</b>" if "scene" in data else None
+
+
+def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
+    widget = "application/vnd.jupyter.widget-view+json"
+    outputs = [
+        new_output("stream", name="stderr", text="compiling"),
+        new_output("stream", name="stdout", text="\x1b[1mfound\x1b[0m"),
+        new_output("display_data", {"scene": "…", widget: {}}),
+        new_output("display_data", {widget: {}, "image/png": "…"}, metadata={"image/png": {"width": 300}}),
+        new_output("display_data", {widget: {}, "text/plain": "Widget()"}),
+    ]
+    cells = [
+        new_markdown_cell("# 07 · A page\n\nIt *says* what (7) is, as lesson 06 and [lesson 08](08.ipynb) do.\n\n## Curve"),
+        new_code_cell("draw()", outputs=outputs),
+        new_code_cell('predict("07.a", ..., choices=["a", "b"])', metadata={"tags": ["predict"]}),
+        new_code_cell("assert found", metadata={"tags": ["claims"]}),
+        new_code_cell("x = ...", metadata={"tags": ["exercise"]}),
+        new_code_cell('check("07.1", x)', metadata={"tags": ["check"]}, outputs=outputs),
+        new_code_cell('review("07")', outputs=outputs),
+    ]
+    made = prepared(new_notebook(cells=cells), NoPictures(), {"06": "06_cones.ipynb"})
+    text, draw, asked, claims, stub, check, said = made.cells
+    assert "what [(7)](#eq-7) is, as [lesson 06](06_cones.ipynb) and lesson 08 do" in text.source
+    printed, scene, image = draw.outputs
+    assert (printed.text, scene.data) == ("found", {"text/html": "<b>a scene</b>"})
+    assert list(image.data) == ["image/png"]
+    assert draw.metadata["mystnb"]["image"] == {"alt": "Figure: Curve", "width": "300px"}
+    assert "*a* or *b*" in asked.source and "(../run.md)" in asked.source
+    assert "hide-input" in claims.metadata["tags"] and stub.source == "x = ..."
+    assert {check.cell_type, said.cell_type} == {"markdown"} and "(../run.md)" in check.source
+    assert made.metadata["myst"]["html_meta"]["description"].startswith("It says what (7) is")
+
+
+def test_links_leave_code_formulas_and_links_as_they_are() -> None:
+    for text in ("`f(7)`", "$h (7)$", "$$x (7)\n(8)$$", "[as (7)](x.md)", "```\n(7)\n```", "## On (7)", "f(7)", "(99)"):
+        assert linked(text, {}) == text
+    assert linked("(26)(27), §4.1, App. A, note 12", {}) == (
+        "[(26)](#eq-26)[(27)](#eq-27), [§4.1](#sec-4-1), [App. A](#app-a), [note 12](#notes-of-the-document)"
+    )
+
+
+def test_a_docstring_becomes_text_lists_and_links() -> None:
+    text = "(9) ζ of A * b_i by `Contacts`. mu: of friction. a, b: two\n    lines.\n\nx: no parameter.\n\n    code = 1\n"
+    made = docstrings.restructured(text, ["mu", "a", "b"])
+    assert ":ref:`(9) <eq-9>`" in made
+    assert r"A \* b\_i" in made and ":py:obj:`Contacts <floatbase.dynamics.Contacts>`" in made
+    assert "* ``mu``: of friction.\n* ``a``, ``b``: two lines." in made
+    assert "\n\nx: no parameter." in made and "::\n\n    code = 1" in made
+
+
+def test_every_formula_of_the_course_becomes_mathml() -> None:
+    texts = [cell.source for path in FOLDER.glob("*.ipynb") for cell in read(path).cells if cell.cell_type == "markdown"]
+    plain = "\n\n".join(re.sub(r"`[^`\n]*`", "", text) for text in [*texts, equations.table()])
+    found = re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", plain, re.DOTALL)
+    assert len(found) > 300
+    for latex in {block or inline for block, inline in found}:
+        drawn = mathml.mathml(re.sub(r"\\tag\{.*?\}", "", latex), "block")
+        assert "\\" not in re.sub(r"<annotation.*?</annotation>|&#x0005C;", "", drawn), latex
+
+
+def test_a_lesson_that_is_not_there_is_told(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "floatbase.lessons.publish", "site", str(tmp_path / "no.ipynb"), "--to", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2 and "there is no lesson" in done.stderr
