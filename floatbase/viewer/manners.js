@@ -10,6 +10,10 @@ function startManners(viewer, camera) {
   leaveTheWheel(pane, canvas, framed);
   const tools = part("tools"), shown = new Map(Object.keys(PARTS).map((name) => [name, true]));
   let views = {};
+  const set = (name, is) => {
+    const scene = viewer.scene_tree.children.meshcat?.children ?? {};
+    for (const node of PARTS[name]) if (scene[node]) scene[node].object.visible = is;
+  };
   const look = (name) => { if (views[name]) camera.look(views[name]); viewer.set_dirty(); };
 
   const home = tools.querySelector("button"), menu = tools.querySelector("div");
@@ -21,15 +25,13 @@ function startManners(viewer, camera) {
   }
   for (const name of shown.keys()) {
     const label = document.createElement("label"), box = Object.assign(document.createElement("input"), {type: "checkbox", checked: true});
-    box.onchange = () => { shown.set(name, box.checked); viewer.set_dirty(); };
+    box.onchange = () => { shown.set(name, box.checked); set(name, box.checked); viewer.set_dirty(); };
     label.append(box, name);
     menu.append(label);
   }
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
-    const scene = viewer.scene_tree.children.meshcat?.children ?? {};
-    for (const [name, is] of shown)
-      for (const node of PARTS[name]) if (scene[node]) scene[node].object.visible = is;
+    for (const [name, is] of shown) if (!is) set(name, false);  // what is ticked may come and go in a recording
     render();
   };
 

@@ -285,7 +285,8 @@ def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv("FLOATBASE_VIEWER", "site")
         given = {"down": (0, 0.05, 0.1), "force": (0, 30, 60)}
         panel = squat(views[0], stops=given, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
-        record = fb.rollout(fb.Simulation(go2), ConstantTorques(np.zeros(12)), 0.2)
+        push = fb.Push(np.array([0.0, 40.0, 0.0]), 0.1, 0.05)
+        record = fb.rollout(fb.Simulation(go2), ConstantTorques(np.zeros(12)), 0.2, [push])
         moving = views[1].play(record, title="falls")
         note = slider_panel(None, lambda x: f"x is {x:.0f}", stops={"x": (0, 1, 2)}, x=(0, 1, 2))
         shown = [made.place(one._repr_mimebundle_()) for one in (panel, note, moving)]
@@ -384,8 +385,10 @@ def test_a_stop_looks_alike_whatever_was_shown_before(page: Any) -> None:
 def test_a_recording_waits_where_motion_is_unwanted_plays_on_request_and_rests_out_of_sight(page: Any) -> None:
     frame = inside(page, 1)
     assert frame.evaluate("[viewer.animator.playing, viewer.animator.duration]") == [False, pytest.approx(0.2, abs=0.01)]
+    arrow = "viewer.scene_tree.find(['meshcat', 'push']).object.visible"
+    assert not frame.evaluate(arrow)  # it comes with the push
     frame.locator("#player button").click()
-    frame.wait_for_function("viewer.animator.playing && viewer.animator.time > 0")
+    frame.wait_for_function(f"viewer.animator.playing && {arrow}")
     panel = inside(page, 0)
     frame.wait_for_function("viewer.resting()", timeout=20_000)
     panel.wait_for_function("!viewer.resting()", timeout=20_000)

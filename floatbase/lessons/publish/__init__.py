@@ -8,12 +8,12 @@ from floatbase.lessons.publish.notebooks import execute, read, run, solved
 from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare
 
 if TYPE_CHECKING:
-    from floatbase.lessons.publish import conventions, equations, site
+    from floatbase.lessons.publish import conventions, equations, pictures, site
 
-_PARTS = ("conventions", "equations", "site")  # imported at first use; the last needs the extra `site`
+_PARTS = ("conventions", "equations", "pictures", "site")  # imported at first use; the last needs the extra `site`
 
 __all__ = [
-    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "lesson_table", "prepare", "read",
+    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "lesson_table", "pictures", "prepare", "read",
     "readme_with_table", "run", "site", "solved", "title_of",
 ]  # fmt: skip
 

@@ -19,6 +19,7 @@ from typing import Any
 from floatbase.viewer import page, published, wire
 
 _LEAST = 1500  # bytes of a command that pictures share; a smaller one each has itself
+_USUAL = 0.3  # of a robot's pictures
 _FOLDER = "pictures"  # beside pictures.js
 _NEEDS = "This turns and moves where JavaScript is on."
 
@@ -59,17 +60,19 @@ class Pictures:
             self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
     def _groups(self) -> dict[str, list[bytes]]:
-        """Large commands that several pictures have, name of a file -> commands; a file for each set of robots."""
+        """Large commands that several pictures have, name of a file -> commands.
+
+        There is a file for all robots, and for each robot one of what its pictures usually have and one of the rest.
+        """
         pictures = [(set(about["names"]), set(commands)) for about, commands in self._placed.values()]
         uses = Counter(command for _, commands in pictures for command in commands if len(command) >= _LEAST)
-        robots: dict[bytes, set[str]] = {command: set() for command, times in uses.items() if times > 1}
-        for names, commands in pictures:
-            for command in commands & robots.keys():
-                robots[command] |= names
+        robots = {c: set.union(*(names for names, has in pictures if c in has)) for c, times in uses.items() if times > 1}
         found: dict[str, list[bytes]] = {}
         for command in sorted(robots):
-            found.setdefault("-".join(sorted(robots[command])), []).append(command)
-        return {_name(names, *commands): commands for names, commands in found.items()}
+            (robot,) = robots[command] if len(robots[command]) == 1 else ("robots",)
+            usual = uses[command] >= _USUAL * sum(robot in names for names, _ in pictures)
+            found.setdefault(robot if usual else f"{robot}-more", []).append(command)
+        return {_name(name, *commands): commands for name, commands in found.items()}
 
     def _write(self, name: str, parts: Sequence[bytes]) -> None:
         packed = base64.b64encode(gzip.compress(wire.frame(parts), 9, mtime=0)).decode()

@@ -56,15 +56,15 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     shutil.rmtree(source, ignore_errors=True)
     shutil.copytree(_OWN, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     *notebooks, scene = run_all([*([] if stored else shown), _scene(kept)], kept).values()
-    pictures = Pictures(source / "static")
+    pictures = Pictures(folder / "_static")
     _lessons(source, dict(zip(shown, notebooks or map(read, shown), strict=True)), pictures)
     _first_page(source, shown, _picture(scene, pictures))
     _texts(source)
     (source / "api").mkdir()
     for name, text in reference.pages().items():
         (source / "api" / name).write_text(text, encoding="utf-8")
-    pictures.write()
     _sphinx(source, folder)
+    pictures.write()
     pages = (page.read_text(encoding="utf-8") for page in folder.rglob("*.html"))
     mathml.write_font(pages, folder / "_static" / mathml.FONT)
     return folder / "index.html"

@@ -1,10 +1,10 @@
 "use strict";
-// The 3-D pictures of a site. Each is drawn by the viewer in a frame, which is made when the picture comes near the window and
+// The 3-D pictures of a site. Each is drawn by the viewer in a frame, which is made when the picture is about to be seen and
 // returns its WebGL context while it is out of sight: browsers have about 16. What a slider shows was computed before: a stop is a
 // list of what differs from the first, as numbers of keys and commands.
 
 const floatbasePictures = (() => {
-  const BASE = new URL("pictures/", document.currentScript.src), GONE = -1, NEAR = "600px 0px", SEEN = "50px 0px";
+  const BASE = new URL("pictures/", document.currentScript.src), GONE = -1, NEAR = "900px 0px", SEEN = "150px 0px";
   const OLD = "The 3-D pictures of this page are packed in a way that this browser is too old to open. Open it in a current one: " +
     "Chrome or Edge from 80, Firefox from 113, Safari from 16.4.";
   const files = new Map(); // name -> {parts, take}
@@ -154,12 +154,11 @@ const floatbasePictures = (() => {
     sight.observe(figure);
   }
   const near = new IntersectionObserver((entries) => {
-    for (const {target, isIntersecting} of entries) {
-      if (isIntersecting && !started.has(target)) started.set(target, start(target).catch((error) => fail(target, error)));
-    }
+    for (const {target, isIntersecting} of entries) if (isIntersecting) contents(target.dataset.picture).catch(() => {}); // told below
   }, {rootMargin: NEAR});
   const sight = new IntersectionObserver((entries) => {
     for (const {target, isIntersecting} of entries) {
+      if (isIntersecting && !started.has(target)) started.set(target, start(target).catch((error) => fail(target, error)));
       started.get(target)?.then((scenes) => { for (const scene of scenes) scene.sight(isIntersecting); });
     }
   }, {rootMargin: SEEN});
