@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from floatbase.lessons import all_exercises
 
 
@@ -17,3 +19,14 @@ def missed(name: str, wrong: Iterable[tuple[Any, str]]) -> list[tuple[str, str]]
     """Of wrong answers and what their hints must say, those that are told something else: what is missing, what is said."""
     said = [(hint, all_exercises()[name].judge(answer)) for answer, hint in wrong]
     return [(hint, repr(verdict)) for hint, verdict in said if verdict.right or hint not in verdict.text]
+
+
+MASS = 16.085  # kg, of go2
+LIFTED = (9.81 + 2.0) * MASS  # N: the right answer to 00.1
+# what a learner might give instead of an answer
+ODD = {
+    "nothing": None, "Ellipsis": ..., "text": "a", "texts": ["a"] * 12, "nothings": [None] * 12, "ragged": [[1.0], [1.0, 2.0]],
+    "object": object(), "three": (1, 2, 3),
+    "dictionary": {}, "not a number": np.nan, "not numbers": np.full(12, np.nan), "endless": np.full((4, 3), np.inf),
+    "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs, "pair": ("a", "b"),
+}  # fmt: skip

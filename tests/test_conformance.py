@@ -215,8 +215,8 @@ RESULTS = {
 }  # fmt: skip
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live"),
-    "judges whatever a learner may give": ("Exercise", "Numeric", "Shaped", "check", "compare", "numbers", "predict", "reveal",
-        "review"),
+    "judges whatever a learner may give": ("Exercise", "Numeric", "Shaped", "check", "compare", "hand_in", "numbers", "predict",
+        "reveal", "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "AlteredSimulation.advance",

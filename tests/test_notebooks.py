@@ -20,8 +20,8 @@ from nbformat.v4 import new_code_cell, new_notebook
 from panels import moved_sliders
 
 import floatbase as fb
-from floatbase.lessons import all_exercises, check, progress
-from floatbase.lessons.publish import FOLDER, read, run, solved
+from floatbase.lessons import all_exercises, check, hand_in, progress
+from floatbase.lessons.publish import FOLDER, grades, read, run, solved
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 HOME = 'os.environ["FLOATBASE_HOME"]'
@@ -141,6 +141,8 @@ def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
     number = path.stem.split("_")[0]
     solved_now = {name for name, entry in progress.load().items() if entry["right"]}
     assert solved_now == {name for name in all_exercises() if name.startswith(f"{number}.")}
+    marks = grades.judged(hand_in("Ada", tmp_path)).marks
+    assert {mark.exercise for mark in marks if mark.result in ("right", "to be read")} == solved_now, marks
 
 
 def test_all_lessons_together_take_less_than_half_of_the_five_minutes() -> None:

@@ -11,20 +11,22 @@ from floatbase.lessons.rounding import about
 
 if TYPE_CHECKING:
     from floatbase.lessons import stops
+    from floatbase.lessons.handing_in import hand_in
     from floatbase.lessons.panels import SliderPanel, live, push_panel, slider_panel
     from floatbase.lessons.roses import draw_roses, measured_rose, plot_roses, rose_controller
 
 # imported at first use: they load physics and pictures
 _LAZY = {
+    "hand_in": "handing_in",
     **dict.fromkeys(("SliderPanel", "live", "push_panel", "slider_panel"), "panels"),
     **dict.fromkeys(("draw_roses", "measured_rose", "plot_roses", "rose_controller"), "roses"),
     "stops": "stops",
 }
 
 __all__ = [
-    "ConstantTorques", "Exercise", "Numeric", "Shaped", "SliderPanel", "Torques", "Verdict", "about", "all_exercises", "check",
-    "compare", "draw_roses", "joint_servo", "live", "measured_rose", "numbers", "plot_roses", "predict", "progress",
-    "push_panel", "reveal", "review", "rose_controller", "show_progress", "slider_panel", "stops",
+    "ConstantTorques", "Exercise", "Numeric", "Shaped", "SliderPanel", "Torques", "Verdict", "about", "all_exercises",
+    "check", "compare", "draw_roses", "hand_in", "joint_servo", "live", "measured_rose", "numbers", "plot_roses", "predict",
+    "progress", "push_panel", "reveal", "review", "rose_controller", "show_progress", "slider_panel", "stops",
 ]  # fmt: skip
 
 

@@ -199,7 +199,7 @@ def check(name: str, answer: Any) -> Verdict:
     exercise = _exercise(name)
     verdict = exercise.judge(answer)
     if answer is not None and answer is not Ellipsis and not _same(answer, exercise.placeholder()):
-        progress.record(name, verdict.right)
+        progress.record(name, verdict.right, answer)
     return verdict
 
 

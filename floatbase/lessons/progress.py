@@ -7,15 +7,18 @@ need no lock, and an interrupt or a full disk costs that one line at most. Nothi
 from __future__ import annotations
 
 import errno
+import inspect
 import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from floatbase._arrays import LARGEST
+from floatbase._arrays import LARGEST, plain_numbers
+from floatbase.affine import Quadratic
 
 _NAME = "progress.jsonl"
+_LONGEST = 100_000  # characters of an answer that is kept; the longest right one of the course takes less than 20 000
 _BEFORE = "progress.json"  # one object for all tries, written by floatbase up to 0.2.0: read, and left as it is
 
 
@@ -38,9 +41,25 @@ def load() -> dict[str, dict[str, int]]:
     return tried
 
 
-def record(name: str, right: bool) -> None:
-    """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten, without an error."""
-    keep(name, {"tries": 1, "right": int(right)})
+def record(name: str, right: bool, answer: Any = None) -> None:
+    """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten, without an error.
+
+    answer: what was answered; it is kept as the numbers or names that it is, or as the text of a function, and is never run.
+    """
+    keep(name, {"tries": 1, "right": int(right), "answer": as_json(answer)})
+
+
+def answers() -> dict[str, Any]:
+    """For each exercise that was tried: the last right answer `as_json`, or where none was right the last."""
+    found: dict[str, Any] = {}
+    solved = set()
+    for text in _texts():
+        for name, entry in _entries(text):
+            right = entry.get("right") == 1
+            if "answer" in entry and (right or name not in solved):
+                found[name] = entry["answer"]
+                solved |= {name} if right else set()
+    return found
 
 
 def predictions() -> dict[str, dict[str, Any]]:
@@ -67,6 +86,51 @@ def keep(name: str, entry: dict[str, Any]) -> str:
 def obstacle() -> str:
     """Why tries and predictions cannot be kept, and what to do; "" where they can. Makes no file."""
     return _append(b"")
+
+
+def as_json(answer: Any) -> Any:
+    """An answer in the form in which it is kept: numbers, texts, lists; else an object that says what it is.
+
+    `from_json` gives back an answer that a judge takes for the same; only of a function no more than its code is left.
+    """
+    try:
+        kept = _as_json(answer)
+        fits = len(json.dumps(kept)) <= _LONGEST
+    except RecursionError:  # a list that holds itself
+        fits = False
+    return kept if fits else {"too long": type(answer).__name__}
+
+
+def _as_json(answer: Any) -> Any:
+    if isinstance(answer, Quadratic):
+        return {"H": answer.H.tolist(), "g": answer.g.tolist(), "c": answer.c}
+    if isinstance(answer, str):
+        return answer
+    if isinstance(answer, tuple):
+        return {"tuple": [_as_json(part) for part in answer]}
+    if (array := plain_numbers(answer)) is not None:
+        return array.tolist()
+    if isinstance(answer, list):
+        return [_as_json(part) for part in answer]
+    return {"code": _code(answer)} if callable(answer) else {"other": type(answer).__name__}
+
+
+def _code(function: Any) -> str:
+    try:
+        return inspect.getsource(function)
+    except (OSError, TypeError):
+        return "(its code is not known)"
+
+
+def from_json(kept: Any) -> Any:
+    """The answer that `as_json` kept. Raises `ValueError` or another error of Python where it is damaged."""
+    if isinstance(kept, list) and (array := plain_numbers(kept)) is not None:
+        return array
+    if isinstance(kept, list):
+        return [from_json(part) for part in kept]
+    if isinstance(kept, dict):
+        return tuple(map(from_json, kept["tuple"])) if "tuple" in kept else Quadratic(kept["H"], kept["g"], kept["c"])
+    return kept
 
 
 def _append(line: bytes) -> str:

@@ -14,13 +14,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hints import missed, right
+from hints import LIFTED, MASS, ODD, missed, right
 
 import floatbase as fb
 from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
 
-MASS = 16.085  # kg, of go2
-LIFTED = (9.81 + 2.0) * MASS  # N: the right answer to 00.1
 TIMES = 300  # tries of each of those who record at once
 
 
@@ -41,14 +39,6 @@ def changed(answer: Any) -> Any:
     if callable(answer):
         return lambda *given: answer(*given)
     return answer + 1
-
-
-ODD = {
-    "nothing": None, "Ellipsis": ..., "text": "a", "texts": ["a"] * 12, "nothings": [None] * 12, "ragged": [[1.0], [1.0, 2.0]],
-    "object": object(), "three": (1, 2, 3),
-    "dictionary": {}, "not a number": np.nan, "not numbers": np.full(12, np.nan), "endless": np.full((4, 3), np.inf),
-    "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs, "pair": ("a", "b"),
-}  # fmt: skip
 
 
 def test_no_answer_at_all_makes_a_check_fail() -> None:

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from floatbase.errors import InputError
-from floatbase.lessons.publish import FOLDER, README, prepare, readme_with_table, run
+from floatbase.lessons.publish import FOLDER, README, prepare, readme_with_table, run, write_solutions
+
+SOLUTIONS = Path("build/solutions")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -24,6 +26,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     shown.add_argument("--to", type=Path, metavar="FOLDER", help="where to write, build/site by default")
     rosed = commands.add_parser("roses", help="measure the push roses of lessons, such as 05, anew")
     rosed.add_argument("lessons", nargs="+", metavar="LESSON")
+    keys = commands.add_parser("solutions", help="write the lessons with solutions in place of exercises, for teachers")
+    keys.add_argument("--to", type=Path, default=SOLUTIONS, metavar="FOLDER", help=f"where to write, {SOLUTIONS} by default")
+    graded = commands.add_parser("grade", help="judge the answers in files that learners wrote by hand_in(…)")
+    graded.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    graded.add_argument("--table", type=Path, metavar="CSV", help="write a row for each learner and exercise, too")
+    graded.add_argument("--code", action="store_true", help="print code that was handed in, to be read")
     commands.add_parser("workspace", help="bring the learner's copy in notebooks/my up to date")
 
     given = parser.parse_args(arguments)
@@ -36,6 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _site(given.lessons or None, given.to, given.stored)
         elif given.command == "roses":
             _roses(given.lessons)
+        elif given.command == "solutions":
+            _solutions(given.to)
+        elif given.command == "grade":
+            _grade(given.files, given.table, given.code)
         else:
             for line in prepare():
                 print(line)
@@ -62,6 +74,23 @@ def _roses(lessons: Sequence[str]) -> None:
 
     for lesson in lessons:
         print(f"{lesson}: {measure_rose(lesson)}")
+
+
+def _solutions(folder: Path) -> None:
+    for path in write_solutions(folder):
+        print(path)
+
+
+def _grade(files: Sequence[Path], table: Path | None, code: bool) -> None:
+    from floatbase.lessons.publish import grades
+
+    everyone = grades.grade(files)
+    print(grades.overview(everyone))
+    if code:
+        print(grades.code_to_read(everyone))
+    if table:
+        grades.write_table(everyone, table)
+        print(f"All marks: {table}")
 
 
 def _site(lessons: Sequence[Path] | None, folder: Path | None, stored: bool) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons.publish.workspace import FOLDER
 
 # nbformat and nbclient are imported where they are used: `make lab` needs neither
 
@@ -42,6 +44,29 @@ def execute(notebook: Any, folder: Path, **settings: str) -> Any:
     client = NotebookClient(notebook, timeout=120, resources=where, extra_arguments=quiet, coalesce_streams=True)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as home:
         return client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
+
+
+def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
+    """Write lessons with the solution of each exercise in its place, and why it is right below; returns the files.
+
+    folder: made if need be. sources: the lessons, all of the course by default.
+    """
+    import nbformat
+    from nbformat.v4 import new_markdown_cell
+
+    known, written = all_exercises(), []
+    folder.mkdir(parents=True, exist_ok=True)
+    for source in sources or sorted(FOLDER.glob("*.ipynb")):
+        notebook, cells = solved(read(source)), []
+        for cell in notebook.cells:
+            cells.append(cell)
+            name = cell.metadata.get("exercise")
+            if name and known[name].explanation:
+                cells.append(new_markdown_cell(f"**Why.** {known[name].explanation}"))
+        notebook.cells = cells
+        written.append(folder / f"{source.stem}.solved.ipynb")
+        nbformat.write(notebook, written[-1])
+    return written
 
 
 def run(path: Path) -> None:

@@ -1,0 +1,164 @@
+"""What learners have handed in, judged again: a line for each of them, and a table of all marks. No code of theirs is run."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from floatbase.errors import InputError
+from floatbase.lessons import progress
+from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons.handing_in import FORM
+
+_LARGEST_FILE = 20_000_000  # bytes; all answers of the course take less than 0.1 MB
+_PARTS = {"name": str, "exercises": dict, "predictions": dict}
+_NEVER, _READ = "·", "to be read"
+_COLUMNS = ("name", "time", "exercise", "result", "tries", "told")
+_FORMULA = ("=", "+", "-", "@")  # a spreadsheet runs a text that begins so
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What came of one exercise of one learner.
+
+    exercise: its name. tries: how many. result: "right", "wrong", "to be read" for code that the learner's own check judged,
+    or "·" where it was not tried. told: what the check says now, or the code to be read.
+    """
+
+    exercise: str
+    tries: int = 0
+    result: str = _NEVER
+    told: str = ""
+
+
+@dataclass(frozen=True)
+class HandedIn:
+    """What a file of `hand_in` is worth. name: the learner's. time: when it was written. marks: of every exercise.
+
+    predicted: how many predictions were made.
+    """
+
+    name: str
+    time: str
+    marks: tuple[Mark, ...]
+    predicted: int
+
+
+def judged(path: str | Path) -> HandedIn:
+    """Judge every answer of a file that `hand_in` wrote again: what it claims does not count, and none of its code is run.
+
+    Raises `InputError` where the file is none of `hand_in`.
+    """
+    found = _read(Path(path))
+    return HandedIn(
+        name=_line(found["name"]),
+        time=_line(found.get("time")),
+        marks=tuple(_marks(found["exercises"])),
+        predicted=len(found["predictions"]),
+    )
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The content of a file of `hand_in`."""
+    try:
+        large = path.stat().st_size > _LARGEST_FILE
+        found = None if large else json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict) or not all(isinstance(found.get(key), kind) for key, kind in _PARTS.items()):
+        found = {}
+    if found.get("form") != FORM:
+        raise InputError(f"{path} is not a file that hand_in(…) wrote, or it was cut short. Ask for it again.")
+    return found
+
+
+def _marks(entries: dict[str, Any]) -> Iterator[Mark]:
+    for name, exercise in all_exercises().items():
+        entry = entries.get(name)
+        entry = entry if isinstance(entry, dict) else {}
+        tries, kept = entry.get("tries"), entry.get("answer")
+        if type(tries) is not int or tries < 1:
+            yield Mark(name)
+            continue
+        if isinstance(kept, dict) and isinstance(code := kept.get("code"), str):
+            yield Mark(name, tries, _READ, code)
+            continue
+        try:
+            with np.errstate(all="ignore"):
+                verdict = exercise.judge(progress.from_json(kept))
+        except Exception as error:  # a file may hold anything, and one answer must not end the others' judgement
+            yield Mark(name, tries, "wrong", f"The answer cannot be judged: {_line(error)}")
+        else:
+            yield Mark(name, tries, "right" if verdict.right else "wrong", verdict.text)
+
+
+def _line(value: Any) -> str:
+    """As text on one short line, whatever it is."""
+    return "".join(letter if letter.isprintable() else " " for letter in str(value))[:80]
+
+
+def grade(files: Sequence[Path]) -> list[HandedIn]:
+    """Judge the files, in their order. One that `hand_in` did not write is told on the error stream and left out.
+
+    Raises `InputError` where none is left.
+    """
+    everyone = []
+    for path in tqdm(files, desc="judging", unit="file", leave=False, disable=None):
+        try:
+            everyone.append(judged(path))
+        except InputError as error:
+            print(error, file=sys.stderr)
+    if not everyone:
+        raise InputError("No file is left to judge: give files that learners wrote by hand_in(…).")
+    return everyone
+
+
+def overview(everyone: Sequence[HandedIn]) -> str:
+    """A line for each learner: exercises that are right, lesson by lesson, and all; how much code there is to read."""
+    lessons = sorted({mark.exercise.split(".")[0] for mark in everyone[0].marks})
+    rows = [("", *lessons, "all", "to be read", "predictions")]
+    for one in everyone:
+        rights = [mark.exercise.split(".")[0] for mark in one.marks if mark.result == "right"]
+        unread = sum(mark.result == "to be read" for mark in one.marks)
+        counts = [rights.count(lesson) for lesson in lessons]
+        rows.append((one.name, *map(str, counts), f"{len(rights)} of {len(one.marks)}", str(unread), str(one.predicted)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(f"{part:<{width}}" for part, width in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def code_to_read(everyone: Sequence[HandedIn]) -> str:
+    """All code that was handed in: what a check cannot judge without running it."""
+    found = [(one.name, mark) for one in everyone for mark in one.marks if mark.result == "to be read"]
+    return "\n".join(f"--- {name}, {mark.exercise}\n{_visible(mark.told)}" for name, mark in found)
+
+
+def _visible(code: str) -> str:
+    """Code without characters that would work the terminal."""
+    return "".join(letter if letter.isprintable() or letter in "\n\t" else "?" for letter in code)
+
+
+def write_table(everyone: Sequence[HandedIn], path: Path) -> None:
+    """Write a row for each learner and exercise, as CSV. Raises `InputError` where the file cannot be written."""
+    rows = [(one.name, one.time, m.exercise, m.result, m.tries, m.told) for one in everyone for m in one.marks]
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(_COLUMNS)
+            writer.writerows([_plain(part) for part in row] for row in rows)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror}.") from None
+
+
+def _plain(value: object) -> object:
+    """A value that a spreadsheet takes for a text and not for a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value

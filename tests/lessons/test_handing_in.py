@@ -1,0 +1,162 @@
+"""Handing in: answers come back as they were given, are judged again, and no file runs code or ends a judgement."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hints import LIFTED, ODD
+
+import floatbase as fb
+from floatbase.errors import InputError
+from floatbase.lessons import all_exercises, check, hand_in, predict, progress
+from floatbase.lessons.publish import FOLDER, grades, read, write_solutions
+
+
+@pytest.fixture(autouse=True)
+def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """One who has just begun, in a folder of their own."""
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def through_a_file(answer: Any) -> Any:
+    return progress.from_json(json.loads(json.dumps(progress.as_json(answer))))
+
+
+def same(a: Any, b: Any) -> bool:
+    if isinstance(a, fb.Quadratic):
+        return isinstance(b, fb.Quadratic) and bool(np.array_equal(a.H, b.H) and np.array_equal(a.g, b.g)) and a.c == b.c
+    if isinstance(a, tuple):
+        return isinstance(b, tuple) and all(same(*pair) for pair in zip(a, b, strict=True))
+    return bool(np.array_equal(a, b))
+
+
+def test_every_kind_of_answer_of_the_course_comes_back_to_the_last_bit() -> None:
+    placeholders = {name: exercise.placeholder() for name, exercise in all_exercises().items()}
+    answers = {name: answer for name, answer in placeholders.items() if not callable(answer)}
+    assert len(answers) > 40
+    back = {name: through_a_file(answer) for name, answer in answers.items()}
+    assert [name for name, answer in answers.items() if not same(answer, back[name])] == []
+
+
+def test_odd_answers_are_kept_in_some_form_too() -> None:
+    endless: list[Any] = []
+    endless.append(endless)
+    for odd in [*ODD.values(), endless, np.zeros((1000, 1000)), lambda x: x]:
+        json.dumps(progress.as_json(odd))
+
+
+def test_a_file_is_judged_again_and_its_claims_do_not_count(learner: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for answer in (3.0, LIFTED, 4.0):
+        check("00.1", answer)
+    check("03.1", 5)
+    predict("02.c", 12.5, unit="mm")
+    path = hand_in("Ada Lovelace")
+    assert path.name == "answers-Ada_Lovelace.json" and "1 of" in capsys.readouterr().out
+    marks = {mark.exercise: mark for mark in grades.judged(path).marks}
+    assert (marks["00.1"].result, marks["00.1"].tries) == ("right", 3)
+    assert (marks["03.1"].result, marks["01.1"].result, grades.judged(path).predicted) == ("wrong", "·", 1)
+
+    claimed = json.loads(path.read_text())
+    claimed["exercises"]["00.1"]["answer"] = 7.0
+    claimed["exercises"]["01.1"] = {"tries": 1, "right": 1, "answer": [0.0, 0.0, 0.0]}
+    path.write_text(json.dumps(claimed))
+    assert {mark.result for mark in grades.judged(path).marks if mark.exercise in ("00.1", "01.1")} == {"wrong"}
+
+
+def test_code_is_kept_to_be_read_and_never_run(learner: Path) -> None:
+    ran = []
+
+    def row_to_drop(W: Any, prices: Any) -> None:
+        ran.append(W)
+
+    check("C.3", row_to_drop)
+    before = len(ran)
+    path = hand_in("Ada")
+    out = grades.code_to_read([grades.judged(path)])
+    assert len(ran) == before > 0
+    assert "def row_to_drop" in out and "--- Ada, C.3" in out
+
+
+HOSTILE = (
+    {"tuple": 3}, {"H": [[1.0]], "g": "a", "c": None}, {"tuple": [[[1.0], [1.0, 2.0]]]}, {"code": 5}, {}, [[[[]]]],
+    "a" * 10_000, {"other": "object"}, None, True, 1e400, [float("nan")] * 12, {"__import__": "os"},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kept", HOSTILE, ids=range(len(HOSTILE)))
+def test_an_answer_of_any_form_is_judged_without_an_error(learner: Path, kept: Any) -> None:
+    entry = {"tries": 1, "right": 1, "answer": kept}
+    found = {"form": "answers to the floatbase course", "name": "\x1b[2J=1", "predictions": {}}
+    path = learner / "a.json"
+    path.write_text(json.dumps(found | {"exercises": dict.fromkeys(all_exercises(), entry) | {"99.1": 5}}))
+    handed_in = grades.judged(path)
+    assert {mark.result for mark in handed_in.marks} == {"wrong"}
+    assert handed_in.name.isprintable()
+
+
+NO_FILE = ("", "null", "[]", "{", '{"form": 5}', "[" * 100_000, '{"form": "answers to the floatbase course", "name": 5}')
+
+
+@pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
+def test_what_hand_in_did_not_write_is_told(learner: Path, text: str) -> None:
+    (learner / "a.json").write_text(text)
+    with pytest.raises(InputError, match="is not a file that hand_in"):
+        grades.judged(learner / "a.json")
+    with pytest.raises(InputError, match="cannot be read"):
+        grades.judged(learner / "none.json")
+
+
+def test_nothing_to_hand_in_no_name_and_no_place_are_told(learner: Path) -> None:
+    with pytest.raises(InputError, match="nothing to hand in yet"):
+        hand_in("Ada")
+    check("00.1", 3.0)
+    for name in ("", " ", "..", "a\nb"):
+        with pytest.raises(InputError, match="name must be the name"):
+            hand_in(name)
+    with pytest.raises(InputError, match="cannot be written"):
+        hand_in("Ada", learner / "none")
+    assert hand_in("../../Ada").parent == Path(".")
+
+
+def test_a_class_is_one_table(learner: Path) -> None:
+    check("00.1", LIFTED)
+    files = [str(hand_in(name)) for name in ("Ada", "Émilie du Châtelet", "=1+1")]
+    (learner / "holiday.json").write_text("{}")
+    command = [sys.executable, "-m", "floatbase.lessons.publish", "grade", "holiday.json"]
+    said = subprocess.run([*command, *files, "--table", "marks.csv"], capture_output=True, text=True, check=True)
+    assert (
+        said.stdout.count("1 of ") == 3 and "Émilie du Châtelet" in said.stdout and "holiday.json is not a file" in said.stderr
+    )
+    rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
+    assert len(rows) == 3 * len(all_exercises())
+    assert {row["name"] for row in rows} == {"Ada", "Émilie du Châtelet", "'=1+1"}
+    with pytest.raises(InputError, match="No file is left to judge"):
+        grades.grade([learner / "holiday.json"])
+
+
+def test_the_last_right_answer_is_kept_or_else_the_last(learner: Path) -> None:
+    for answer in (1.0, 2.0):
+        check("00.1", answer)
+    assert progress.answers() == {"00.1": 2.0}
+    for answer in (LIFTED, 3.0):
+        check("00.1", answer)
+    assert progress.answers() == {"00.1": LIFTED}
+
+
+def test_solutions_for_teachers_stand_in_the_lessons(learner: Path) -> None:
+    lesson = FOLDER / "02_equations_of_motion.ipynb"
+    (path,) = write_solutions(learner / "solutions", [lesson])
+    cells = read(path).cells
+    solutions = {name: e.solution for name, e in all_exercises().items() if name.startswith("02.")}
+    assert {c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata} == solutions
+    explained = sum(bool(all_exercises()[name].explanation) for name in solutions)
+    assert len(cells) == len(read(lesson).cells) + explained
