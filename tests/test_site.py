@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+import nbformat
 import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from floatbase.lessons.publish import FOLDER, equations, read
-from floatbase.lessons.publish.site import docstrings, linked, mathml, prepared
+from floatbase.lessons.publish.site import docstrings, linked, mathml, prepared, run_all
 
 pytestmark = pytest.mark.timeout(600)
 SHOWN = ["00_start_here.ipynb", "06_friction_cones.ipynb"]
@@ -189,6 +190,17 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
     assert "hide-input" in claims.metadata["tags"] and stub.source == "x = ..."
     assert {check.cell_type, said.cell_type} == {"markdown"} and "(../run.md)" in check.source
     assert made.metadata["myst"]["html_meta"]["description"].startswith("It says what (7) is")
+
+
+def test_a_lesson_is_run_again_when_it_has_changed(tmp_path: Path) -> None:
+    lesson, kept = tmp_path / "07_page.ipynb", tmp_path / "kept"
+    for printed in ("once", "once", "twice"):
+        nbformat.write(new_notebook(cells=[new_code_cell(f"print({printed!r})", id="a")]), lesson)
+        before = set(kept.glob("*"))
+        ran = run_all([lesson], kept)[lesson]
+        assert ran.cells[0].outputs[0].text == f"{printed}\n" and len(ran.cells) == 1
+        assert (set(kept.glob("*")) == before) == (printed == "once" and bool(before))
+    assert len(list(kept.iterdir())) == 1
 
 
 def test_links_leave_code_formulas_and_links_as_they_are() -> None:

@@ -11,7 +11,6 @@ import base64
 import gzip
 import html
 import json
-import re
 from collections.abc import Iterable
 from functools import cache
 from importlib.util import find_spec

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 _PARTS = ("conventions", "equations", "grades", "pictures", "site")  # imported at first use; the last needs the extra `site`
 
 __all__ = [
-    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "grades", "lesson_table", "pictures", "prepare", "read",
-    "readme_with_table", "run", "site", "solved", "title_of", "write_solutions",
+    "FOLDER", "MINE", "README", "conventions", "equations", "execute", "grades", "lesson_table", "pictures", "prepare",
+    "read", "readme_with_table", "run", "site", "solved", "title_of", "write_solutions",
 ]  # fmt: skip
 
 

@@ -7,7 +7,7 @@ extra `site`.
 
 from floatbase.lessons.publish.site import docstrings, mathml
 from floatbase.lessons.publish.site.build import SITE, build
-from floatbase.lessons.publish.site.outputs import prepared
+from floatbase.lessons.publish.site.outputs import prepared, run_all
 from floatbase.lessons.publish.site.words import linked
 
-__all__ = ["SITE", "build", "docstrings", "linked", "mathml", "prepared"]
+__all__ = ["SITE", "build", "docstrings", "linked", "mathml", "prepared", "run_all"]

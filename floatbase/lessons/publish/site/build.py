@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from floatbase.lessons.publish.contents import equations_of, title_of
 from floatbase.lessons.publish.notebooks import read
 from floatbase.lessons.publish.pictures import Pictures
 from floatbase.lessons.publish.site import mathml, reference
+from floatbase.lessons.publish.site.addresses import addresses
 from floatbase.lessons.publish.site.outputs import prepared, run_all
 from floatbase.lessons.publish.site.words import NOTES, anchor, linked
 from floatbase.lessons.publish.workspace import FOLDER
@@ -24,6 +26,7 @@ from floatbase.lessons.publish.workspace import FOLDER
 SITE = Path("build/site")
 _OWN = Path(__file__).parent  # texts and static files of the site
 _ROOT = FOLDER.parent
+RUN = _ROOT / "build" / "site-run"  # lessons that were run
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
 _TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
@@ -51,33 +54,31 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     for path in shown:
         if path not in known:
             raise InputError(f"there is no lesson {path}; the course's lessons are in {FOLDER}.")
-    folder = folder.resolve()
-    source, kept = folder.with_name(f"{folder.name}-source"), folder.with_name(f"{folder.name}-run")
-    shutil.rmtree(source, ignore_errors=True)
-    shutil.copytree(_OWN, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-    *notebooks, scene = run_all([*([] if stored else shown), _scene(kept)], kept).values()
+    *notebooks, scene = run_all([*([] if stored else shown), _scene()], RUN).values()
     pictures = Pictures(folder / "_static")
-    _lessons(source, dict(zip(shown, notebooks or map(read, shown), strict=True)), pictures)
-    _first_page(source, shown, _picture(scene, pictures))
-    _texts(source)
-    (source / "api").mkdir()
-    for name, text in reference.pages().items():
-        (source / "api" / name).write_text(text, encoding="utf-8")
-    _sphinx(source, folder)
+    if (folder / ".buildinfo").exists():  # an earlier site, and no other folder of somebody's
+        shutil.rmtree(folder)
+    with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
+        source = Path(place) / "source"
+        shutil.copytree(_OWN, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+        _lessons(source, dict(zip(shown, notebooks or map(read, shown), strict=True)), pictures)
+        _texts(source, shown, _picture(scene, pictures))
+        _library(source / "api")
+        _sphinx(source, folder)
     pictures.write()
     pages = (page.read_text(encoding="utf-8") for page in folder.rglob("*.html"))
     mathml.write_font(pages, folder / "_static" / mathml.FONT)
     return folder / "index.html"
 
 
-def _scene(kept: Path) -> Path:
+def _scene() -> Path:
     """A notebook that draws the picture of the first page: the program of the README, played."""
     readme = (_ROOT / "README.md").read_text(encoding="utf-8")
     code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
     play = 'fb.Viewer(robot, height=420).play(run, title="a push of 30 N to the side")'
     notebook = new_notebook(cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")])
-    kept.mkdir(parents=True, exist_ok=True)
-    path = kept / "first_page.ipynb"
+    path = RUN / "first_page.ipynb"
+    path.parent.mkdir(parents=True, exist_ok=True)
     nbformat.write(notebook, path)
     return path
 
@@ -98,21 +99,14 @@ def _picture(notebook: Any, pictures: Pictures) -> str:
     return f"```{{raw}} html\n{placed or image}\n```"
 
 
-def _first_page(source: Path, lessons: Sequence[Path], scene: str) -> None:
-    """The texts of the first page, with its picture and the lists of lessons."""
+def _lists(lessons: Sequence[Path]) -> str:
+    """The lessons for the bar beside each page."""
     listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
     listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
-    toctrees = [
+    return "\n\n".join(
         "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *(f"lessons/{path.stem}" for path in paths), "```"])
         for caption, paths in listed.items()
-    ]
-    text = (source / "index.md").read_text(encoding="utf-8")
-    for name, part in {"scene": scene, "lessons": _table(lessons), "toctrees": "\n\n".join(toctrees)}.items():
-        text = text.replace(f"{{{name}}}", part)
-    (source / "index.md").write_text(text, encoding="utf-8")
-    for path in source.glob("*.md"):
-        addresses = {lesson.name.split("_")[0]: f"lessons/{lesson.name}" for lesson in lessons}
-        path.write_text(linked(path.read_text(encoding="utf-8"), addresses), encoding="utf-8")
+    )
 
 
 def _table(known: Iterable[Path]) -> str:
@@ -120,26 +114,37 @@ def _table(known: Iterable[Path]) -> str:
     return "\n".join(["| lesson | equations |", "|---|---|", *rows])
 
 
-def _texts(source: Path) -> None:
-    """The map, the conventions, how to use the course, the changelog, and the benchmarks with their figures."""
-    texts = {
+def _texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
+    """All texts that are no lessons, with their links; the figures of the benchmarks."""
+    made = {
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
         "lessons/how_to.md": (FOLDER / "how_to.md").read_text(encoding="utf-8"),
         "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace("(notebooks/", "(lessons/"),
         **{f"benchmarks/{path.name}": path.read_text(encoding="utf-8") for path in _ROOT.glob("benchmarks/*.md")},
     }
-    shown = {path.name.split("_")[0]: path.name for path in (source / "lessons").glob("*.ipynb")}
-    for name, text in texts.items():
+    for name, text in made.items():
         about = f'---\nmyst:\n  html_meta:\n    description: "{_ABOUT[Path(name).stem]}"\n---\n'
-        (source / name).write_text(about + linked(text, shown), encoding="utf-8")
+        (source / name).write_text(about + text, encoding="utf-8")
+    for path in source.rglob("*.md"):
+        text = path.read_text(encoding="utf-8")
+        for name, part in {"scene": scene, "lessons": _table(lessons), "toctrees": _lists(lessons)}.items():
+            text = text.replace(f"{{{name}}}", part) if path == source / "index.md" else text
+        way = "" if path.parent.name == "lessons" else "lessons/" if path.parent == source else "../lessons/"
+        path.write_text(linked(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}), encoding="utf-8")
     for path in _ROOT.glob("benchmarks/*.png"):
         shutil.copy(path, source / "benchmarks")
 
 
+def _library(target: Path) -> None:
+    target.mkdir()
+    for name, text in reference.pages().items():
+        (target / name).write_text(text, encoding="utf-8")
+
+
 def _with_anchors(page: str) -> str:
     """The map with places that links lead to, and its functions linked to the pages of the library."""
-    known = reference.addresses()
+    known = addresses()
 
     def link(match: re.Match[str]) -> str:
         address = known.get(f"floatbase.{match[1]}")

@@ -46,6 +46,7 @@ html_theme_options = {
     "navbar_persistent": [],  # search stands in the side bar
     "use_fullscreen_button": False,
     "show_navbar_depth": 1,
+    "navigation_depth": 2,
     "home_page_in_toc": True,
 }
 

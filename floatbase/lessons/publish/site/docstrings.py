@@ -10,7 +10,7 @@ from typing import Any
 
 from sphinx.util.inspect import stringify_signature
 
-from floatbase.lessons.publish.site.reference import addresses
+from floatbase.lessons.publish.site.addresses import addresses
 from floatbase.lessons.publish.site.words import NAMED, place
 
 _SPAN = re.compile(r"``?([^`]+)``?")
