@@ -169,7 +169,7 @@ FORMULAS = (
         r"\begin{bmatrix} \ddot q \\ \tau \\ \lambda \end{bmatrix} = "
         r"\underbrace{B^{\dagger} \begin{bmatrix} -h \\ b \end{bmatrix}}_{v} + V_\perp \beta",
         r"All solutions of (12): the smallest one, v, and directions, the columns of $V_\perp$, which span the null space of "
-        "B. Where the contacts are independent there are d, as many as motors. β are the coordinates of a motion in this space.",
+        "B. Where the contacts are independent there are d, as many as motors. β are the coordinates of a motion here.",
     ),
     Formula(
         "(14)", "§3", "accelerations from torques, η",
@@ -204,8 +204,8 @@ FORMULAS = (
         "(19)", "§3", "a cost on β, seen from one of them",
         r"Q^{\ddot q}(\ddot q) = \widetilde Q\left(\left(V_\perp^{\ddot q}\right)^{\dagger}\left(\ddot q - v^{\ddot "
         r"q}\right)\right)",
-        "The way back: the cost that a cost on β is for accelerations alone, by the smallest of the β that come closest to them."
-        " Likewise for τ and λ.",
+        "The way back: the cost that a cost on β is for accelerations alone, by the smallest of the β that come closest to "
+        "them. Likewise for τ and λ.",
     ),
     Formula(
         "(20)", "§3.1", "net force, G_f",
@@ -270,7 +270,7 @@ FORMULAS = (
     Formula(
         "App. A", "App. A", "fictitious forces",
         r"h(q,\dot q) = \underbrace{C(q,\dot q)\,\dot q}_{\text{Coriolis, centrifugal}} + g(q)",
-        "What h holds without friction: gravity g, and the forces that appear only because the coordinates turn with the robot. "
+        "What h holds without friction: gravity g, and the forces that appear only because coordinates turn with the robot. "
         "Those depend on q and q̇, and never on accelerations. h stands on the left of (1): what acts on the robot is −C q̇ and "
         "−g. The appendix has no formula; this is the one of the lesson.",
     ),
