@@ -39,6 +39,9 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         path.write_text(json.dumps(written, indent=1), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}. Name a folder: hand_in(…, folder=…).") from None
-    right = sum(entry["right"] > 0 for entry in tried.values())
-    print(f"{path}: {right} of {len(all_exercises())} exercises solved, {len(predicted)} predictions. Give this file away.")
+    known = all_exercises()  # an older course may have had others
+    solved = [name for name, entry in tried.items() if entry["right"] and name in known]
+    print(f"{path}: {len(solved)} of {len(known)} exercises solved, {len(predicted)} predictions. Give this file to your teacher.")
+    if lost := [name for name in solved if name not in answers]:
+        print(f"An older floatbase did not keep your answers to {', '.join(lost)}: check them once more, then hand in again.")
     return path
