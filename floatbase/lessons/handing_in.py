@@ -40,8 +40,9 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}. Name a folder: hand_in(…, folder=…).") from None
     known = all_exercises()  # an older course may have had others
-    solved = [name for name, entry in tried.items() if entry["right"] and name in known]
-    print(f"{path}: {len(solved)} of {len(known)} exercises solved, {len(predicted)} predictions. Give this file to your teacher.")
-    if lost := [name for name in solved if name not in answers]:
+    solved = [key for key, entry in tried.items() if entry["right"] and key in known]
+    done = f"{len(solved)} of {len(known)} exercises solved, {len(predicted)} predictions"
+    print(f"{path}: {done}. Give this file to your teacher.")
+    if lost := [key for key in solved if key not in answers]:
         print(f"An older floatbase did not keep your answers to {', '.join(lost)}: check them once more, then hand in again.")
     return path

@@ -258,7 +258,7 @@ FORMULAS = (
         r"\text{such that} \qquad M\,\ddot q + h = S\,\tau + J^T\lambda, \qquad J\,\ddot q = b, \qquad G\,x \le u",
         r"What it must obey: the equations of motion (7), and inequalities on $x = (\ddot q, \tau, \lambda)$, such as "
         r"friction cones and the "
-        "limits of motors and joints.",
+        "limits of motors and joints. Other linear equalities may stand with them.",
     ),
     Formula(
         "(28)", "§4.2", "friction cone",
