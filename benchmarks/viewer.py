@@ -62,18 +62,18 @@ def transforms(window: Window, calls: int) -> Iterator[Row]:
 
 
 def shows(view: fb.Viewer, calls: int, pause: float = 0.0) -> Iterator[Row]:
-    """A full picture in which everything is new. The states' kinematics are computed in the call, so they count."""
+    """A full picture in which everything is new. The state is made in the call, as a slider's callback does, so it counts."""
     robot, random = view.robot, np.random.default_rng(0)
     contacts = fb.Contacts.points(robot, 0.6)
     home = robot.standing().q
     for facets in (None, 4) if not pause else (None,):
-        view.painter = view.painter.replace(facets)
-        states = [fb.State(robot, home + np.r_[np.zeros(7), random.normal(0, 0.03, robot.nq - 7)]) for _ in range(calls)]
+        view.painter = view.painter.replace(facets=facets)
+        places = home + np.hstack([np.zeros((calls, 7)), random.normal(0, 0.03, (calls, robot.nq - 7))])
         lean = random.normal(0, 0.25, (calls, 2, 4, 3)) * [1, 1, 0.3]
         forces = 0.25 * robot.weight * (lean + [0.0, 0.0, 1.0])
 
-        def show(i: int, states: list[fb.State] = states, forces: np.ndarray = forces) -> None:
-            view.show(states[i], contacts, forces[i, 0], forces[i, 1], title=f"{i}")
+        def show(i: int, places: np.ndarray = places, forces: np.ndarray = forces) -> None:
+            view.show(fb.State(robot, places[i]), contacts, forces[i, 0], forces[i, 1], title=f"{i}")
 
         what = "cones" if facets is None else f"{facets} facets each"
         yield "show", f"forces, planned, {what}" + (", 30 a second" if pause else ""), timed(show, calls, pause)

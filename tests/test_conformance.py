@@ -192,6 +192,7 @@ EXAMPLES: dict[str, Any] = {
     "Swing.start": UP, "Swing.end": UP, "lift": 0.0, "land": 0.5, "Swing.height": 0.05, "gait": GAIT, "Stand.steps": GAIT,
     "Walk.velocity": np.zeros(2), "Stand.velocity": np.zeros(2), "yaw_rate": 0.1, "clearance": 0.05, "reach": 0.2, "ramp": 0.1,
     "foothold": lambda foot, land, walk: np.zeros(2), "gains": Gains(), "place": np.zeros(2),
+    "pitch_and_yaw.angles": lambda t: np.array([0.1 * t, 0.2 * t]),
     "neutral_point.velocity": np.zeros(2), "stance_time": 0.3, "capture_point.com": UP, "capture_point.velocity": UP,
     "dcm_error": np.zeros(2), "time_left": 0.1, "dead_zone": 0.02,
     "support_margin.point": np.zeros(2), "support_margin.feet": np.eye(2), "margin": 0.03,

@@ -6,9 +6,10 @@ from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing
+from floatbase.behaviours.turning import pitch_and_yaw
 from floatbase.behaviours.walk import Step, Walk, below_the_body
 
 __all__ = [
     "LIPM", "Gains", "Gait", "Stand", "Step", "Swing", "Walk", "below_the_body", "capture_point", "neutral_point",
-    "step_adjustment", "support_margin",
+    "pitch_and_yaw", "step_adjustment", "support_margin",
 ]  # fmt: skip

@@ -93,8 +93,9 @@ class FrictionCone(Value):
 
     def status(self, force: npt.ArrayLike) -> Status:
         """(28) "inside", "active" (on the surface, within `NEAR` of the limit μ α_⊥) or "outside"; force: shape (3,), N."""
-        parts = decompose(force, self.normal)
-        return _status(parts.alpha_par, self.mu * parts.alpha_perp)
+        f = checked("force", force, (3,), "N")
+        alpha = float(self.normal @ f)  # as `decompose` has it, for pictures that ask for many
+        return _status(float(np.linalg.norm(f - alpha * self.normal)), self.mu * alpha)
 
     def project(self, force: npt.ArrayLike) -> Array:
         """The force of the cone nearest to the one given, shape (3,), N: the Euclidean projection.

@@ -4,43 +4,25 @@ from __future__ import annotations
 
 import math
 import threading
-import time
-from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 import floatbase as fb
 from floatbase.errors import ViewerError
-from floatbase.playground.cards import CARDS, Card, Judge
-from floatbase.playground.session import Session
-from floatbase.playground.settings import GAITS, IDEAL, Settings
-from floatbase.playground.terms import SYMBOLS, arrows
+from floatbase.playground.cards import Card, Judge
+from floatbase.playground.equation import SYMBOLS
+from floatbase.playground.pace import Pace
+from floatbase.playground.panel import Panel
+from floatbase.playground.session import PERIOD, Session
+from floatbase.playground.settings import Settings
+from floatbase.playground.terms import arrows
 from floatbase.robots import Robot
 from floatbase.simulation import SEEN, Live, advice
 from floatbase.viewer import Picture, published, push_at
 
-_HARDEST = 2.5  # times the weight: a push that asks for steps
-_PAIRS = {  # name: (attribute, low, high, step)
-    "friction": ("friction", 0.05, 1.5, 0.05),
-    "slope [°]": ("slope", -30.0, 30.0, 1.0),
-    "mass [×]": ("mass", 0.5, 2.0, 0.05),
-    "motors [Hz]": ("bandwidth", 1.0, IDEAL, 1.0),
-}
-_OFF = {  # term: (switch in the belief, switch in the world)
-    "gravity": ("gravity believed", "gravity in the world"),
-    "velocity": ("Coriolis and centrifugal forces believed", "Coriolis and centrifugal forces in the world"),
-    "drift": ("drift of the contacts believed", ""),
-    "forces": ("force of one leg believed", "force of one leg in the world"),
-    "zeros": ("zeros of S believed", "zeros of S in the world"),
-    "cones": ("feet that cannot pull believed", "feet that cannot pull in the world"),
-}
-_WEIGHTS = ("motion", "posture", "effort")
-_FREE = "play freely"
 _STILL = "The playground needs the live lesson: here its robot stands still."
 
 
@@ -53,7 +35,7 @@ class Playground:
     settings: those at first.
     background: "white", "light" or "dark".
     height: of the picture in a notebook, pixels.
-    port: of the page; 0 for a free one.
+    port: of the page; 0 for a free one, opened once `url` is asked for.
     """
 
     def __init__(
@@ -76,24 +58,24 @@ class Playground:
         self.card: Card | None = None
         self.judge: Judge | None = None
         self._last_push: fb.Push | None = None
-        self._shown: dict[str, bool] = dict.fromkeys(SYMBOLS, False) | {"forces": True, "cones": True}
+        self.shown: dict[str, bool] = dict.fromkeys(SYMBOLS, False) | {"forces": True, "cones": True}
         self._requested: dict[str, Any] = {}
         self._lock = threading.Lock()  # over what is requested
         self._drawing = threading.Lock()  # the run draws, and so does who pauses it
         session = self.session
         self.run = Live(
-            session.sim, session.controller, self._show, control_period=session.period, actuators=session.actuators,
+            session.sim, session.controller, self._show, control_period=PERIOD, actuators=session.actuators,
             after_reset=self._restart,
         )  # fmt: skip
         self.run.on_status(self._tell)
         self.pace = Pace()
         self.view.stand_on(session.sim.ground)
-        self._add_controls()
+        self._panel = Panel(self)
         self._write()
 
     @property
     def url(self) -> str:
-        """Address of the page."""
+        """Address of the page, which has no port before this is asked for."""
         return self.view.url
 
     def start(self) -> Playground:
@@ -135,6 +117,11 @@ class Playground:
         elif not waiting:
             self.run.soon(self._take_over)
 
+    def nod(self, size: float) -> None:
+        """Let the base describe an ellipse in pitch and yaw; one under way keeps its phase. size: rad, half its width."""
+        wanted = self.wanted
+        self.set(nod=size, begin=wanted.begin if wanted.nod else self.session.sim.time)
+
     def choose(self, card: Card | None) -> None:
         """Begin a challenge, or play freely."""
         self.card, self.judge = card, None if card is None else card.judge()
@@ -154,7 +141,7 @@ class Playground:
 
     def _begin(self, settings: Settings) -> None:
         self.session.change(**asdict(settings))
-        self._follow_settings()
+        self._panel.follow(self.session.settings)
         self._hand_over()
         self._write()
 
@@ -172,7 +159,7 @@ class Playground:
 
     def _hand_over(self) -> None:
         session = self.session
-        self.run.use(session.controller, sim=session.sim, actuators=session.actuators, control_period=session.period)
+        self.run.use(session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD)
         self.view.stand_on(session.sim.ground)  # the true one, whatever the controller believes
         if self.view.painter.facets not in (None, session.settings.facets):
             self.view.painter = self.view.painter.replace(facets=session.settings.facets)
@@ -185,121 +172,16 @@ class Playground:
             self.judge = card.judge()
         self._hand_over()
 
-    def _add_controls(self) -> None:
-        view, weight, s = self.view, self.robot.weight, self.session.settings
-        view.button("run", self.run.start)
-        view.button("pause", self.run.pause)
-        view.button("reset", self.run.reset)
-        view.button("push", self.push)
-        view.button("all as at first", self.undo)
-        view.slider("speed", self.run.slow_motion, 1.0, 0.05, 1.0, 0.05)
-        view.slider("push [N]", partial(setattr, self, "force"), self.force, 0.0, _HARDEST * weight, 1.0)
-        view.slider("towards [°]", partial(setattr, self, "towards"), self.towards, -180.0, 180.0, 5.0)
-        if not self.robot.is_floating:
-            return
-        self._add_cards()
-        for name, (attribute, low, high, step) in _PAIRS.items():
-            for i, column in enumerate(("believed", "true")):
-                value, changed = getattr(s, attribute)[i], partial(self._set_part, attribute, i)
-                view.slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column)
-        self._add_stance()
-        self._add_walk()
-        where = "its quadratic program"
-        view.slider("facets", lambda n: self.set(facets=round(n)), s.facets, 3, 16, 1, where)
-        view.slider("torque limits [×]", lambda x: self.set(torque=x), s.torque, 0.05, 1.0, 0.05, where)
-        view.slider("least force [N]", lambda x: self.set(least_force=x), s.least_force, 0.0, 100.0, 5.0, where)
-        for i, name in enumerate(_WEIGHTS):
-            changed = partial(self._set_weight, i)
-            view.slider(f"{name} ×10^", changed, 0.0, -3.0, 3.0, 0.5, where)
-        self._add_terms()
-
-    def _add_cards(self) -> None:
-        if self.robot.name in {card.robot for card in CARDS}:
-            titles = [_FREE, *(f"{i + 1}. {card.title}" for i, card in enumerate(CARDS))]
-            self.view.choice("challenge", lambda i: self.choose(CARDS[i - 1] if i else None), titles)
-
-    def _add_stance(self) -> None:
-        view = self.view
-        for foot in self.robot.feet:
-            view.checkbox(f"on {foot.frame}", partial(self._stand_on, foot.frame), True, "its stance")
-        for i, axis in enumerate("xyz"):
-            view.slider(f"CoM {axis} [m]", partial(self._set_part, "shift", i), 0.0, -0.08, 0.08, 0.005, "its stance")
-        view.slider("nod and turn", lambda x: self.set(nod=x, begin=self.session.sim.time), 0.0, 0.0, 0.35, 0.01, "its stance")
-
-    def _add_walk(self) -> None:
-        view, gaits = self.view, self._gaits
-        if not gaits:
-            return
-        view.choice("gait", self._walk, ["stand", "step when pushed", *gaits], 0, "its steps")
-        view.slider("forwards [m/s]", partial(self._set_part, "velocity", 0), 0.0, -0.3, 0.5, 0.05, "its steps")
-        view.slider("to the left [m/s]", partial(self._set_part, "velocity", 1), 0.0, -0.2, 0.2, 0.05, "its steps")
-        view.slider("turn [rad/s]", partial(self._set_part, "velocity", 2), 0.0, -0.5, 0.5, 0.05, "its steps")
-
-    def _add_terms(self) -> None:
-        view = self.view
-        for term, symbol in SYMBOLS.items():
-            view.term(f"show {term}", partial(self._show_term, term), self._shown[term], symbol, "shown")
-            believed, true = _OFF.get(term, ("", ""))
-            if believed:
-                view.term(believed, partial(self._switch, "believed_off", term), True, symbol, "believed")
-            if true:
-                view.term(true, partial(self._switch, "true_off", term), True, symbol, "world")
-
     @property
-    def _gaits(self) -> list[str]:
-        return list(GAITS.get(len(self.robot.feet), {}))
-
-    @property
-    def _wanted(self) -> Settings:
+    def wanted(self) -> Settings:
         """The settings with what is still requested."""
         with self._lock:
             return replace(self.session.settings, **self._requested)
 
-    def _set_part(self, attribute: str, i: int, value: float) -> None:
-        values = list(getattr(self._wanted, attribute))
-        values[i] = value
-        self.set(**{attribute: tuple(values)})
-
-    def _set_weight(self, i: int, exponent: float) -> None:
-        self._set_part("weights", i, 10.0**exponent)
-
-    def _stand_on(self, foot: str, stands: bool) -> None:
-        lifted = [name for name in self._wanted.lifted if name != foot]
-        self.set(lifted=tuple(lifted if stands else [*lifted, foot]))
-
-    def _walk(self, number: int) -> None:
-        gait = ["", "", *self._gaits][number] or None
-        self.set(gait=gait, catches=number == 1, begin=self.session.sim.time)
-
-    def _switch(self, attribute: str, term: str, on: bool) -> None:
-        off = tuple(name for name in getattr(self._wanted, attribute) if name != term)
-        self.set(**{attribute: off if on else (*off, term)}, leg=self.robot.feet[0].frame)
-
-    def _show_term(self, term: str, shown: bool) -> None:
-        self._shown[term] = shown
+    def show_term(self, term: str, shown: bool) -> None:
+        self.shown[term] = shown
         if self.run.status != "running":
             self._draw_again()
-
-    def _follow_settings(self) -> None:
-        """Show the session's settings at the controls, which only a floating robot has."""
-        if not self.robot.is_floating:
-            return
-        s, view = self.session.settings, self.view
-        values: dict[str, Any] = {"facets": s.facets, "nod and turn": s.nod, "torque limits [×]": s.torque}
-        values["least force [N]"] = s.least_force
-        for name, (attribute, *_) in _PAIRS.items():
-            values |= dict(zip((f"{name} believed", f"{name} true"), getattr(s, attribute), strict=True))
-        values |= {f"on {foot.frame}": foot.frame not in s.lifted for foot in self.robot.feet}
-        values |= {f"CoM {axis} [m]": value for axis, value in zip("xyz", s.shift, strict=True)}
-        values |= {f"{name} ×10^": math.log10(value) for name, value in zip(_WEIGHTS, s.weights, strict=True)}
-        if self._gaits:
-            values["gait"] = 1 if s.catches else 0 if s.gait is None else 2 + self._gaits.index(s.gait)
-            names = ("forwards [m/s]", "to the left [m/s]", "turn [rad/s]")
-            values |= dict(zip(names, s.velocity, strict=True))
-        for term, (believed, true) in _OFF.items():
-            values |= {believed: term not in s.believed_off} | ({true: term not in s.true_off} if true else {})
-        for name, value in values.items():
-            view.move(name, value)
 
     def _write(self) -> None:
         """The texts of the panel: the challenge, and the program."""
@@ -309,7 +191,7 @@ class Playground:
                 self.view.note("card", f"{judge.card.text}\n{judge.says}")
             elif self.robot.is_floating:
                 self.view.note("card", "")
-            code = self.session.settings.code(self.robot, self.session.period, self._last_push)
+            code = self.session.settings.code(self.robot, PERIOD, self._last_push)
             self.view.note("code", code, "as Python", code=True)
 
     def _tell(self, status: str) -> None:
@@ -346,11 +228,11 @@ class Playground:
             speed = self.pace.update(now)
             pace = "" if speed is None else f", {speed:.0%} of real time"
             gait = f", {session.settings.gait}" if session.settings.gait else ""
-            headline = f"{self.robot.name}{gait}, {now:.1f} s{pace}, control every {1e3 * session.period:g} ms"
-            forces = self._shown["forces"]
+            headline = f"{self.robot.name}{gait}, {now:.1f} s{pace}, control every {1e3 * PERIOD:g} ms"
+            forces = self.shown["forces"]
             self.view.show(
                 record.final, record.contacts, record.measured[-1] if forces else None,
-                _planned(record) if forces else None, push=push_at(record, -1, SEEN), cones=self._shown["cones"],
+                _planned(record) if forces else None, push=push_at(record, -1, SEEN), cones=self.shown["cones"],
                 support=True, extra=self._extra(record),
                 title="\n".join(filter(None, [headline, self.outcome, session.note])),
             )  # fmt: skip
@@ -358,9 +240,10 @@ class Playground:
     def _extra(self, record: fb.Rollout) -> Picture:
         """Arrows of the terms, and marks of a walk."""
         picture: Picture = {}
-        for term, shown in self._shown.items():
+        settings = self.session.settings
+        for term, shown in self.shown.items():
             if shown:
-                picture |= arrows(term, record, self.view.scale, self.session.settings.true_off)
+                picture |= arrows(term, record, self.view.scale, settings.true_off, settings.mass[1])
         walk = self.session.walk
         return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
 
@@ -371,7 +254,8 @@ class Playground:
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
-        return f"Playground({self.robot.name}, {self.url})"
+        address = f", {self.url}" if self.view.window.listens else ""
+        return f"Playground({self.robot.name}{address})"
 
 
 def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> Playground:
@@ -390,22 +274,3 @@ def gap(record: fb.Rollout) -> float:
 def _planned(record: fb.Rollout) -> Any:
     """The planned forces at the last row, None where there are none."""
     return record.planned[-1] if np.isfinite(record.planned[-1]).all() else None
-
-
-class Pace:
-    """Simulated time per real time. clock: gives real time, s. over: s of real time, back from now, that count."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic, over: float = 2.0):
-        self._clock, self._over = clock, over
-        self._seen: deque[tuple[float, float]] = deque()  # clock and simulated time, s
-
-    def update(self, simulated: float) -> float | None:
-        """The pace when the simulation's clock has come to `simulated` s; None for half a second after a start or a pause."""
-        now = self._clock()
-        if self._seen and (simulated < self._seen[-1][1] or now - self._seen[-1][0] > self._over):
-            self._seen.clear()
-        self._seen.append((now, simulated))
-        while now - self._seen[0][0] > self._over:
-            self._seen.popleft()
-        since, start = self._seen[0]
-        return (simulated - start) / (now - since) if now - since > 0.5 else None

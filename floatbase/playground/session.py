@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -16,14 +14,14 @@ import pinocchio as pin
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.actuators import FirstOrderLag
-from floatbase.behaviours import Gait, Stand, Walk
+from floatbase.behaviours import Gait, Stand, Walk, pitch_and_yaw
 from floatbase.control import Belief, Command
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.playground.settings import Settings
 from floatbase.robots import Robot, State
 from floatbase.simulation import Actuators, AlteredSimulation, Controller, World
 
-PERIODS = (2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3)  # s between ticks of the controller: with each, robots stand a push
+PERIOD = 4e-3  # s between ticks: go2's readable QP takes 1.5 ms, so that half of the time is left for physics and pictures
 _NOD_RATE = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
 _YAW_OVER_PITCH = 1.15  # the ellipse is a little wider in yaw
 _GROWING = 1.5  # s in which the ellipse grows from nothing
@@ -63,19 +61,18 @@ def nodding(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callabl
     begin: s, when it grows from nothing.
     Returns R (3, 3), angular velocity and acceleration, rad/s and rad/s², world, as a function of t.
     """
-    home, step = np.asarray(rotation, dtype=float), 1e-4
+    home = np.asarray(rotation, dtype=float)
 
     def angles(t: float) -> Array:
         s = min(max((t - begin) / _GROWING, 0.0), 1.0)
         phase = 2.0 * math.pi * _NOD_RATE * (t - begin)
         return size * s**3 * (10.0 - 15.0 * s + 6.0 * s**2) * np.array([math.sin(phase), _YAW_OVER_PITCH * math.cos(phase)])
 
+    turning = pitch_and_yaw(angles)
+
     def path(t: float) -> tuple[Array, Array, Array]:
-        before, now, after = angles(t - step), angles(t), angles(t + step)
-        (p1, y1), (p2, y2) = (after - before) / (2.0 * step), (after - 2.0 * now + before) / step**2
-        turn = pin.rpy.rpyToMatrix(0.0, now[0], now[1])
-        up, aside = np.array([0.0, 0.0, 1.0]), turn[:, 1]  # the axes of yaw and of pitch
-        return turn @ home, y1 * up + p1 * aside, y2 * up + p2 * aside + y1 * p1 * np.cross(up, aside)
+        turn, omega, alpha = turning(t)
+        return turn @ home, omega, alpha
 
     return path
 
@@ -90,9 +87,9 @@ class Session:
     """A robot under settings that change while it runs.
 
     robot: as from `fb.load`. settings: those at first.
-    `sim`, `controller` and `actuators` are what `rollout` takes, made by the very lines that `settings.code` shows. `period` is
-    what fits this machine, s. `last` is the newest record, which `see` is told of. `note` says why a change was refused, and
-    then `settings` stay as they were.
+    `sim`, `controller` and `actuators` are what `rollout` takes, made by the very lines that `settings.code` shows, with a tick
+    every `PERIOD`: the same on every machine, so that a run can be had again. `last` is the newest record, which `see` is told
+    of. `note` says why a change was refused, and then `settings` stay as they were.
     """
 
     def __init__(self, robot: Robot, settings: Settings | None = None):
@@ -102,8 +99,6 @@ class Session:
         self.note = ""
         self._make_world()
         self.controller: Controller = self._controller(self.settings, self.home)
-        self._periods: dict[bool, float] = {}
-        self.period = self._fitting_period()
 
     def _make_world(self) -> None:
         """A world on the true ground, with the robot standing in it."""
@@ -178,7 +173,6 @@ class Session:
         self.controller = self._controller(now, self._standing_here())
         if self.robot.is_floating:
             self.sim.base_wrench = np.zeros(6)  # of motors that may be there no more
-        self.period = self._fitting_period()
 
     def restart(self) -> None:
         """After a reset of the simulation: schedules count from the clock's new beginning, and actuators hold the robot."""
@@ -200,28 +194,3 @@ class Session:
         turned = self.home.replace(q=q)
         q[:3] += (contacts.positions(present) - contacts.positions(turned)).mean(axis=0) * [1.0, 1.0, bool(self._ground)]
         return turned.replace(q=q)
-
-    def _fitting_period(self) -> float:
-        """`control_period` of a tick like the present one, measured once for each way to compute it."""
-        readable = bool(self.settings.belief()) or "zeros" in self.settings.true_off
-        if readable not in self._periods:
-            trial = AlteredSimulation(self.robot)
-            belief = {"belief": Belief(mass=1.0 + 1e-9)} if readable else {}
-            contacts = Contacts.feet(self.robot)
-            tried = fb.WholeBodyController(self.robot, contacts, fb.standing_tasks(self.robot.standing()), **belief)  # type: ignore[arg-type]
-            self._periods[readable] = control_period(trial, tried)
-        return self._periods[readable]
-
-
-def control_period(sim: fb.Simulation, controller: Controller, share: float = 0.5) -> float:
-    """The shortest of `PERIODS`, s, of which physics and controller need at most `share` on this machine; else the longest.
-
-    The rest of the time is for pictures. Leaves the simulation reset.
-    """
-    ticks, clock = 10, [time.perf_counter()]
-    for _ in range(4):  # the first one warms up, and the best of the others is this machine when it is not interrupted
-        fb.rollout(sim, controller, ticks * PERIODS[0], control_period=PERIODS[0])
-        clock.append(time.perf_counter())
-    sim.reset()
-    tick = min(end - begin for begin, end in pairwise(clock[1:])) / ticks
-    return next((period for period in PERIODS if tick <= share * period), PERIODS[-1])

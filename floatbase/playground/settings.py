@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from floatbase._arrays import Value
 from floatbase.dynamics import Contacts
+from floatbase.playground.equation import EQUATION
 from floatbase.robots import Robot
 from floatbase.simulation import Push
 
 GAITS = {4: {"trot": "Gait.trot", "crawl": "Gait.crawl"}, 2: {"walk": "Gait.walk"}}  # by number of feet
 STEPS = {4: "Gait.trot(robot, swing=0.2)", 2: "Gait.walk(robot, swing=0.4)"}  # with which a robot catches itself
-TERMS = ("gravity", "velocity", "drift", "forces", "zeros", "cones")  # of (7) that can be switched off
 IDEAL = 100.0  # Hz: actuators at this end of their slider are perfect
 AHEAD = 1.0  # s from a control to the first step
 _GAIN = 100.0  # 1/s², of tasks with perfect actuators
@@ -37,7 +37,7 @@ class Settings(Value):
     gait: among those of `GAITS`, or None to stand.
     velocity: m/s forwards and to the left, rad/s to the left, of a gait.
     catches: whether it steps when it must.
-    believed_off, true_off: names of `TERMS` that are switched off in the controller's belief, and in the world.
+    believed_off, true_off: names of terms of `EQUATION` that are switched off in the controller's belief, and in the world.
     leg: the contact whose force the term "forces" switches off.
     begin: s, on the clock, when the gait or the ellipse was chosen.
     """
@@ -76,7 +76,7 @@ class Settings(Value):
         off, parts = self.true_off, []
         if self.mass[1] != 1.0:
             parts.append(f"mass={self.mass[1]:g}")
-        parts += [f"{word}=False" for term, word in (("gravity", "gravity"), ("velocity", "velocity_forces")) if term in off]
+        parts += [f"{term.world}=False" for term in EQUATION if term.world and term.name in off]
         if "forces" in off:
             parts.append(f"untouched={list(Contacts.feet(robot)[self.leg].point_names)}")
         if "cones" in off:
@@ -88,8 +88,7 @@ class Settings(Value):
         off, parts = self.believed_off, []
         if self.mass[0] != 1.0:
             parts.append(f"mass={self.mass[0]:g}")
-        words = {term: term for term in TERMS if term != "forces"} | {"velocity": "velocity_forces", "zeros": "underactuated"}
-        parts += [f"{word}=False" for term, word in words.items() if term in off]
+        parts += [f"{term.belief}=False" for term in EQUATION if term.belief and term.name in off]
         if "forces" in off and self.leg not in self.lifted:
             parts.append(f'unfelt=["{self.leg}"]')
         return f"Belief({', '.join(parts)})" if parts else ""

@@ -9,10 +9,6 @@ from floatbase._arrays import Array
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.viewer import COM, MEASURED, Picture, below, marks, shapes
 
-SYMBOLS = {
-    "inertia": "M q̈", "velocity": "+ C q̇", "gravity": "+ g", "zeros": "= S τ", "forces": "+ Jᵀλ", "drift": "J̇ q̇",
-    "cones": "nᵀλ ≥ 0",
-}  # fmt: skip
 _PER_ACCELERATION = 0.03  # m of arrow per m/s², of the feet's drift
 _TEXT = 0.05  # m, height of letters
 _LEVER = 0.3  # m, of the force that a torque is drawn as
@@ -24,15 +20,21 @@ def arrows(
     record: fb.Rollout,
     scale: float,
     off: tuple[str, ...] = (),
+    mass: float = 1.0,
 ) -> Picture:
-    """The arrows of a term of `SYMBOLS` at the last row of a record; forces and cones are drawn by the viewer itself.
+    """The arrows of a term of `EQUATION` at the last row of a record; forces and cones are drawn by the viewer itself.
 
     scale: m/N, as the viewer draws forces.
     off: terms that the world does not have: gravity and C q̇ have no arrow then.
+    mass: all masses of the world as a multiple of the data sheet's. M q̈, C q̇ and g are drawn with it, as they truly are.
     """
-    made = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity, "zeros": _torques, "drift": _drift}
-    lacking = term in off and term in ("gravity", "velocity")
-    return below(f"term {term}", made[term](record, scale)) if term in made and not lacking else {}
+    if term in off and term in ("gravity", "velocity"):
+        return {}
+    of_mass = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity}
+    others = {"zeros": _torques, "drift": _drift}
+    if term in of_mass:
+        return below(f"term {term}", of_mass[term](record, scale * mass))
+    return below(f"term {term}", others[term](record, scale)) if term in others else {}
 
 
 def _arrow(name: str, at: Array, vector: Array, words: str, colour: tuple[float, float, float] = COM) -> Picture:
@@ -49,13 +51,13 @@ def _inertia(record: fb.Rollout, scale: float) -> Picture:
         return {}
     first = record.state(0)
     rate = (state.com_velocity - first.com_velocity) / float(record.time[-1] - record.time[0])
-    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "m a")
+    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "true m a")
 
 
 def _gravity(record: fb.Rollout, scale: float) -> Picture:
     """The weight, as an arrow that ends at the centre of mass: below it there is the ground."""
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
-    words = shapes.label(at + [0.0, 0.08, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "m g", _TEXT)
+    words = shapes.label(at + [0.0, 0.08, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "true m g", _TEXT)
     return {"/m g": shapes.arrow(at - weight, weight, COM, 0.5), "/m g label": words}
 
 
@@ -64,7 +66,7 @@ def _velocity(record: fb.Rollout, scale: float) -> Picture:
     state = record.final
     force = (state.h - state.replace(v=np.zeros(state.robot.nv)).h)[:3]
     pose = state.frame_pose("base")
-    return _arrow("C v", np.array(pose.translation), scale * pose.rotation @ force, "C q̇")
+    return _arrow("C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇")
 
 
 def _torques(record: fb.Rollout, scale: float) -> Picture:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -61,8 +60,6 @@ class AlteredSimulation(Simulation):
         model = self.model
         self._own = {name: np.array(getattr(model, name)) for name in ("body_mass", "body_inertia", "dof_armature")}
         self._gravity = np.array(model.opt.gravity)
-        self._scratch = mujoco.MjData(model)
-        self._numbers = {int(ball): i for i, ball in enumerate(self._balls)}
         self.world = World() if world is None else world
 
     @property
@@ -138,9 +135,13 @@ class AlteredSimulation(Simulation):
         return moving - scratch.qfrc_bias + turning
 
     def _pull_feet(self, applied: Array) -> None:
-        """Add the pull of the magnets on each ball that touched in the last step."""
-        for plane, ball in self.data.contact.geom:
-            if ball in self._numbers:
+        """Add the pull of the magnets on each ball that touches the ground."""
+        mujoco.mj_fwdPosition(
+            self.model, self.data
+        )  # contacts where the feet are now: the step before found them where it began
+        balls = set(self._balls.tolist())
+        for plane, ball in self.data.contact.geom.tolist():
+            if ball in balls:
                 force = -self._world.magnets * self.ground.normals[plane]
                 at, body = self.data.geom_xpos[ball], int(self.model.geom_bodyid[ball])
                 mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), at, body, applied)
@@ -150,11 +151,12 @@ class AlteredSimulation(Simulation):
         forces = super()._forces_of(geoms, numbers)
         if self._world.magnets:
             planes, balls = geoms[:, :, 0], geoms[:, :, 1]
-            rows, columns = np.nonzero(np.isin(balls, self._balls))
-            points = [self._numbers[int(ball)] for ball in balls[rows, columns]]
+            rows, columns = np.nonzero(np.isin(balls, self._feet))
+            points = np.argmax(balls[rows, columns, None] == self._feet, axis=1)
             forces[rows, points] -= self._world.magnets * self.ground.normals[planes[rows, columns]]
         return forces
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
+    def _watch(self) -> None:
+        """As there, with data of the present model for what is computed beside the step."""
+        super()._watch()
         self._scratch = mujoco.MjData(self.model)

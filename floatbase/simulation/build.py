@@ -1,7 +1,7 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-Only the ground's planes and balls at the feet touch; after a fall the planes touch hulls of the other links, too. Links that
-are welded together are one body, which has all their inertia.
+Only the ground's planes and balls at the feet touch, or hulls of the other links, too, for a robot that falls. Links that are
+welded together are one body, which has all their inertia.
 """
 
 from __future__ import annotations
@@ -72,10 +72,10 @@ class Ground(Value):
         return np.asarray(points) @ self.normals.T - self.offsets
 
 
-def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
+def build_model(robot: Robot, ground: Ground, timestep: float, links: bool = False) -> mujoco.MjModel:
     """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact points, motors as joints.
 
-    Raises `SimulationError` when MuJoCo cannot build it.
+    links: whether the ground touches the links' hulls, too. Raises `SimulationError` when MuJoCo cannot build it.
     """
     spec = _urdf_without_shapes(robot)
     spec.option.timestep = timestep
@@ -102,7 +102,8 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
         _add_foot(spec, foot, feet.point_names)
-    _add_links(spec, robot)
+    if links:
+        _add_links(spec, robot)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -197,7 +198,7 @@ def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
 
 
 def _add_links(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """The hulls of links, without mass, that touch nothing at first: they stop at once, and come out of the ground slowly."""
+    """The hulls of links, without mass: they stop at once where they hit the ground, and come out of it slowly."""
     time = max(_LANDING_TIME, 4.0 * spec.option.timestep)
     for number, points in link_hulls(robot):
         joint = spec.joint(robot.model.names[number])  # the free base's has another name
@@ -205,5 +206,5 @@ def _add_links(spec: mujoco.MjSpec, robot: Robot) -> None:
         mesh = spec.add_mesh(name=f"{LINK} {body.name}", uservert=points.ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         hull = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, name=mesh.name, mass=0.0)
-        hull.contype, hull.conaffinity, hull.priority = 0, 0, 1
+        hull.contype, hull.conaffinity, hull.priority = 0, 1, 1
         hull.solref = [-1.0 / (time * _RISING_TIME), -1.0 / time]  # stiffness and damping for 1 kg, overdamped

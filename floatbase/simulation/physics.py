@@ -17,8 +17,9 @@ from floatbase._arrays import Array, Fixed, Value, checked, cross, flag, number,
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
-from floatbase.simulation.build import LINK, Ground, body_name, build_model
+from floatbase.simulation.build import Ground, body_name, build_model
 from floatbase.simulation.conversion import Conversion
+from floatbase.simulation.lying import Lying, lying
 
 _FALLEN_HEIGHT = 0.4  # part of the base's height at the last reset: a crouch keeps more, lying down does not
 _FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))  # of the base's tilt since the last reset: no leg brings it back from there
@@ -27,7 +28,6 @@ _LONGEST_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 
 _CLOCK_ERROR = 1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
 _ANOTHER = "make another, fb.Simulation(robot, ground=…, timestep=…)"
 _MOVE = "sim.reset(sim.state.replace(q=…, v=…)) puts the robot there, at time 0"
-_MIDPHASE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # it knows only the geoms that touch from the first
 _FATAL = int(mujoco.mjtWarning.mjWARN_BADQPOS)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
 
 
@@ -86,6 +86,7 @@ class Simulation(Fixed):
     robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one; timestep in s. `model` and
     `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`. Raises `SimulationError` when MuJoCo cannot build the robot.
     What it was made with does not change any more; what `model` and `data` hold may. A copy has `model` and `data` of its own.
+    While `links` touch the ground they are another pair, which has what was changed in the first.
     """
 
     _instead: ClassVar[dict[str, str]] = {
@@ -103,13 +104,14 @@ class Simulation(Fixed):
         self._convert = Conversion(robot, self.model)
         self._motors = np.array([self.model.actuator(name).id for name in robot.joint_names], dtype=int)
         self._balls = np.array([self.model.geom(name).id for name in self.point_names], dtype=int)
+        self._feet = self._balls  # the same in `_raw_contacts`, which count as the upright model does
         # of each plane, which is a geom; known from its first contact on
         self._contact_frames, self._frameless = np.zeros((self.model.ngeom, 3, 3)), set(range(len(self.ground.normals)))
         self._most_contacts = len(self._balls) * len(self.ground.normals)  # of feet: in a valley a ball touches two planes
         self._planes = list(zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True))
         self._radii = self.model.geom_size[self._balls, :1]
-        hulls = [i for i in range(self.model.ngeom) if self.model.geom(i).name.startswith(LINK)]
-        self._hulls, self._links = np.array(hulls, dtype=int), False
+        self._upright, self._links = (self.model, self.data), False
+        self._lying: Lying | None = None  # from the first fall on
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._watch()
         self.reset()
@@ -178,19 +180,30 @@ class Simulation(Fixed):
         """Whether the ground touches links, too, not only feet: the hulls of the URDF's collision shapes. A reset ends it.
 
         A fallen robot lies on them, as `rollout(…, settle=1.0)` shows. Before a fall only feet touch, as in (7), and links in
-        the ground come out slowly. Links go through each other.
+        the ground come out slowly. Links go through each other. The first time takes longer: the shapes are read.
         """
         return self._links
 
     @links.setter
     def links(self, touch: bool) -> None:
-        self._links = flag("links", touch)
-        self.model.geom_conaffinity[self._hulls] = touch
-        bodies, options = self.model.geom_bodyid, self.model.opt
-        self.model.body_conaffinity[bodies[self._hulls]] = touch
-        self.model.body_conaffinity[bodies[self._balls]] = 1
-        options.disableflags &= ~_MIDPHASE
-        options.disableflags |= _MIDPHASE * touch
+        if flag("links", touch) == self._links:
+            return
+        self._links = bool(touch)
+        if self._lying is None:
+            self._lying = lying(self.robot, self.ground, self.timestep)
+        if self._lying is None:  # nothing could touch
+            return
+        if touch:
+            self._lying.take_over(*self._upright)
+            self._use(self._lying.model, self._lying.data, self._lying.geoms[self._feet])
+        else:
+            self._lying.hand_over(*self._upright)
+            self._use(*self._upright, self._feet)
+
+    def _use(self, model: mujoco.MjModel, data: mujoco.MjData, balls: npt.NDArray[np.int_]) -> None:
+        """Go on with another model and its data, in which the feet's balls have these numbers."""
+        vars(self).update(model=model, data=data, _balls=balls)
+        self._watch()
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing on the ground by default, at time 0.
@@ -237,7 +250,9 @@ class Simulation(Fixed):
         return self._forces_of(geoms[None], numbers[None])[0]
 
     def _raw_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """What MuJoCo has of n contacts now, all of feet among them: geoms, (n, 2), and forces in their frame, (3 n,), N."""
+        """What MuJoCo has of n contacts of feet now: geoms as the upright model has them, (n, 2), and forces in their frame,
+        (3 n,), N.
+        """
         data = self.data
         contact, numbers, limits = data.contact, data.efc_force, data.nl
         if limits:  # behind the joints at their limits come the contacts
@@ -253,19 +268,20 @@ class Simulation(Fixed):
                 if geom in self._balls:
                     self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
                     self._frameless.discard(plane)
-        if len(geoms) > self._most_contacts:  # so links touch
-            feet = np.isin(geoms[:, 1], self._balls)
+        if self._links and self._lying is not None:
+            geoms = self._lying.upright[geoms].astype(np.int32)
+            feet = geoms[:, 1] >= 0
             geoms, numbers = geoms[feet], numbers.reshape(-1, 3)[feet].ravel()
         return geoms, numbers
 
     def _forces_of(self, geoms: npt.NDArray[np.int32], numbers: Array) -> Array:
         """`contact_forces` of N instants, shape (N, n_points, 3), N, from their `_raw_contacts`, with geom 0 for none."""
-        n, planes, balls = len(geoms), geoms[:, :, 0], geoms[:, :, 1]  # or links, whose forces are not asked for
-        forces, world = np.zeros((n, self.model.ngeom, 3)), numbers.reshape(*balls.shape, 3)
+        n, planes, balls = len(geoms), geoms[:, :, 0], geoms[:, :, 1]
+        forces, world = np.zeros((n, self._upright[0].ngeom, 3)), numbers.reshape(*balls.shape, 3)
         for plane in range(len(self._planes)):
             rows, columns = np.nonzero(planes == plane)  # no ball touches a plane twice, so nothing is added to a sum twice
             forces[rows, balls[rows, columns]] += world[rows, columns] @ self._contact_frames[plane]  # rows: normal, tangents
-        return forces[:, self._balls]
+        return forces[:, self._feet]
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the point of each ball that is nearest to the ground."""

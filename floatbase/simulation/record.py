@@ -164,7 +164,7 @@ class Recorder:
         self._time, self._q, self._v = np.empty(ticks), np.empty((ticks, sim.robot.nq)), np.empty((ticks, sim.robot.nv))
         self._tau_desired = np.empty((ticks, d))
         # MuJoCo's own numbers, which `finished` turns into ours, all rows at once
-        self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force  # views of its memory
+        self._watch()
         self._centres, self._steps = np.empty((ticks, points, 3)), 0
         self._actuators = np.empty((ticks * substeps, sim.model.nu))
         touching = sim._most_contacts
@@ -174,8 +174,14 @@ class Recorder:
         self._plans = np.empty((ticks, stance.k))
         self._with_plan: list[int] = []  # the rows of those
 
-    def drop(self) -> None:
-        """Forget the timesteps of a tick that was begun and is not completed."""
+    def _watch(self) -> None:
+        """Views into the memory of MuJoCo's data."""
+        self._geom_positions, self._actuator_forces = self._sim.data.geom_xpos, self._sim.data.actuator_force
+
+    def fall(self) -> None:
+        """Go on with links that touch. Timesteps of a tick that was begun and is not completed are forgotten."""
+        self._sim.links = True
+        self._watch()
         first = self._n * self._substeps
         self._touching[first : self._steps] = 0
         self._forces[first : self._steps] = 0.0

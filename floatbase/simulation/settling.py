@@ -26,8 +26,7 @@ def settle(sim: Simulation, record: Recorder, stance: Contacts, ticks: int, subs
     """Add ticks to a record in which the controller is off, τ = -d q̇ with `brake`, and links touch the ground."""
     if not ticks:
         return
-    record.drop()
-    sim.links = True
+    record.fall()
     damping = brake(sim, substeps * sim.timestep)
     for _ in range(ticks):
         record.before(sim.time, sim.q, sim.v)

@@ -21,8 +21,11 @@ class Canvas:
         self._interrupted = False
         self._settings: dict[wire.Key, bytes] = {}
 
-    def draw(self, picture: Picture) -> int:
-        """Show this picture and nothing else. Returns how many commands that took; all go into one frame."""
+    def draw(self, picture: Picture, *settings: wire.Update) -> int:
+        """Show this picture and nothing else. Returns how many commands that took; all go into one frame.
+
+        settings: of the page, as for `set`, that go into the same frame.
+        """
         picture = tidy(picture)
         updates = [wire.delete(ROOT)] if self._interrupted else []
         old: Picture = {} if self._interrupted else self.picture
@@ -31,16 +34,19 @@ class Canvas:
         deleted = tuple(f"{path}/" for path in gone)
         for path, item in picture.items():
             updates += _changes(ROOT + path, None if f"{path}/".startswith(deleted) else old.get(path), item)
+        fresh = self._fresh(settings)
+        updates += fresh
         if updates:
             self._interrupted = True  # stays so when an interrupt comes before the end: the next picture is drawn anew
             self.window.put(updates)
         self.picture = picture
         self._interrupted = False
+        self._settings.update(fresh)
         return len(updates)
 
     def set(self, *updates: wire.Update) -> None:
         """Send settings of the page (background, camera, title and the like), except those that were sent already."""
-        fresh = [(key, command) for key, command in updates if self._settings.get(key) != command]
+        fresh = self._fresh(updates)
         if fresh:
             self.set_again(*fresh)
 
@@ -48,6 +54,10 @@ class Canvas:
         """Send settings of the page, also those that were sent already: the reader may have changed them in the page."""
         self.window.put(updates)
         self._settings.update(updates)
+
+    def _fresh(self, updates: tuple[wire.Update, ...]) -> list[wire.Update]:
+        """Those settings that were not sent already."""
+        return [(key, command) for key, command in updates if self._settings.get(key) != command]
 
 
 def _stays(old: Item, new: Item | None) -> bool:

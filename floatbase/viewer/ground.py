@@ -31,8 +31,7 @@ class Plane(NamedTuple):
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
         """The lines of the plane's grid, which reach at least 3 m around a point, shape (3,), m; None for the origin."""
-        t1, t2 = tangents(self.normal)
-        i, j = (0, 0) if around is None else (round(float(t @ around) / JUMP) for t in (t1, t2))
+        i, j = (0, 0) if around is None else np.round(_tangents(self) @ around / JUMP).astype(int).tolist()
         return _lines(self, colour, i, j)
 
 
@@ -69,6 +68,12 @@ def plane_under(normals: Array, positions: Array) -> Plane:
 
 
 @lru_cache(maxsize=64)
+def _tangents(plane: Plane) -> Array:
+    """The two directions of the plane's grid, shape (2, 3)."""
+    return tangents(plane.normal)
+
+
+@lru_cache(maxsize=64)
 def _lines(plane: Plane, colour: RGB, i: int, j: int) -> Item:
     """i, j: how many jumps along its two tangents the grid has made."""
     pose = _pose(plane)
@@ -100,6 +105,6 @@ def _above(plane: Plane, ends: Array) -> Array:
 
 def _pose(plane: Plane) -> Array:
     """Where the plane's grid stands, (4, 4)."""
-    t1, t2 = tangents(plane.normal)
+    t1, t2 = _tangents(plane)
     normal = np.array(plane.normal)
     return placed(plane.offset * normal, np.stack([t1, t2, normal], axis=1))

@@ -1,4 +1,4 @@
-"""The server of a window: a thread with a web server, and the connections to all pages, those in notebooks among them."""
+"""The server of a window: a thread with the connections to all pages, and a web server if one is asked for."""
 
 from __future__ import annotations
 
@@ -27,26 +27,34 @@ LONGEST = 32 << 20  # bytes of a message from a page: a picture of the largest s
 
 
 class Server:
-    """The thread that serves one scene. It has no reference to its `Window`, so a window that nobody refers to can end it."""
+    """The thread that serves one scene. It has no reference to its `Window`, so a window that nobody refers to can end it.
 
-    def __init__(self, scene: Scene, sockets: list[socket.socket]):
+    port: the port that it listens on; None until `listen`: a notebook needs none.
+    """
+
+    def __init__(self, scene: Scene):
         self.scene = scene
-        self.port: int = sockets[0].getsockname()[1]
+        self.port: int | None = None
         self.displays = Displays(scene)
         self.cells = Cells(self.displays.begin_cell)
         self.clients: list[Connection] = []
         self.on_control: Callable[[str, Any], None] | None = None
         self.on_stop: list[Callable[[], None]] = []  # called when the window closes, in the server's thread
-        self._sockets = sockets
+        self._http: tornado.httpserver.HTTPServer | None = None
         self._loop = asyncio.new_event_loop()
         # the newest change for which a wake-up was requested, and the newest that a wake-up has dealt with
         self._requested = self._sent = 0
         self._last_flush = 0.0
         self._timer: asyncio.TimerHandle | None = None
         ready = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(ready,), name=f"floatbase-window-{self.port}", daemon=True)
+        self._thread = threading.Thread(target=self._run, args=(ready,), name=f"floatbase-window-{id(self):x}", daemon=True)
         self._thread.start()
         ready.wait()
+
+    def listen(self, sockets: list[socket.socket]) -> None:
+        """Serve the page on these sockets too."""
+        self.port = sockets[0].getsockname()[1]
+        self.call(self._listen, sockets)
 
     def wake(self, number: int) -> None:
         """Have change `number` sent. Any thread may call this; it costs little while a wake-up is under way."""
@@ -85,22 +93,26 @@ class Server:
 
     def _run(self, ready: threading.Event) -> None:
         asyncio.set_event_loop(self._loop)
-        http = tornado.httpserver.HTTPServer(_application(self))
-        http.add_sockets(self._sockets)
         self._loop.call_soon(ready.set)
         try:
             self._loop.run_forever()
-            self._loop.run_until_complete(self._shut(http))
+            self._loop.run_until_complete(self._shut())
         finally:
             self._loop.close()
 
-    async def _shut(self, http: tornado.httpserver.HTTPServer) -> None:
-        http.stop()
+    def _listen(self, sockets: list[socket.socket]) -> None:
+        self._http = tornado.httpserver.HTTPServer(_application(self))
+        self._http.add_sockets(sockets)
+
+    async def _shut(self) -> None:
+        if self._http is not None:
+            self._http.stop()
         for told in self.on_stop:
             told()
         for client in list(self.clients):
             client.line.end("the window was closed")
-        await http.close_all_connections()
+        if self._http is not None:
+            await self._http.close_all_connections()
         rest = asyncio.all_tasks() - {asyncio.current_task()}
         for task in rest:
             task.cancel()

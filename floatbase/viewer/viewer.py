@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from floatbase.robots import Robot, State
 from floatbase.viewer import film, marks, page, published, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
-from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, SYMBOLS, hexadecimal
+from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, RGB, SYMBOLS, hexadecimal
 from floatbase.viewer.controls import Controls
 from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, below, kinds
@@ -50,7 +51,7 @@ class Viewer(Controls):
     ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin; None takes the plane that the
         contacts stand on when they share a normal, else a level ground.
     follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it otherwise.
-    port: port of the page; 0 takes a free one.
+    port: port of the page; 0 takes a free one once `url` is asked for, so a picture in a notebook has none.
     Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
 
     In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs: its frames come as a slider's
@@ -90,7 +91,10 @@ class Viewer(Controls):
 
     @property
     def url(self) -> str:
-        """Address of the live page. It can be opened on the machine of this process only."""
+        """Address of the live page. It can be opened on the machine of this process only, by every user of it.
+
+        The page has no port before this is asked for. Raises `ViewerError` when the viewer was closed before.
+        """
         return self.window.web_url
 
     @property
@@ -197,8 +201,7 @@ class Viewer(Controls):
         if self._moving:
             self.window.put([self._following(ROBOT), *wire.end_animation()])
             self._moving = False
-        self.canvas.draw(picture)
-        self._caption(kinds(picture), title, ghost_name)
+        self.canvas.draw(picture, *self._caption(kinds(picture), title, ghost_name))  # at once: a second frame would wait
 
     def play(
         self,
@@ -271,7 +274,7 @@ class Viewer(Controls):
         """
         moving = recording.animate(times, pictures, ROOT, positive("speed", speed), paused)
         self.draw(moving.first, title)
-        self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name)
+        self.canvas.set(*self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name))
         self.window.put([moving.command])
         self._moving = True
         return self
@@ -381,7 +384,8 @@ class Viewer(Controls):
         return f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" style="{style}"></iframe>'
 
     def __repr__(self) -> str:
-        return f"Viewer({self.robot.name}, {self.url}{'' if self.window.is_open else ', closed'})"
+        address = f", {self.url}" if self.window.listens else ""
+        return f"Viewer({self.robot.name}{address}{'' if self.window.is_open else ', closed'})"
 
     def _set_stage(self, background: str) -> None:
         """Set the background, and hide meshcat's own grid and axes."""
@@ -394,15 +398,21 @@ class Viewer(Controls):
             wire.page_command("set_theme", name=background),
         )
 
-    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> None:
-        """Set the title, and the legend of the colours in the picture."""
-        colours = dict.fromkeys(("push", "price", "zmp"), self.painter.text)
-        items = [
-            [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else text, SYMBOLS.get(kind, "patch")]
-            for kind, colour, text in LEGEND
-            if kind in shown
-        ]
-        self.canvas.set(wire.page_command("set_title", text=title or ""), wire.page_command("set_legend", items=items))
+    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[wire.Update, wire.Update]:
+        """The commands for the title, and for the legend of the colours in the picture."""
+        return wire.page_command("set_title", text=title or ""), _legend(frozenset(shown), ghost_name, self.painter.text)
+
+
+@lru_cache(maxsize=64)  # most pictures show what the one before did
+def _legend(shown: frozenset[str], ghost_name: str, text: RGB) -> wire.Update:
+    """The command for the legend of these kinds of items. text: colour of what is drawn as texts are."""
+    colours = dict.fromkeys(("push", "price", "zmp"), text)
+    items = [
+        [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else words, SYMBOLS.get(kind, "patch")]
+        for kind, colour, words in LEGEND
+        if kind in shown
+    ]
+    return wire.page_command("set_legend", items=items)
 
 
 def _check_flags(**flags: bool) -> None:

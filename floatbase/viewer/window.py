@@ -1,4 +1,4 @@
-"""The meshcat window: a thread of this process serves meshcat's viewer, to this machine and to its own notebook only.
+"""The meshcat window: a thread of this process serves meshcat's viewer, to its own notebook and, when asked, to this machine.
 
 meshcat's own server is another process, which listens on all interfaces, outlives the kernel, and waits for a browser.
 `Window` has the interface of meshcat's `ViewerWindow`, so `meshcat.Visualizer(window=Window())` draws into it.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import io
 import socket
+import threading
 import time
 import weakref
 import webbrowser
@@ -41,7 +42,9 @@ class Command(Protocol):
 class Window:
     """A meshcat window in this process.
 
-    port: the port to listen on; 0, the default, takes a free one. Raises `ViewerError` when the port is taken.
+    port: the port to listen on, at once; 0, the default, takes a free one when `port`, `web_url` or `open` asks for it. So a
+        window that only notebooks show listens nowhere, and no other user of the machine reaches it. Raises `ViewerError` when
+        the port is taken.
 
     Any thread may draw, and an interrupt while it draws does no harm. The window stores the scene: a page that opens late
     receives all of it, and a page that reads slowly receives the newest value of everything. Neither costs more memory.
@@ -50,13 +53,27 @@ class Window:
 
     def __init__(self, port: int = 0):
         self.scene = Scene()
-        self._server = Server(self.scene, _listen(port))
+        sockets = _listen(port) if _number(port) else []
+        self._server = Server(self.scene)
+        self._opening = threading.Lock()
+        if sockets:
+            self._server.listen(sockets)
         self._closer = weakref.finalize(self, self._server.stop)
 
     @property
     def port(self) -> int:
-        """The port that the window listens on."""
-        return self._server.port
+        """The port that the window listens on, from now on. Raises `ViewerError` when it is closed and never had one."""
+        with self._opening:
+            if self._server.port is None:
+                self._check_open("it has no page")
+                self._server.listen(_listen(0))
+            assert self._server.port is not None
+            return self._server.port
+
+    @property
+    def listens(self) -> bool:
+        """Whether the window has a port; to ask for it or for its address opens one."""
+        return self._server.port is not None
 
     @property
     def web_url(self) -> str:
@@ -90,8 +107,7 @@ class Window:
 
     def put(self, updates: Iterable[wire.Update]) -> None:
         """Draw several updates (key and command, see `wire`) in one frame. Raises `ViewerError` when the window is closed."""
-        if not self._closer.alive:
-            raise ViewerError("the viewer window is closed, so nothing can be drawn; open a new one.")
+        self._check_open("nothing can be drawn")
         self._server.wake(self.scene.put(updates))
 
     def on_control(self, callback: Callable[[str, Any], None] | None) -> None:
@@ -103,7 +119,7 @@ class Window:
         deadline = time.monotonic() + timeout
         while not self._server.clients:
             if time.monotonic() > deadline:
-                raise ViewerError(f"no browser opened {self.web_url} within {timeout:g} s; open it there.")
+                raise ViewerError(f"no browser opened {self._page} within {timeout:g} s; open it there.")
             time.sleep(0.01)
 
     def open(self) -> Window:
@@ -125,7 +141,7 @@ class Window:
 
         if not self._server.clients:
             raise ViewerError(
-                f"no browser shows this window, so there is no picture to take; open {self.web_url} first "
+                f"no browser shows this window, so there is no picture to take; open {self._page} first "
                 "(window.wait() waits for it)."
             )
         try:
@@ -136,7 +152,7 @@ class Window:
             image = Image.open(io.BytesIO(base64.b64decode(data.partition(",")[2])))
             image.load()
         except (ValueError, OSError):
-            raise ViewerError(f"the browser sent no picture; look whether {self.web_url} shows one, and reload it.") from None
+            raise ViewerError("the browser sent no picture; look whether the page shows one, and reload it.") from None
         return image
 
     def close(self) -> None:
@@ -150,13 +166,28 @@ class Window:
         self.close()
 
     def __repr__(self) -> str:
-        return f"Window({self.web_url}, {'open' if self.is_open else 'closed'})"
+        address = f"{self.web_url}, " if self.listens else ""
+        return f"Window({address}{'open' if self.is_open else 'closed'})"
+
+    @property
+    def _page(self) -> str:
+        """The page in a message. An error opens no port."""
+        return self.web_url if self.listens else "the page at its `web_url` (of a viewer: `url`)"
+
+    def _check_open(self, lost: str) -> None:
+        if not self._closer.alive:
+            raise ViewerError(f"the viewer window is closed, so {lost}; open a new one.")
+
+
+def _number(port: int) -> int:
+    """The number of a port, 0 for any. Raises `ViewerError` when it is none."""
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port < 65536:
+        raise ViewerError(f"port is {port!r}; it must be a whole number from 0 (a free one) to 65535.")
+    return port
 
 
 def _listen(port: int) -> list[socket.socket]:
-    """Sockets that listen on the loopback address. Raises `ViewerError` for a port that is taken or is no port."""
-    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port < 65536:
-        raise ViewerError(f"port is {port!r}; it must be a whole number from 0 (a free one) to 65535.")
+    """Sockets that listen on the loopback address. Raises `ViewerError` for a port that is taken."""
     try:
         return tornado.netutil.bind_sockets(port, ADDRESS, family=socket.AF_INET)
     except OSError as error:

@@ -47,12 +47,19 @@ def set_transform(path: str, matrix: Array) -> Update:
 
     Most commands are of this type, so it is packed by hand.
     """
-    path = normal_path(path)
+    key, head = _transform_at(path)
     numbers = np.empty(16, _FLOAT32)
     numbers["code"] = 0xCA
     numbers["value"] = matrix.T.ravel()
-    head = b"\x83\xa4type\xadset_transform\xa4path" + _text(path)
-    return (path, "set_transform", ""), head + b"\xa6matrix\xdc\x00\x10" + numbers.tobytes()
+    return key, head + numbers.tobytes()
+
+
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+def _transform_at(path: str) -> tuple[Key, bytes]:
+    """Key of the transforms at a path, and how their bytes begin."""
+    path = normal_path(path)
+    head = b"\x83\xa4type\xadset_transform\xa4path" + _text(path) + b"\xa6matrix\xdc\x00\x10"
+    return (path, "set_transform", ""), head
 
 
 def set_property(path: str, name: str, value: Any) -> Update:

@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -194,26 +195,59 @@ tick = jit_cached(make_tick)
 '''
 
 
-def test_an_edited_function_is_compiled_anew_and_an_old_one_is_loaded(tmp_path: Path) -> None:
-    """Processes on a copy of the package with a small entry point, whose callee in another file is edited between them."""
+HITS = """
+from floatbase.control.tick.tick import tick
+print(tick(2.0), len(tick.stats.cache_hits), jit.cache_trouble)"""
+NOWHERE = """
+def nowhere(function):
+    raise RuntimeError("cannot cache function: no locator available")
+jit.Cache = nowhere"""
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    """The folder of a copy of the package with a small entry point."""
     package = TICK.parents[1]
     copy = shutil.copytree(package, tmp_path / "floatbase", ignore=shutil.ignore_patterns("__pycache__", "_assets"))
-    folder = copy / TICK.relative_to(package)
-    (folder / "tick.py").write_text(ENTRY, encoding="utf-8")
-    code = "from floatbase.control.tick.tick import tick; print(tick(2.0), len(tick.stats.cache_hits))"
-    environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    (copy / TICK.relative_to(package) / "tick.py").write_text(ENTRY, encoding="utf-8")
+    return copy
 
-    def run() -> list[str]:
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=environment, check=True
-        )
-        return done.stdout.split()
 
-    assert run() == ["6.0", "0"] and run() == ["6.0", "1"]
-    vectors = folder / "vectors.py"
+def run_copied(copy: Path, cache: Path | str = "", before: str = "") -> list[str]:
+    """A process on that copy: what it computes, how often it loaded code, what prevented it from keeping that.
+
+    cache: numba's folder, "" where numba looks for one, and that is beside the source. before: code.
+    """
+    environment = os.environ | {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
+    command = [sys.executable, "-c", f"from floatbase.control.tick import jit{before}{HITS}"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=copy.parent, env=environment, check=True)
+    return done.stdout.split(maxsplit=2)
+
+
+def edit_copied(copy: Path) -> None:
+    """Change a function that the small entry point calls, in another file."""
+    vectors = copy / TICK.relative_to(TICK.parents[1]) / "vectors.py"
     text = vectors.read_text(encoding="utf-8")
     vectors.write_text(text.replace("return a[0] * b[0] +", "return 10.0 * a[0] * b[0] +"), encoding="utf-8")
+
+
+def test_an_edited_function_is_compiled_anew_and_an_old_one_is_loaded(copied: Path, tmp_path: Path) -> None:
+    run = partial(run_copied, copied, tmp_path / "cache")
+    assert run() == ["6.0", "0"] and run() == ["6.0", "1"]
+    edit_copied(copied)
     assert run() == ["24.0", "0"] and run() == ["24.0", "1"]
+
+
+def test_what_was_compiled_beside_the_source_is_loaded_by_those_who_may_not_write_there(copied: Path, tmp_path: Path) -> None:
+    assert run_copied(copied) == ["6.0", "0"]  # who installs it
+    own = tmp_path / "own"
+    assert run_copied(copied, own) == ["6.0", "1"]
+    assert list(own.rglob("*.nb?")) == []
+    assert run_copied(copied, before=NOWHERE) == ["6.0", "1"]
+    edit_copied(copied)
+    assert run_copied(copied, own) == ["24.0", "0"] and run_copied(copied, own) == ["24.0", "1"]
+    assert len(list(own.rglob("*.nbc"))) == 1
+    assert run_copied(copied, before=NOWHERE) == ["24.0", "0", "no folder can be written to\n"]
 
 
 def make_small(digest: int) -> Callable[[float], float]:

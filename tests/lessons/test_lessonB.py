@@ -108,6 +108,10 @@ def test_the_crank_is_drawn_with_its_lever_and_what_is_out_of_reach_is_said(view
     rod, crank = picture["cylinder/rod"].matrix, picture["crank"].matrix
     assert np.allclose(rod[:3, 2] / np.linalg.norm(rod[:3, 2]) @ crank[:3, 2], 0.0, atol=1e-6)  # square
     assert np.allclose(rod[:3, 3] + rod[:3, 2], crank[:3, 3] + crank[:3, 2])
+    for name, chamber in (("A", "base chamber"), ("B", "rod chamber")):  # each label beside the middle of its chamber
+        filled = picture[f"cylinder/{chamber}"].matrix
+        off = picture[f"chamber {name}"].matrix[:3, 3] - filled[:3, 3] - 0.5 * filled[:3, 2]
+        assert off @ filled[:3, 2] == pytest.approx(0.0, abs=1e-9) and 0.03 < np.linalg.norm(off) < 0.1
     assert "lever <b>36 mm</b>" in best and "within reach: -45 to 76 N·m" in best
     assert "more than the supply gives" not in best and "more than the supply gives" in show_crank(view, -80.0, 12.0)
     a, b = (int(bar) for bar in re.findall(r"(\d+) bar", best))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
@@ -321,4 +322,6 @@ def test_pictures_of_a_box() -> None:
     assert told.endswith("(7) misses 0 N on the base") and later != told
     drawn = draw_orders(box, lost[:, 6:], 8, 46.0)
     assert "RL_calf_joint" in drawn and drawn.count("<polyline") == 2 and "46 ms late" in drawn
+    ticks = [float(tick) for tick in re.findall(r'text-anchor="end">([-\d.]+)<', drawn)]
+    assert "N·m</text>" in drawn and 0.0 in ticks and len(ticks) >= 3 and np.allclose(np.diff(ticks), ticks[1] - ticks[0])
     assert plot_missed(box, lost).axes[0].get_ylabel() == "force [N]"

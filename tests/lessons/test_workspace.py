@@ -92,6 +92,23 @@ def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
     assert source(course / MINE / LESSON) == "first = 'my answer'"
 
 
+def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(course: Path, tmp_path: Path) -> None:
+    folders = [tmp_path / "homes" / name for name in ("ada", "bob")]
+    (tmp_path / "homes").mkdir()
+    for folder in folders:
+        assert prepare(course, folder) == [f"{LESSON}: new"]
+    write(folders[0] / LESSON, "first = 'my answer'")
+    update(course)
+    assert prepare(course, folders[0]) == [f"{LESSON}: yours is kept; the course's new text is in {NEW}"]
+    assert prepare(course, folders[1]) == [f"{LESSON}: updated"]
+    assert not (course / MINE).exists()
+
+
+def test_a_package_without_the_course_says_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"there are no lessons in .*notebooks\. Install floatbase from its repository"):
+        prepare(tmp_path / "notebooks", tmp_path)
+
+
 def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
     prepare(course)
     write(course / MINE / LESSON, "first = 1", output="1\n")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.playground import CARDS, Card, Judge, Session, Settings
+from floatbase.playground import CARDS, PERIOD, Card, Judge, Session, Settings
 
 GO2 = judges.load("go2")
 SLICE = 1.0 / 30.0  # s
@@ -55,9 +55,9 @@ def play(card: Card, script: list[tuple[float, Act]], seconds: float = 8.0) -> J
             if made is not None:
                 pushes.append(made)
         acting = [p for p in pushes if session.sim.time < p.start + p.duration]
-        duration = max(1, round(SLICE / session.period)) * session.period
+        duration = max(1, round(SLICE / PERIOD)) * PERIOD
         record = fb.rollout(
-            session.sim, session.controller, duration, acting, control_period=session.period, actuators=session.actuators
+            session.sim, session.controller, duration, acting, control_period=PERIOD, actuators=session.actuators
         )
         session.see(record)
         judge.see(record, session)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.playground import BaseMotors, Session, Settings, arrows, nodding
+from floatbase.playground import BaseMotors, Playground, Session, Settings, arrows, nodding
 
 GO2 = judges.load("go2")
 EACH = {
@@ -114,6 +114,14 @@ def test_gravity_has_no_arrow_where_the_world_has_none() -> None:
     assert arrows("zeros", record, 1e-2, ("zeros",)), "torques are there with motors of the base, too"
 
 
+def test_arrows_of_masses_are_those_of_the_world() -> None:
+    session = Session(GO2, Settings(mass=(1.0, 1.5)))
+    record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
+    lengths = [np.linalg.norm(arrows("gravity", record, 1e-3, (), mass)["term gravity/m g"].matrix[:3, 2]) for mass in (1, 1.5)]
+    assert lengths[1] == pytest.approx(1.5 * lengths[0])
+    assert lengths[0] == pytest.approx(1e-3 * GO2.weight)
+
+
 def test_nodding_has_the_velocity_and_acceleration_that_differences_have() -> None:
     path, h = nodding(np.eye(3), 0.3, begin=1.0), 1e-4
     assert np.allclose(path(0.5)[0], np.eye(3), atol=1e-12)
@@ -127,3 +135,17 @@ def test_nodding_has_the_velocity_and_acceleration_that_differences_have() -> No
 def test_settings_keep_their_kind_when_replaced() -> None:
     assert replace(Settings(), gait="trot").gait == "trot"
     assert Settings().is_plain and not Settings(mass=(1.0, 1.1)).is_plain
+
+
+def test_an_ellipse_that_grows_keeps_its_phase() -> None:
+    playground = Playground(GO2)
+    try:
+        playground.set(nod=0.1, begin=0.5)
+        playground.session.sim.data.time = 2.0
+        playground.nod(0.2)
+        assert (playground.session.settings.nod, playground.session.settings.begin) == (0.2, 0.5)
+        playground.nod(0.0)
+        playground.nod(0.3)
+        assert (playground.session.settings.nod, playground.session.settings.begin) == (0.3, 2.0)
+    finally:
+        playground.close()

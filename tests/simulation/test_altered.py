@@ -107,6 +107,20 @@ def test_magnets_let_the_ground_pull() -> None:
     assert nets[GO2.weight] < -0.2 * GO2.weight
 
 
+def test_magnets_pull_from_the_first_touch_on() -> None:
+    """Newton's law of the whole robot at every timestep of a landing: nothing pulls that the measured forces do not have."""
+    sim = AlteredSimulation(GO2, world=World(magnets=GO2.weight))
+    state = GO2.standing()
+    q, v = np.array(state.q), np.zeros(GO2.nv)
+    q[2], v[2] = q[2] + 5e-3, -0.3
+    sim.reset(state.replace(q=q, v=v))
+    record = fb.rollout(sim, judges.controller_of("go2"), 0.03)
+    momentum = GO2.mass * np.array([record.state(i).com_velocity[2] for i in range(len(record))])
+    force = record.measured.reshape(len(record), -1, 3)[:, :, 2].sum(axis=1) - GO2.weight
+    assert np.any(record.measured[0] == 0.0) and np.any(record.measured[-1] != 0.0)
+    assert np.abs(np.diff(momentum) / sim.timestep - force[:-1]).max() < 0.2 * GO2.weight  # one magnet is a whole weight
+
+
 def test_motors_of_the_base_carry_it() -> None:
     sim = AlteredSimulation(GO2)
     in_the_air(sim)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+import pickle
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import judges
 import numpy as np
@@ -169,12 +170,84 @@ def test_an_untouched_foot_stays_untouched_after_a_reset_and_magnets_pull_feet_o
     assert sim.contact_forces()[0, 2] > 0.0
 
 
+def test_links_are_read_at_the_first_fall() -> None:
+    sim = fb.Simulation(judges.load("go2"))
+    model, data = sim.model, sim.data
+    assert model.nmesh == 0 and model.ngeom == 5
+    sim.links = True
+    assert sim.model.nmesh > 0
+    sim.reset()
+    assert sim.model is model and sim.data is data
+
+
+def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
+    """State, clock, forces and places of the feet are the same with links that touch, and without them again."""
+    sim = fb.Simulation(judges.load("go2"))
+    for _ in range(50):
+        sim.step(np.full(12, 0.5))
+    state, before = sim.state, (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces())
+    for touch in (True, False):
+        sim.links = touch
+        assert np.array_equal(sim.q, state.q) and np.array_equal(sim.v, state.v)
+        after = sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces()
+        assert after[0] == before[0] and np.array_equal(after[1], before[1])
+        assert np.allclose(after[2], before[2], atol=2e-3)  # those are of a timestep before
+        assert sim.contact_forces().shape == (4, 3) and np.all(sim.contact_forces()[:, 2] >= 0.0)
+
+
+def test_what_is_changed_in_the_model_holds_in_a_fall_and_after_it() -> None:
+    sim = fb.Simulation(judges.load("go2"))
+    sim.model.opt.gravity[2] = -3.0
+    sim.model.geom("FL_foot").friction[0] = 0.3
+    sim.model.body_mass[1] += 1.0
+    sim.links = True
+    assert sim.model.opt.gravity[2] == -3.0 and sim.model.geom("FL_foot").friction[0] == 0.3
+    assert sim.model.geom("FR_foot").friction[0] == 1.0
+    assert sim.model.body_mass.sum() == pytest.approx(sim.robot.mass + 1.0)
+    sim.model.body_mass[1] -= 1.0
+    sim.model.opt.gravity[2] = -9.81
+    sim.reset()
+    assert sim.model.opt.gravity[2] == -9.81 and sim.model.geom("FL_foot").friction[0] == 0.3
+    assert sim.model.body_mass.sum() == pytest.approx(sim.robot.mass)
+
+
+def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None:
+    sim = AlteredSimulation(judges.load("go2"))
+    sim.links = True
+    sim.world = World(mass=1.5, untouched=["FL_foot"], velocity_forces=False, magnets=5.0)
+    sim.step(np.zeros(12))
+    assert not np.any(sim.contact_forces()[0]) and np.any(sim.contact_forces()[1])
+    sim.reset()
+    assert sim.model.body_mass.sum() == pytest.approx(1.5 * sim.robot.mass)
+    sim.step(np.zeros(12))
+    assert not np.any(sim.contact_forces()[0]) and np.any(sim.contact_forces()[1])
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda sim: pickle.loads(pickle.dumps(sim))])
+def test_a_copy_of_a_robot_that_lies_moves_alone(copied: Callable[[fb.Simulation], fb.Simulation]) -> None:
+    sim = fb.Simulation(judges.load("go2"))
+    sim.links = True
+    other = copied(sim)
+    for _ in range(20):
+        other.step(np.zeros(12))
+    assert sim.time == 0.0 and other.links
+    other.reset()
+    other.step(np.zeros(12))
+    fresh = fb.Simulation(judges.load("go2"))
+    fresh.step(np.zeros(12))
+    assert np.array_equal(other.q, fresh.q) and np.array_equal(other.contact_forces(), fresh.contact_forces())
+    sim.step(np.zeros(12))
+    assert sim.links and sim.time == pytest.approx(sim.timestep)
+
+
 def test_a_robot_without_its_meshes_keeps_the_primitives() -> None:
     """The same URDF, its files nowhere: built all the same, with hulls of boxes and cylinders."""
     robot = judges.load("anymal_kinova")
     bare = fb.load_urdf(robot.urdf, feet=list(robot.feet), posture=robot.posture)
-    hulls = [fb.Simulation(one).model.nmesh for one in (bare, robot)]
-    assert 0 < hulls[0] < hulls[1]
+    sims = [fb.Simulation(one) for one in (bare, robot)]
+    for sim in sims:
+        sim.links = True
+    assert 0 < sims[0].model.nmesh < sims[1].model.nmesh
 
 
 def test_an_arm_that_is_bolted_to_the_ground_has_no_hulls() -> None:

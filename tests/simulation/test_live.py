@@ -48,6 +48,7 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slic
         raise error
 
     run.use(broken)
+    assert run.controller is broken
     run.start()
     until(lambda: run.status != "running")
     assert str(error) in run.status

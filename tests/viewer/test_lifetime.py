@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
@@ -23,6 +24,8 @@ from waiting import PATIENCE, until
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
 from floatbase.viewer import Viewer, Window, wire
+
+from .test_window import window_threads
 
 MB = 1 << 20
 HUNG = 5.0  # s: a sixth of what a page may take over a frame, so a call that waits for a page takes longer
@@ -47,9 +50,10 @@ def test_a_killed_browser_leaves_nothing_behind(
     viewer: Viewer, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, tmp_path: Path
 ) -> None:
     viewer.show(standing, contacts, forces)
+    address = viewer.url
     threads, files, entries = threading.active_count(), len(os.listdir("/proc/self/fd")), len(viewer.window.scene)
     browser = subprocess.Popen(
-        [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path}", "--remote-debugging-port=0", viewer.url],
+        [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path}", "--remote-debugging-port=0", address],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
     )  # fmt: skip
     try:
@@ -100,9 +104,9 @@ def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(w
     assert memory() - before < 20 * MB
     assert len(window.scene) == 10
     assert window.browsers == 1
-    thread = f"floatbase-window-{window.port}"
+    threads = len(window_threads())
     window.close()
-    assert thread not in [running.name for running in threading.enumerate()]
+    assert len(window_threads()) == threads - 1
     assert not answers(window.port)
 
 
@@ -185,5 +189,32 @@ def test_a_kernel_is_interrupted_and_restarted_under_a_viewer() -> None:
         assert process.children() == []
         process.kill()
         until(lambda: not answers(port))
+    finally:
+        kernel.close()
+
+
+IN_A_NOTEBOOK = """import floatbase as fb
+from floatbase.lessons import live, push_panel
+from floatbase.playground import playground
+robot = fb.load("go2")
+sim = fb.Simulation(robot)
+view = fb.Viewer(robot)
+view.show(sim.state)
+display(view, push_panel(live(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), view), view))
+field = playground("go2")
+display(field)
+print(repr(view), repr(field), type(view.widget()).__name__)"""
+PORTS = "import psutil; print(sorted(c.laddr.port for c in psutil.Process().net_connections('inet') if c.status == 'LISTEN'))"
+
+
+def test_a_kernel_that_shows_pictures_listens_where_jupyter_does_and_nowhere_else() -> None:
+    kernel = Kernel()
+    try:
+        jupyters = json.loads(kernel.run(PORTS))
+        assert jupyters
+        assert kernel.run(IN_A_NOTEBOOK).endswith("Viewer(go2) Playground(go2) NotebookPicture\n")
+        assert json.loads(kernel.run(PORTS)) == jupyters
+        port = int(kernel.run("print(view.window.port)"))  # whoever asks gets one
+        assert json.loads(kernel.run(PORTS)) == sorted([*jupyters, port])
     finally:
         kernel.close()

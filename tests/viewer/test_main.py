@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from waiting import until
 
-from floatbase import Contacts, Simulation, WholeBodyController, standing_tasks
 from floatbase.__main__ import main
-from floatbase.playground import PERIODS, Pace, Playground, control_period
+from floatbase.playground import Pace, Playground
 from floatbase.robots import Robot, catalogue, load
 
 from .looks import picture
@@ -176,15 +175,6 @@ def test_the_pace_is_simulated_time_over_time() -> None:
     now[0] += 0.6
     assert pace.update(2.6) == pytest.approx(1.0)
     assert pace.update(0.0) is None  # a reset
-
-
-def test_the_control_period_leaves_room_and_the_robot_where_it_stood(go2: Robot) -> None:
-    sim = Simulation(go2)
-    controller = WholeBodyController(go2, Contacts.points(go2), standing_tasks(go2.standing()))
-    assert control_period(sim, controller, share=1e9) == PERIODS[0]
-    assert control_period(sim, controller, share=1e-9) == PERIODS[-1]
-    assert sim.time == 0.0
-    np.testing.assert_allclose(sim.q, go2.standing().q)
 
 
 @pytest.mark.parametrize("name", ["ur5", "talos"])

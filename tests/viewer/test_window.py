@@ -28,7 +28,8 @@ import umsgpack
 from waiting import PATIENCE, until
 
 from floatbase.errors import FloatbaseError, ViewerError
-from floatbase.viewer import Window, wire
+from floatbase.robots import State
+from floatbase.viewer import Viewer, Window, wire
 
 
 def window_threads() -> list[threading.Thread]:
@@ -102,16 +103,53 @@ def test_what_is_deleted_is_gone_with_all_below_it_and_may_come_back(window: Win
 
 
 def test_the_window_listens_on_loopback_only(window: Window) -> None:
+    place = f"{window.port:04X}"
     lines = Path("/proc/net/tcp").read_text().splitlines()
-    listening = [line.split()[1] for line in lines if line.split()[3] == "0A"]
-    assert f"0100007F:{window.port:04X}" in listening
-    assert f"00000000:{window.port:04X}" not in listening
+    found = [line.split()[1] for line in lines if line.split()[3] == "0A"]
+    assert f"0100007F:{place}" in found
+    assert f"00000000:{place}" not in found
     # another address of this machine's loopback network is already too far away, and so are its addresses in other networks
     others = {a.address for found in psutil.net_if_addrs().values() for a in found if a.family == socket.AF_INET}
     for address in ("127.0.0.2", *(others - {"127.0.0.1"})):
         with pytest.raises(OSError):
             socket.create_connection((address, window.port), timeout=2)
     socket.create_connection(("127.0.0.1", window.port), timeout=2).close()
+
+
+def listening() -> set[int]:
+    """The ports that this process listens on."""
+    return {found.laddr.port for found in psutil.Process().net_connections("inet") if found.status == psutil.CONN_LISTEN}
+
+
+def test_a_picture_has_a_port_only_once_its_address_is_asked_for(viewer: Viewer, standing: State, tmp_path: Path) -> None:
+    before = listening()
+    viewer.show(standing)
+    viewer.widget()
+    viewer.save(tmp_path / "scene.html")
+    assert set(viewer._repr_mimebundle_()[0]) >= {"image/png"}
+    assert repr(viewer) == "Viewer(go2)" and repr(viewer.window) == "Window(open)"
+    assert listening() == before and not viewer.window.listens
+    assert viewer.url == f"http://127.0.0.1:{viewer.window.port}/"
+    assert listening() - before == {viewer.window.port}
+    assert viewer.window.listens and repr(viewer) == f"Viewer(go2, {viewer.url})"
+    assert urllib.request.urlopen(viewer.url, timeout=PATIENCE).status == 200
+    viewer.close()
+    assert listening() == before
+
+
+def test_threads_that_ask_for_the_port_at_once_get_the_same_one(window: Window) -> None:
+    before = listening()
+    with ThreadPoolExecutor(16) as pool:
+        ports = set(pool.map(lambda _: window.port, range(64)))
+    assert len(ports) == 1 and listening() - before == ports
+
+
+def test_a_closed_window_that_had_no_page_opens_none() -> None:
+    window = Window()
+    window.close()
+    with pytest.raises(ViewerError, match=r"window is closed, so it has no page; open a new one"):
+        _ = window.port
+    assert repr(window) == "Window(closed)"
 
 
 def test_fifty_windows_opened_and_dropped_leave_no_thread_no_port_and_no_process() -> None:
@@ -160,6 +198,10 @@ def test_a_port_is_free_at_once_after_close() -> None:
 
 def test_no_browser_is_an_error_at_once(window: Window) -> None:
     start = time.monotonic()
+    with pytest.raises(ViewerError, match=r"no browser shows this window.*open the page at its `web_url`"):
+        window.get_image()
+    assert not window.listens
+    assert window.web_url == f"http://127.0.0.1:{window.port}/"
     with pytest.raises(ViewerError, match=r"no browser shows this window.*open http://127.0.0.1"):
         window.get_image()
     with pytest.raises(ViewerError, match=r"no browser opened http://127.0.0.1.* within 0.1 s"):

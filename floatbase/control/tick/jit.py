@@ -3,6 +3,7 @@
 numba caches a compiled function on disk and compiles it anew when its own file changes, but not when the file of a function
 that it calls does. So one function alone is cached, the entry point `tick`. It carries a digest of this folder in its closure,
 which is part of numba's cache key: an edit in any file compiles anew. Whatever is wrong with the cache, the tick is compiled.
+What was compiled beside the source is loaded also by those who may not write there, such as the students of one installation.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator
 from numba.core.serialize import dumps
 
 from floatbase.control.problem import INCONSISTENT
@@ -65,10 +66,25 @@ class _Sealed(CompileResultCacheImpl):
         return super().rebuild(context, pickle.loads(code))
 
 
-class Cache(FunctionCache):
-    """numba's cache of one function."""
+class _Beside(InTreeCacheLocator):
+    """The folder beside the source, to read from: numba itself takes only folders that it may write to."""
 
-    _impl_class = _Sealed
+    def ensure_cache_path(self) -> None:
+        pass
+
+
+class _SealedBeside(_Sealed):
+    _locator_classes: Any = (_Beside,)
+
+
+class Installed(FunctionCache):
+    """What is kept beside the source of one function, only to read. trouble: why nothing else can be kept."""
+
+    _impl_class: Any = _SealedBeside
+
+    def __init__(self, function: Callable[..., Any], trouble: Exception | None = None):
+        super().__init__(function)
+        self._trouble = trouble
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """What is kept for a signature, or None, at which numba compiles: files that are damaged count as missing."""
@@ -78,13 +94,33 @@ class Cache(FunctionCache):
             return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep nothing, and remember why."""
+        if self._trouble is not None:
+            cannot_keep(self._trouble)
+
+
+class Cache(Installed):
+    """numba's cache of one function, and where that holds nothing, what is kept beside the source."""
+
+    _impl_class = _Sealed
+
+    def __init__(self, function: Callable[..., Any]):
+        super().__init__(function)
+        self._installed = Installed(function)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """As for `Installed`."""
+        found = super().load_overload(signature, context)
+        return self._installed.load_overload(signature, context) if found is None else found
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
         """Keep what was compiled, in place of damaged files. Where that fails, as on a full disk, `cache_trouble` says why."""
         try:
             try:
-                super().save_overload(signature, compiled)
+                FunctionCache.save_overload(self, signature, compiled)
             except Exception:  # the list of what is kept may be damaged: start it over
                 self.flush()
-                super().save_overload(signature, compiled)
+                FunctionCache.save_overload(self, signature, compiled)
         except Exception as error:
             cannot_keep(error)
 
@@ -96,5 +132,5 @@ def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
         try:
             function._cache = Cache(function.py_func)
         except Exception as error:  # a RuntimeError where numba finds no folder for its cache
-            cannot_keep(error)
+            function._cache = Installed(function.py_func, error)
     return function

@@ -25,7 +25,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
 _LIFTED = 0.003  # m above the ground: no flicker with its lines
 _MOST = 600.0  # N: the hardest push of the panel
-_RECORDED = (150.0, 200.0, 250.0, 350.0)  # N: what both stand, what only steps save, what neither does
+_RECORDED = (150.0, 250.0, 350.0)  # N: what both stand, what only steps save, what they save to the side only
 _HALF = widgets.Layout(width="50%")
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import pinocchio as pin
 
 import floatbase as fb
 from floatbase._arrays import Array
+from floatbase.behaviours import pitch_and_yaw
 from floatbase.simulation import Rollout
 
 REACH = np.array([0.5, 0.35, -0.5, 0.0, 0.0, 0.0])  # rad: how far ur5's joints swing on the figure of eight
@@ -50,18 +50,11 @@ def circling(pitch: float, yaw: float, rate: float, loops: int, phase: float = 9
     pitch, yaw: rad, half the widths of the ellipse. rate: loops for each second.
     phase: degrees between the two; 0 makes a line of the ellipse, to and fro.
     """
-    total, step, shift = loops / rate, 1e-4, np.deg2rad(phase)
+    total, shift = loops / rate, np.deg2rad(phase)
 
     def angles(t: float) -> Array:
         s = np.clip(rate * min(t, total - t), 0.0, 1.0)
         size = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
         return np.asarray(size * np.array([pitch * np.sin(TURN * rate * t), yaw * np.sin(TURN * rate * t + shift)]))
 
-    def path(t: float) -> tuple[Array, Array, Array]:
-        before, now, after = angles(t - step), angles(t), angles(t + step)
-        (p1, y1), (p2, y2) = (after - before) / (2.0 * step), (after - 2.0 * now + before) / step**2
-        R = pin.rpy.rpyToMatrix(0.0, now[0], now[1])
-        up, aside = np.array([0.0, 0.0, 1.0]), R[:, 1]  # the axes of yaw and of pitch
-        return R, y1 * up + p1 * aside, y2 * up + p2 * aside + y1 * p1 * np.cross(up, aside)
-
-    return path
+    return pitch_and_yaw(angles)

@@ -29,7 +29,7 @@ LASTS = 0.4  # s, of the panel's run
 
 
 def show_crank(view: Viewer, angle: float, torque: float) -> str:
-    """Draw a knee's cylinder, three times as large; as text its lever, and the pressures that a torque takes.
+    """Draw a knee's cylinder, three times as large, with its chambers A and B; as text its lever, and pressures for a torque.
 
     angle: °, of the joint from where the lever is longest; the rod goes out as it grows. torque: N·m.
     """
@@ -42,6 +42,10 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
     a, b = _pressures(bench, min(most, max(least, torque)))
     supply = bench.hydraulics.supply_pressure
     picture = view.painter.stage() | below("cylinder", props.hydraulic_cylinder(foot, end, stroke, (a / supply, b / supply)))
+    beside = np.cross([0.0, 1.0, 0.0], end - foot) / np.linalg.norm(end - foot)
+    for name, chamber in (("A", "base chamber"), ("B", "rod chamber")):
+        filled = picture[f"cylinder/{chamber}"].matrix
+        picture[f"chamber {name}"] = shapes.label(filled[:3, 3] + 0.5 * filled[:3, 2] - 0.09 * beside, name, 0.04)
     for name, start, tip, radius in (
         ("thigh", JOINT, foot, 0.012),
         ("crank", JOINT, end, 0.016),

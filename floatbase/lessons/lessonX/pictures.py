@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from floatbase._arrays import Array
 from floatbase.lessons.lessonX.box import BlackBox
@@ -96,9 +97,14 @@ class _Frame:
         return f'<polyline points="{points}" fill="none" {style}/>'
 
     def ticks(self) -> str:
-        """The line of no torque, and the tenths of a second."""
-        zero = f'x1="{EDGE}" y1="{self.up(0.0):.1f}" x2="{WIDTH - EDGE}" y2="{self.up(0.0):.1f}"'
-        drawn = f'<line {zero} stroke="currentColor" stroke-width="0.5"/>'
+        """Lines at round torques, the one of no torque thicker, and at the tenths of a second."""
+        drawn = f'<text x="{EDGE - 6}" y="{HEIGHT + 12}" font-size="11" text-anchor="end">N·m</text>'
+        for torque in np.asarray(MaxNLocator(5).tick_values(self.low, self.high)).tolist():
+            if self.low <= torque <= self.high:
+                y, width = float(self.up(torque)), 0.2 if torque else 0.5
+                ends = f'x1="{EDGE}" y1="{y:.1f}" x2="{WIDTH - EDGE}" y2="{y:.1f}"'
+                drawn += f'<line {ends} stroke="currentColor" stroke-width="{width}"/>'
+                drawn += f'<text x="{EDGE - 6}" y="{y + 4:.1f}" font-size="11" text-anchor="end">{torque:g}</text>'
         for tenth in range(int(np.ceil(10 * self.begin)), int(10 * self.end) + 1):
             x = float(self.across(tenth / 10))
             drawn += f'<line x1="{x:.1f}" y1="5" x2="{x:.1f}" y2="{HEIGHT}" stroke="currentColor" stroke-width="0.2"/>'

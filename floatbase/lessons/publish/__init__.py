@@ -8,7 +8,7 @@ from floatbase.lessons.publish.notebooks import execute, read, run, solved, writ
 from floatbase.lessons.publish.workspace import FOLDER, MINE, prepare
 
 if TYPE_CHECKING:
-    from floatbase.lessons.publish import conventions, equations, pictures, site
+    from floatbase.lessons.publish import conventions, equations, grades, pictures, site
 
 _PARTS = ("conventions", "equations", "grades", "pictures", "site")  # imported at first use; the last needs the extra `site`
 

@@ -32,7 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     graded.add_argument("files", nargs="+", type=Path, metavar="FILE")
     graded.add_argument("--table", type=Path, metavar="CSV", help="write a row for each learner and exercise, too")
     graded.add_argument("--code", action="store_true", help="print code that was handed in, to be read")
-    commands.add_parser("workspace", help="bring the learner's copy in notebooks/my up to date")
+    laid = commands.add_parser("workspace", help="bring the learner's copy of the course up to date")
+    laid.add_argument("--to", type=Path, default=None, metavar="FOLDER", help="where that is, notebooks/my by default")
 
     given = parser.parse_args(arguments)
     try:
@@ -49,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "grade":
             _grade(given.files, given.table, given.code)
         else:
-            for line in prepare():
+            for line in prepare(mine=given.to):
                 print(line)
     except InputError as error:
         parser.exit(2, f"{error}\n")

@@ -32,17 +32,21 @@ _OF_CELL = {"collapsed", "execution", "jp-MarkdownHeadingCollapsed", "jupyter", 
 _OF_NOTEBOOK = {"kernelspec", "language_info", "orig_nbformat", "signature", "widgets"}
 
 
-def prepare(folder: Path = FOLDER) -> list[str]:
-    """Bring the learner's copies in folder/my up to date; returns a line for each file that changed, or could not be.
+def prepare(folder: Path = FOLDER, mine: Path | None = None) -> list[str]:
+    """Bring the learner's copies up to date; returns a line for each file that changed, or could not be.
+
+    folder: of the course. mine: of the learner's copies, folder/my by default.
 
     A lesson or page that is not there is copied. One that the learner has not written in is replaced when the course has a
     newer text. One that the learner has written in stays as it is; the course's newer text is laid beside it as
     NAME.new.ipynb, or NAME.new2.ipynb where the learner has gone on in the first, and so on. Outputs do not count as writing.
 
     However this ends, each file is whole, the old or the new one, and the next call does the rest. Raises `InputError` where
-    there can be no folder/my.
+    there can be no such folder, and where the course is not: the package alone, as a wheel has it, has no lessons.
     """
-    mine = folder / MINE
+    if not folder.is_dir():
+        raise InputError(f"there are no lessons in {folder}. Install floatbase from its repository, by `pip install -e`.")
+    mine = folder / MINE if mine is None else mine
     try:
         mine.mkdir(exist_ok=True)
     except FileExistsError:

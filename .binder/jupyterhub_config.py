@@ -1,0 +1,45 @@
+"""JupyterHub for a class on one machine: each student gets a server of JupyterLab, and in it an own copy of the lessons.
+
+Once, as root, in a copy of the repository that all accounts may read, such as /opt/floatbase, and with an account of the machine
+for each student:
+
+    make setup
+    .venv/bin/python -m pip install -c environment.txt "jupyterhub>=5.2"
+    npm install -g configurable-http-proxy
+
+Then, at every start:
+
+    .venv/bin/jupyterhub --config .binder/jupyterhub_config.py
+
+The hub's own address is the only one that a browser needs: pictures travel with everything else that Jupyter says. Put https in
+front before students type passwords: `c.JupyterHub.ssl_key` and `ssl_cert`, or a web server.
+"""
+
+import sys
+
+c = get_config()  # noqa: F821  JupyterHub defines it
+
+c.JupyterHub.bind_url = "http://:8000"
+c.Authenticator.allow_all = (
+    True  # whoever has an account of this machine; or name them: c.Authenticator.allowed_users = {"ada"}
+)
+
+# What a student's server does first, as that student: make a folder that no other account can read, for the ways between its
+# processes, and bring the lessons in ~/floatbase up to date, which overwrites no writing.
+START = f"""export JUPYTER_RUNTIME_DIR=$(mktemp -d -t jupyter-XXXXXXXX)
+{sys.executable} -m floatbase.lessons.publish workspace --to "$HOME/floatbase"
+exec {sys.executable} -m jupyterhub.singleuser "$@\""""
+c.Spawner.cmd = ["sh", "-c", START, "floatbase"]
+c.Spawner.default_url = "/lab/tree/floatbase/00_start_here.ipynb"
+c.Spawner.start_timeout = 120  # s: many start at the first minute of a class
+c.Spawner.http_timeout = 120
+c.Spawner.environment = {"OPENBLAS_NUM_THREADS": "1"}  # no student's matrices take all cores
+c.Spawner.args = [
+    # ports of a kernel could be listened to by every account of the machine; sockets in that folder cannot
+    "--KernelManager.transport=ipc",
+    "--MappingKernelManager.cull_idle_timeout=3600",  # s, after which a kernel that no page looks at ends
+    "--ServerApp.shutdown_no_activity_timeout=7200",  # s, and the whole server
+    "--LabApp.news_url=None",
+    "--LabApp.extension_manager=readonly",
+    "--LanguageServerManager.autodetect=False",
+]

@@ -1,0 +1,31 @@
+# The course in JupyterLab, for one reader or as the image of a hub, from the exact versions in environment.txt:
+#
+#     docker build -t floatbase .
+#     docker run --rm -p 127.0.0.1:8888:8888 -v floatbase:/home/learner/floatbase floatbase
+#
+# It prints an address to open. What a reader writes is in the volume.
+FROM python:3.12-slim
+
+# Code is compiled here for any processor of this kind, so that the first start is as quick as the next.
+ENV NUMBA_CPU_NAME=generic OPENBLAS_NUM_THREADS=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PATH=/opt/venv/bin:$PATH
+# what was predicted and solved lies with the lessons, in the volume
+ENV FLOATBASE_HOME=/home/learner/floatbase/.floatbase
+
+# Pinocchio needs libgomp1, which this small system lacks
+RUN apt-get update && apt-get install -y --no-install-recommends libgomp1 && rm -rf /var/lib/apt/lists/*
+RUN useradd --create-home --uid 1000 learner && install -d -o learner /home/learner/floatbase
+COPY . /opt/floatbase
+WORKDIR /opt/floatbase
+RUN python -m venv /opt/venv \
+    && pip install -q -c environment.txt hatchling editables \
+    && pip install -q -c environment.txt --no-build-isolation -e ".[course,hub]" \
+    && jupyter labextension disable @jupyterlab/apputils-extension:announcements
+RUN python -m floatbase compile
+
+# all that was made above can be read, and not written, by whoever reads the course
+USER learner
+WORKDIR /home/learner
+EXPOSE 8888
+CMD ["sh", "-c", "python -m floatbase.lessons.publish workspace --to floatbase; exec jupyter lab --ip=0.0.0.0 --no-browser \
+     --LabApp.default_url=/lab/tree/floatbase/00_start_here.ipynb --LabApp.extension_manager=readonly --LabApp.news_url=None \
+     --LanguageServerManager.autodetect=False"]

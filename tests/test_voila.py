@@ -1,0 +1,75 @@
+"""Voilà in a real browser: lesson 00 and a playground as a page without code, whose pictures move.
+
+The browser reaches Voilà's own address and nothing else. Its own template asks for icons elsewhere, and does without them.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import nbformat
+import pytest
+from browsers import browser_of_a_file, needs_chromium
+from labs import HEIGHT, LONG, answers, free_ports, only, picture_in, push_panel_of, push_until_it_falls, screenshot
+from waiting import until
+
+from floatbase.lessons.publish import FOLDER, read
+
+SINKS = 0.02  # m: by 49 mm, where the robot carries half its mass more than its controller knows
+PLAYGROUND = 'from floatbase.playground import playground\nplayground("go2")'
+ICONS = "/@fortawesome/"
+MASS = "viewer.gui_controllers['mass [×] true']"
+
+pytestmark = [needs_chromium, pytest.mark.timeout(600)]
+pytest.importorskip("voila", reason="Voilà is not installed")
+
+
+@pytest.fixture(scope="module")
+def voila(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a Voilà that serves lesson 00 with a playground at its end."""
+    home = tmp_path_factory.mktemp("voila")
+    lesson = read(FOLDER / "00_start_here.ipynb")
+    lesson.cells.append(nbformat.v4.new_code_cell(PLAYGROUND))
+    nbformat.write(lesson, home / "lesson.ipynb")
+    environment = {**os.environ, "JUPYTER_CONFIG_DIR": str(home), "JUPYTER_DATA_DIR": str(home), "HOME": str(home)}
+    (port,) = free_ports(1)
+    command = [sys.executable, "-m", "voila", "lesson.ipynb", "--no-browser", f"--port={port}", "--Voila.ip=127.0.0.1"]
+    log = home / "voila.log"
+    with log.open("w") as sink:
+        server = subprocess.Popen(
+            command, env=environment, cwd=home, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True
+        )
+    try:
+        until(lambda: answers(port) or server.poll() is not None)
+        assert server.poll() is None, log.read_text()
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        os.killpg(server.pid, signal.SIGTERM)
+        server.wait(timeout=20)
+
+
+browser = browser_of_a_file
+
+
+def test_the_pictures_of_a_page_without_code_move(voila: str, browser: Any) -> None:
+    page = browser.new_page(viewport={"width": 1100, "height": 800})
+    page.set_default_timeout(1000 * LONG)
+    strangers = only(page, voila)
+    try:
+        page.goto(voila, wait_until="commit")
+        push_until_it_falls(page, push_panel_of(page), "00_voila")
+        field = picture_in(page.locator(".jp-Cell", has=page.locator("iframe")).last)
+        field.wait_for_function(MASS)
+        standing = field.evaluate(HEIGHT)
+        field.evaluate(f"{MASS}.setValue(1.5)")  # its controller does not know, so it sinks
+        field.wait_for_function(f"({HEIGHT})() < {standing - SINKS}")
+        assert [url for url in strangers if ICONS not in url] == []
+        assert page.get_by_text("Traceback").count() == 0
+    finally:
+        screenshot(page, "00_voila_end")
+        page.close()
