@@ -1,7 +1,7 @@
 """JupyterHub for a class on one machine: each student gets a server of JupyterLab, and in it an own copy of the lessons.
 
-Once, as root, in a copy of the repository that all accounts may read, such as /opt/floatbase, and with an account of the machine
-for each student:
+Once, as root, in a copy of the repository that all accounts may read, such as /opt/floatbase, with an account of the machine
+for each student, and a Python that all may run:
 
     make setup
     .venv/bin/python -m pip install -c environment.txt "jupyterhub>=5.2"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import signal
 import sys
 import threading
@@ -37,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"The controller takes its {controller.path} path: {controller.path_reason}.")
         return 0
     try:
-        return _view(options)
+        return _view(options, sys.argv[1:] if arguments is None else arguments)
     except fb.FloatbaseError as error:
         print(f"floatbase: {error}", file=sys.stderr)
         return 2
@@ -50,8 +51,14 @@ def _robot(options: argparse.Namespace) -> fb.Robot:
     return fb.load_urdf(options.robot, floating=not options.fixed, feet=options.feet, foot_radius=options.foot_radius)
 
 
-def _view(options: argparse.Namespace) -> int:
-    """Show a robot until Ctrl-C or SIGTERM."""
+def _again(given: Sequence[str], asked: int, port: int) -> str:
+    """What the page says when it has ended. given: arguments of the command line; asked: the port among them, 0 for none."""
+    command = shlex.join(["python", "-m", "floatbase", *given, *([] if asked else ["--port", str(port)])])
+    return f"This robot has gone. Start it again with\n{command}\nand this page comes back by itself."
+
+
+def _view(options: argparse.Namespace, given: Sequence[str]) -> int:
+    """Show a robot until Ctrl-C or SIGTERM. given: the arguments of the command line, to be told."""
     from floatbase.playground import Playground, Settings  # loads MuJoCo and the viewer, which the other commands do without
 
     ended = threading.Event()
@@ -62,6 +69,7 @@ def _view(options: argparse.Namespace) -> int:
         page = Playground(robot, settings, background=options.background, port=options.port)
         with closing(page):
             page.start()
+            page.view.ending(_again(given, options.port, page.view.window.port))
             print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
                 page.view.window.open()

@@ -120,7 +120,7 @@ def _idle_sliders(page: Any, name: str, number: str, sliders: list[str], moved: 
         after = once_new(lambda: (frame.evaluate(SCENE), cell.evaluate(SAID)), before)
         idle += [slider] if after == before else []
     end = once_new(lambda: frame.evaluate(SCENE), start)  # what the panel says may be there before the picture
-    cell.locator("iframe").first.scroll_into_view_if_needed()
+    cell.locator("iframe").first.evaluate("(frame) => frame.scrollIntoView()")
     screenshot(page, f"{name.split('_')[0]}_panel_{number}")
     assert end != start, f"{name}, cell {number}: no slider moves the picture"
     moved |= _changed(start, end)

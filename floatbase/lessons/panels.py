@@ -18,6 +18,8 @@ from floatbase.lessons.stops import DIRECTIONS, computed, recorded_pushes
 from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
 from floatbase.viewer import Viewer, published, push_at, with_image
 
+_NARROW = "min(340px, 100%)"  # width below which nothing of a slider is left but its name and its number
+
 # sliders ----------------------------------------------------------------------------------------------------------------
 
 
@@ -36,10 +38,11 @@ class SliderPanel(widgets.VBox):
         beside: bool,
         stops: Mapping[str, Sequence[float]],
     ):
-        width, flex = ("62%", "0 0 auto") if beside else ("auto", None)  # a long note beside it wraps, and takes nothing of it
-        self._picture = widgets.VBox(layout=widgets.Layout(width=width, flex=flex))
-        note = widgets.HTML()
-        top = [note] if view is None else [widgets.HBox([self._picture, note])] if beside else [self._picture, note]
+        self._picture = widgets.VBox(layout=_wide(62, 380) if beside else widgets.Layout())
+        note = widgets.HTML(layout=_wide(30, 270) if beside else widgets.Layout())
+        note.layout.padding = "0 0 0 10px" if beside else None
+        row = widgets.HBox([self._picture, note], layout=widgets.Layout(flex_flow="row wrap"))
+        top = [note] if view is None else [row] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])
         self.view, self.sliders, self.note, self.beside, self.stops = view, sliders, note, beside, stops
         self._draw = draw
@@ -67,6 +70,11 @@ class SliderPanel(widgets.VBox):
             return computed(self)
         self._picture.children = [self.view.widget()] if self.view else []
         return with_image(super()._repr_mimebundle_(**kwargs), *self._picture.children)
+
+
+def _wide(share: int, least: int) -> widgets.Layout:
+    """A part of a row that takes its share of the width, %, and a line of its own where that is less than `least` pixels."""
+    return widgets.Layout(flex=f"1 1 {share}%", min_width=f"min({least}px, 100%)")
 
 
 def slider_panel(
@@ -97,7 +105,7 @@ def slider_panel(
 def _range_slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:
     text = name.replace("_", " ") + (f" [{unit}]" if unit else "")
     made = _slider(text, low, first, high, _round_step(low, first, high), wait)
-    made.style.description_width, made.layout.width = "12em", "80%"
+    made.style.description_width, made.layout.width = "min(12em, 36%)", "80%"
     return made
 
 
@@ -112,7 +120,8 @@ def _slider(text: str, low: float, first: float, high: float, step: float, wait:
         readout_format=f".{max(0, -math.floor(math.log10(step)))}f",
         continuous_update=not wait,
         tooltip=text,
-        layout=widgets.Layout(width="60%"),
+        style={"description_width": "min(8.5em, 36%)"},
+        layout=widgets.Layout(width="60%", min_width=_NARROW),
     )
 
 
@@ -190,7 +199,9 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
     run.on_status(lambda _: line.tell())
     force.observe(let_go, names="value")
     buttons = [button("run", run.start), button("pause", run.pause), button("reset", reset)]
-    rows = [force, widgets.HBox([towards, _button("push", push)]), speed, widgets.HBox([*buttons, line])]
+    wrapped = widgets.Layout(flex_flow="row wrap")
+    aim, bar = (widgets.HBox(parts, layout=wrapped) for parts in ([towards, _button("push", push)], [*buttons, line]))
+    rows = [force, aim, speed, bar]
     return _PushPanel(run, view, most, rows)
 
 

@@ -82,6 +82,7 @@ class Card:
     start: settings to begin with.
     fixed: names of settings that may not be changed.
     world: names of pairs of settings of which the true one may not be changed.
+    paused: whether the reader must press run first.
     end: looks at why a run stopped, where that may solve it.
     """
 
@@ -93,6 +94,7 @@ class Card:
     fixed: tuple[str, ...] = ()
     world: tuple[str, ...] = ()
     end: Callable[[Judge, str, Session], bool | str] | None = None
+    paused: bool = False
 
     def judge(self) -> Judge:
         """A new judge."""
@@ -246,8 +248,9 @@ CARDS = (
     Card("Stand on two feet", "Lift FR and RL, and stand on FL and RR for a second.", _two_feet, fixed=_WORLD),
     Card("Survive 300 N", "Push it with 300 N from any side; 2 s later it must be on its feet.", _survive, fixed=_WORLD),
     Card(
-        "Down an icy slope", "The ground falls by 20° and is slippery. Slide 30 cm without falling.", _slide,
+        "Down an icy slope", "The ground falls by 20° and is slippery. Press run, and slide 30 cm without falling.", _slide,
         Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "true_off", "believed_off"), ("slope", "friction"),
+        paused=True,
     ),
     Card("On an edge", "Bring a foot's planned force onto an edge of its polyhedron: two active facets.", _edge, fixed=_WORLD),
     Card(

@@ -20,10 +20,11 @@ from floatbase.playground.session import PERIOD, Session
 from floatbase.playground.settings import Settings
 from floatbase.playground.terms import arrows
 from floatbase.robots import Robot
-from floatbase.simulation import SEEN, Live, advice
+from floatbase.simulation import GOES_ON, SEEN, Live, advice
 from floatbase.viewer import Picture, published, push_at
 
 _STILL = "The playground needs the live lesson: here its robot stands still."
+_SHOWN = ("forces", "cones")  # terms that are drawn at first
 
 
 class Playground:
@@ -52,13 +53,14 @@ class Playground:
         self.view = fb.Viewer(robot, background=background, port=port, facets=facets, follow=True, height=height)
         self.session = Session(robot, settings)
         self._first = self.session.settings
-        self.force, self.towards = 0.1 * robot.weight, 0.0  # N, and degrees: 0 forwards, 90 to the left
+        self.force, self.towards = self._gentle, 0.0  # N, and degrees: 0 forwards, 90 to the left
         self.pushed = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
         self.outcome = ""
         self.card: Card | None = None
         self.judge: Judge | None = None
         self._last_push: fb.Push | None = None
-        self.shown: dict[str, bool] = dict.fromkeys(SYMBOLS, False) | {"forces": True, "cones": True}
+        self.shown = {term: term in _SHOWN for term in SYMBOLS}
+        self._waits = [False, False]  # for the reader to press run: after the next reset, after the next slice
         self._requested: dict[str, Any] = {}
         self._lock = threading.Lock()  # over what is requested
         self._drawing = threading.Lock()  # the run draws, and so does who pauses it
@@ -77,6 +79,11 @@ class Playground:
     def url(self) -> str:
         """Address of the page, which has no port before this is asked for."""
         return self.view.url
+
+    @property
+    def _gentle(self) -> float:
+        """The push at first, N."""
+        return 0.1 * self.robot.weight
 
     def start(self) -> Playground:
         """Show the robot and let it run."""
@@ -129,7 +136,11 @@ class Playground:
         self._write()
 
     def undo(self) -> None:
-        """Set everything as it was at first, and put the robot back on its feet."""
+        """Set everything as it was at first, the push, the speed and what is shown too, and put the robot back on its feet."""
+        self.force, self.towards, self._last_push = self._gentle, 0.0, None
+        self.shown |= {term: term in _SHOWN for term in SYMBOLS}
+        self.run.slow_motion(1.0)
+        self._panel.follow_looks(1.0)
         self._restart_with(self._first if self.card is None else self.card.start)
 
     def _restart_with(self, settings: Settings) -> None:
@@ -140,6 +151,7 @@ class Playground:
         self.run.reset()
 
     def _begin(self, settings: Settings) -> None:
+        self._waits[0] = self.card is not None and self.card.paused
         self.session.change(**asdict(settings))
         self._panel.follow(self.session.settings)
         self._hand_over()
@@ -167,6 +179,7 @@ class Playground:
     def _restart(self) -> None:
         """After a reset of the simulation, in the run's thread."""
         self.session.restart()
+        self._waits = [False, self._waits[0]]
         card = self.card
         if card is not None:
             self.judge = card.judge()
@@ -198,7 +211,7 @@ class Playground:
         """Show what stopped the run, if anything did, over the last picture."""
         self.outcome = "" if status == "running" else advice(status)
         judge = self.judge
-        if judge is not None and status not in ("running", "paused"):
+        if judge is not None and status not in GOES_ON:
             judge.ended(status, self.session)
             self._write()
         self._draw_again()
@@ -218,6 +231,9 @@ class Playground:
             if judge.says != before:
                 self._write()
         self._draw(record)
+        if self._waits[1]:
+            self._waits[1] = False
+            self.run.pause()
         if self.robot.is_floating:
             self.view.strip("planned and measured forces differ by", float(record.time[-1]), gap(record), "N")
 
@@ -229,11 +245,9 @@ class Playground:
             pace = "" if speed is None else f", {speed:.0%} of real time"
             gait = f", {session.settings.gait}" if session.settings.gait else ""
             headline = f"{self.robot.name}{gait}, {now:.1f} s{pace}, control every {1e3 * PERIOD:g} ms"
-            forces = self.shown["forces"]
             self.view.show(
-                record.final, record.contacts, record.measured[-1] if forces else None,
-                _planned(record) if forces else None, push=push_at(record, -1, SEEN), cones=self.shown["cones"],
-                support=True, extra=self._extra(record),
+                record.final, record.contacts, record.measured[-1], _planned(record), push=push_at(record, -1, SEEN),
+                cones=self.shown["cones"], arrows=self.shown["forces"], support=True, extra=self._extra(record),
                 title="\n".join(filter(None, [headline, self.outcome, session.note])),
             )  # fmt: skip
 
@@ -243,7 +257,7 @@ class Playground:
         settings = self.session.settings
         for term, shown in self.shown.items():
             if shown:
-                picture |= arrows(term, record, self.view.scale, settings.true_off, settings.mass[1])
+                picture |= arrows(term, record, self.view.scale, self.view.painter.size, settings.true_off, settings.mass[1])
         walk = self.session.walk
         return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
 

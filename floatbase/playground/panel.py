@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from floatbase.playground.cards import CARDS
 from floatbase.playground.equation import EQUATION
 from floatbase.playground.settings import GAITS, IDEAL, Settings
+from floatbase.playground.terms import MEANINGS
 
 if TYPE_CHECKING:
     from floatbase.playground.page import Playground
@@ -47,7 +48,8 @@ class Panel:
         for name, (attribute, low, high, step) in _PAIRS.items():
             for i, column in enumerate(("believed", "true")):
                 value, changed = getattr(s, attribute)[i], partial(self._set_part, attribute, i)
-                view.slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column)
+                word = "perfect" if high == IDEAL else ""
+                view.slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column, word)
         self._add_stance()
         self._add_walk()
         where = "its quadratic program"
@@ -83,6 +85,8 @@ class Panel:
 
     def _add_terms(self) -> None:
         view = self._play.view
+        for name, (colour, meaning) in MEANINGS.items():
+            view.explain(f"term {name}", colour, meaning)
         for term in EQUATION:
             show = partial(self._play.show_term, term.name)
             view.term(f"show {term.name}", show, self._play.shown[term.name], term.symbol, "shown")
@@ -114,6 +118,15 @@ class Panel:
     def _switch(self, attribute: str, term: str, on: bool) -> None:
         off = tuple(name for name in getattr(self._play.wanted, attribute) if name != term)
         self._play.set(**{attribute: off if on else (*off, term)}, leg=self._play.robot.feet[0].frame)
+
+    def follow_looks(self, speed: float) -> None:
+        """Show the push, the speed (simulated over real time) and the shown terms at their controls."""
+        play = self._play
+        values: dict[str, Any] = {"speed": speed, "push [N]": play.force, "towards [°]": play.towards}
+        if play.robot.is_floating:
+            values |= {f"show {term.name}": play.shown[term.name] for term in EQUATION}
+        for name, value in values.items():
+            play.view.move(name, value)
 
     def follow(self, s: Settings) -> None:
         """Show settings at the controls, which only a floating robot has."""

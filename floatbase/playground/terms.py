@@ -10,66 +10,83 @@ from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.viewer import COM, MEASURED, Picture, below, marks, shapes
 
 _PER_ACCELERATION = 0.03  # m of arrow per m/s², of the feet's drift
-_TEXT = 0.05  # m, height of letters
+_TEXT = 0.06  # height of letters, over the size of the robot
 _LEVER = 0.3  # m, of the force that a torque is drawn as
 _SHORTEST = 5e-3  # m: shorter arrows are not drawn
+
+MEANINGS = {  # term: (colour of its arrows, what they are)
+    "inertia": (COM, "m a, mass times acceleration"),
+    "velocity": (COM, "C q̇, Coriolis and centrifugal force"),
+    "gravity": (COM, "m g, weight"),
+    "zeros": (MEASURED, "τ, torques of the joints"),
+    "drift": (COM, "J̇ q̇, drift of the feet"),
+}
+_ROWS = {"inertia": 0.25, "velocity": 0.37, "gravity": 0.49, "zeros": 0.61, "drift": 0.73}  # of words, over the robot's size
+_OF_MASS = ("inertia", "velocity", "gravity")
+_BEHIND = 1.1  # times its size behind its centre of mass, where no arrow stands
 
 
 def arrows(
     term: str,
     record: fb.Rollout,
     scale: float,
+    size: float,
     off: tuple[str, ...] = (),
     mass: float = 1.0,
 ) -> Picture:
     """The arrows of a term of `EQUATION` at the last row of a record; forces and cones are drawn by the viewer itself.
 
+    A term that is too small to be seen, or that the world does not have, is told in words behind the robot.
     scale: m/N, as the viewer draws forces.
+    size: of the robot, m.
     off: terms that the world does not have: gravity and C q̇ have no arrow then.
     mass: all masses of the world as a multiple of the data sheet's. M q̈, C q̇ and g are drawn with it, as they truly are.
     """
-    if term in off and term in ("gravity", "velocity"):
+    if term not in MEANINGS:
         return {}
-    of_mass = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity}
-    others = {"zeros": _torques, "drift": _drift}
-    if term in of_mass:
-        return below(f"term {term}", of_mass[term](record, scale * mass))
-    return below(f"term {term}", others[term](record, scale)) if term in others else {}
+    made = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity, "zeros": _torques, "drift": _drift}
+    lacking = term in off and term in ("gravity", "velocity")
+    drawn = {} if lacking else made[term](record, scale * (mass if term in _OF_MASS else 1.0), size)
+    if drawn:
+        return below(f"term {term}", drawn)
+    words = MEANINGS[term][1].split(",")[0] + (": switched off" if lacking else " ≈ 0")
+    at = np.array(record.final.com) + [-_BEHIND * size, 0.0, _ROWS[term] * size]
+    return {f"word {term}": shapes.label(at, words, _TEXT * size)}
 
 
-def _arrow(name: str, at: Array, vector: Array, words: str, colour: tuple[float, float, float] = COM) -> Picture:
+def _arrow(name: str, at: Array, vector: Array, words: str, size: float) -> Picture:
     if not np.isfinite(vector).all() or np.linalg.norm(vector) < _SHORTEST:
         return {}
-    tip = at + vector * (1.0 + 0.05 / np.linalg.norm(vector))
-    return {f"/{name}": shapes.arrow(at, vector, colour, 0.5), f"/{name} label": shapes.label(tip, words, _TEXT)}
+    tip = at + vector * (1.0 + 0.1 * size / np.linalg.norm(vector))
+    return {f"/{name}": shapes.arrow(at, vector, COM, size), f"/{name} label": shapes.label(tip, words, _TEXT * size)}
 
 
-def _inertia(record: fb.Rollout, scale: float) -> Picture:
+def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
     """Mass times the acceleration of the centre of mass, by differences over the record."""
     state = record.final
     if len(record) < 2:
         return {}
     first = record.state(0)
     rate = (state.com_velocity - first.com_velocity) / float(record.time[-1] - record.time[0])
-    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "true m a")
+    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "true m a", size)
 
 
-def _gravity(record: fb.Rollout, scale: float) -> Picture:
+def _gravity(record: fb.Rollout, scale: float, size: float) -> Picture:
     """The weight, as an arrow that ends at the centre of mass: below it there is the ground."""
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
-    words = shapes.label(at + [0.0, 0.08, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "true m g", _TEXT)
-    return {"/m g": shapes.arrow(at - weight, weight, COM, 0.5), "/m g label": words}
+    words = shapes.label(at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "true m g", _TEXT * size)
+    return {"/m g": shapes.arrow(at - weight, weight, COM, size), "/m g label": words}
 
 
-def _velocity(record: fb.Rollout, scale: float) -> Picture:
+def _velocity(record: fb.Rollout, scale: float, size: float) -> Picture:
     """The force of C q̇ on the base."""
     state = record.final
     force = (state.h - state.replace(v=np.zeros(state.robot.nv)).h)[:3]
     pose = state.frame_pose("base")
-    return _arrow("C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇")
+    return _arrow("C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇", size)
 
 
-def _torques(record: fb.Rollout, scale: float) -> Picture:
+def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
     """A curled arrow around the axis of each joint, whose radius is that of the force with this torque at a lever of 0.3 m."""
     state, first = record.final, record.robot.nv - record.robot.d
     picture: Picture = {}
@@ -82,7 +99,7 @@ def _torques(record: fb.Rollout, scale: float) -> Picture:
     return picture
 
 
-def _drift(record: fb.Rollout, scale: float) -> Picture:
+def _drift(record: fb.Rollout, scale: float, size: float) -> Picture:
     """What the velocities alone accelerate the feet by."""
     contacts: Contacts = record.contacts_at(-1)
     eom = equations_of_motion(record.final, contacts)
@@ -90,5 +107,5 @@ def _drift(record: fb.Rollout, scale: float) -> Picture:
     for name in contacts.names:
         if contacts[name].k == 3:
             at = contacts.only(name).positions(record.final)[0]
-            picture |= _arrow(name, at, -_PER_ACCELERATION * eom.b[contacts.force_slice(name)], "J̇ q̇")
+            picture |= _arrow(name, at, -_PER_ACCELERATION * eom.b[contacts.force_slice(name)], "J̇ q̇", size)
     return picture

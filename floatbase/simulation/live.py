@@ -19,13 +19,15 @@ from floatbase.simulation.settling import lies_still, settled
 _SLICE = 1.0 / 30.0  # s of simulated time in a slice, about: as often as a picture is drawn
 _LONGEST_JOIN = 5.0  # s that `close` waits for a slice: far longer than one takes
 _SETTLING = 1.5  # s after a fall in which a robot comes to lie, at most
+IDLE = "paused by itself, untouched for long"  # a status
+GOES_ON = ("running", "paused", IDLE)  # the statuses of a run that nothing has ended
 SEEN = 0.4  # s for which a slice still lists a push that is over: the eye misses an arrow of a tenth of a second
 
 
 def advice(status: str) -> str:
     """A status of `Live` as a line for who watches: what stopped the run, in a sentence, and what to do about it."""
-    if text("status", status) in ("running", "paused"):
-        return status
+    if text("status", status) in GOES_ON:
+        return status if status != IDLE else f"{IDLE}: press run"
     reason = status.split("\n")[0].split(". ")[0].rstrip(".")
     return f"{reason}: press reset, or push again"
 
@@ -38,9 +40,10 @@ class Live:
     after_reset: called after each reset, in that thread, to reset what has a memory of its own, such as the actuators.
     idle: s without any call here after which the run pauses by itself, so that a forgotten page costs nothing.
 
-    `status` is "running", "paused", or why the run stopped: "fell", "diverged", "controller failed: …", "stopped: …" for an
-    exception, which `error` holds. A fall or a failure is told at once; slices go on with the controller off, as `settle`
-    of `rollout` says, until the robot lies still, or for 1.5 s at most. Calls act between slices, and none but `close` waits.
+    `status` is "running", "paused", `IDLE` where it has paused by itself, or why the run stopped: "fell", "diverged",
+    "controller failed: …", "stopped: …" for an exception, which `error` holds. A fall or a failure is told at once; slices go
+    on with the controller off, as `settle` of `rollout` says, until the robot lies still, or for 1.5 s at most. Calls act
+    between slices, and none but `close` waits.
     """
 
     def __init__(
@@ -81,7 +84,7 @@ class Live:
 
     @property
     def status(self) -> str:
-        """ "running", "paused", or why it stopped: see the class."""
+        """ "running", "paused", `IDLE`, or why it stopped: see the class."""
         return self._status
 
     @property
@@ -169,7 +172,7 @@ class Live:
         """Run, after a reset where it is requested or needed: all under one lock, so that no slice comes between."""
         with self._lock:
             self._last_call = time.monotonic()
-            if reset or self._status not in ("running", "paused"):
+            if reset or self._status not in GOES_ON:
                 self._reset_requested, self._requested = True, []
             if push is not None:
                 self._requested.append(push)
@@ -242,7 +245,7 @@ class Live:
             if outcome == "completed":
                 if stop.is_set() or time.monotonic() - self._last_call <= self._idle:
                     return
-                outcome = "paused"
+                outcome = IDLE
             elif stop is not self._stop:  # paused and started again meanwhile
                 self._reset_requested = True
                 return

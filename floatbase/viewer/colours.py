@@ -63,7 +63,10 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
 )
 
 # how the legend marks what is not a patch of its colour: first part of the item's path -> a class of the page's style
-SYMBOLS = {"com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line"}
+SYMBOLS = {
+    "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line", "cone": "cone", "idle cone": "cone",
+    "support": "tile", "wrench": "curl",
+}  # fmt: skip
 
 # status of a friction cone -> its colour and its opacity
 CONE = {"idle": IDLE, "inside": CALM, "active": WARNING, "outside": ALARM}
@@ -73,7 +76,16 @@ CONE_ALPHA = {"idle": 0.12, "inside": 0.28, "active": 0.28, "outside": 0.28}
 BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
     "white": (_rgb("#FFFFFF"), _rgb("#FFFFFF"), _rgb("#DDDDDD"), _rgb("#222222")),
     "light": (_rgb("#FBFCFE"), _rgb("#DFE5EC"), _rgb("#BCC5CF"), _rgb("#222222")),
-    "dark": (_rgb("#1E2227"), _rgb("#33393F"), _rgb("#59616A"), _rgb("#F2F2F2")),
+    "dark": (_rgb("#1E2227"), _rgb("#282C32"), _rgb("#4B525A"), _rgb("#F2F2F2")),
+}
+
+# colour -> its shade on a dark background, for those that would hide there
+NIGHT = {
+    MEASURED: _rgb("#1C80C0"),
+    PLANNED: _rgb("#8CCBF2"),
+    COM: _rgb("#CD5A9B"),
+    PATCH: _rgb("#C4C9CF"),
+    GREYS[0]: _rgb("#DDE3EA"),
 }
 
 

@@ -34,6 +34,7 @@ class Controls:
         step: float = 0.01,
         section: str = "",
         column: str = "",
+        at_most: str = "",
     ) -> None:
         """Add a slider to the panel in the page.
 
@@ -43,10 +44,11 @@ class Controls:
         low, high, step: its range and its smallest step.
         section: heading that it stands under.
         column: "believed" or "true" for a part of a row of two, whose name ends in that word.
+        at_most: a word that stands for its highest value, as "perfect".
         """
         low, high = number("low", low), number("high", high, least=number("low", low))
         value, step = number("value", value, "", low, high), positive("step", step)
-        place = _place(name, section, column)
+        place = _place(name, section, column) | ({"at_most": text("at_most", at_most)} if at_most else {})
         changed = function("changed", changed, "changed(value)")
         self._control(name, changed, value=value, min=low, max=high, step=step, **place)
 

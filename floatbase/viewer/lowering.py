@@ -116,18 +116,19 @@ def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
     return Shape(_object("LineSegments", {"attributes": attributes}, material))
 
 
-def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.13, 0.13)) -> Shape:
+def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.13, 0.13), on_top: bool = True) -> Shape:
     """Text that always faces the reader.
 
     text: the text; braces make a subscript: "f{c}".
     height: height of its letters, m.
     plate: whether a plate lies behind it.
     colour: RGB of the text.
+    on_top: whether it is drawn over whatever is in front of it.
     """
     picture = text_picture(text, plate, colour)
     tall, wide = picture.shape[:2]
     image = {"type": "Uint8Array", "width": wide, "height": tall, "data": umsgpack.Ext(0x12, picture[::-1].tobytes())}
-    material = {"type": "SpriteMaterial", "map": "texture", "transparent": True, "depthTest": False, "depthWrite": False}
+    material = {"type": "SpriteMaterial", "map": "texture", "transparent": True, "depthTest": not on_top, "depthWrite": False}
     lowered = _object("Sprite", None, material)
     lowered["images"] = [{"uuid": "image", "url": image}]
     # 1025: two bytes a pixel, grey and alpha; 1006: smooth when scaled

@@ -134,14 +134,18 @@ def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
 
 @lru_cache(maxsize=64)
 def _unit_curl(colour: RGB, on_top: bool) -> Shape:
-    """Three quarters of a ring of radius 1 around z, with a head at its end."""
-    end = 1.5 * np.pi
-    ring = geometry.torus_arc(1.0, 0.055, 0.0, end - 0.3)
+    """Three quarters of a ring of radius 1 around z, with a head at its end and two before: one is seen from anywhere."""
+    end = 1.5 * np.pi - 0.3
+    ring = geometry.torus_arc(1.0, 0.055, 0.0, end)
+    heads = [_head(angle) for angle in (end / 3.0, 2.0 * end / 3.0, end)]
+    return lowering.mesh(*geometry.merged([ring, *heads]), colour, on_top=on_top)
+
+
+def _head(angle: float) -> geometry.Mesh:
+    """A head of an arrow on the ring of radius 1 around z, along it."""
     head, faces = geometry.revolved([(0.0, 0.0), (0.17, 0.0), (0.0, 0.42)])
-    at = np.array([np.cos(end - 0.3), np.sin(end - 0.3), 0.0])
-    along = np.array([-at[1], at[0], 0.0])
-    turned = head @ geometry.frame_along(along).T + at
-    return lowering.mesh(*geometry.merged([ring, (turned, faces)]), colour, on_top=on_top)
+    at = np.array([np.cos(angle), np.sin(angle), 0.0])
+    return head @ geometry.frame_along([-at[1], at[0], 0.0]).T + at, faces
 
 
 @lru_cache(maxsize=64)

@@ -2,6 +2,7 @@
 // floatbase's page around meshcat's viewer: our own commands, the player, and messages of several commands.
 
 const part = (id) => document.getElementById(id);
+const names = (path) => path.split("/").filter((name) => name);
 
 function startViewer() {
   const viewer = new MeshCat.Viewer(part("meshcat-pane"));
@@ -9,7 +10,7 @@ function startViewer() {
   const player = startPlayer(viewer);
   const panel = startPanel(viewer);
   const camera = startCamera(viewer, panel);
-  const legend = startLegend(viewer, camera);
+  const legend = startLegend(camera, (colour) => theme.colour(colour)), theme = startTheme(viewer, legend);
   const manners = startManners(viewer, camera);
   const commands = {
     set_camera: camera.look,
@@ -23,7 +24,8 @@ function startViewer() {
     },
     set_legend: (command) => { legend.show(command.items); },
     set_kept: (command) => { part("kept").style.display = command.kept ? "block" : "none"; },
-    set_theme: (command) => { document.body.className = command.name; },
+    set_theme: theme.ask,
+    set_ending: (command) => { part("notice").textContent = command.text; },
     set_animation: (command) => { meshcat(command); player.load(command); },
     set_control: panel.add,
     move_control: panel.move,
@@ -33,6 +35,9 @@ function startViewer() {
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
     (commands[command.type] || meshcat)(command);
+    const made = command.type == "set_object" && viewer.scene_tree.find([...names(command.path), "<object>"]).object;
+    if (made) camera.letters(made);
+    theme.after(command, made);
     viewer.set_dirty();
   };
   return viewer;
@@ -62,9 +67,10 @@ function viewerOrText() {
 
 // The legend, at the lower left. Where it would cover what the camera looks at, it is folded into a button: pointing at it
 // or reaching it by the keyboard opens it, a click keeps it open, Escape closes it.
-function startLegend(viewer, camera) {
+// shade: the colour that a colour has in the present theme.
+function startLegend(camera, shade) {
   const legend = part("legend"), lines = part("lines"), button = legend.querySelector("button");
-  let kept = false;
+  let kept = false, shown = [];
   const open = (now) => {
     legend.classList.toggle("open", now);
     button.setAttribute("aria-expanded", now);
@@ -87,20 +93,21 @@ function startLegend(viewer, camera) {
   button.onclick = () => keep(!kept);
   const sizes = new ResizeObserver(fold);
   for (const one of [part("meshcat-pane"), part("player"), part("panel")]) sizes.observe(one);
-  return {
-    show(items) {
-      lines.replaceChildren(...items.map(([colour, text, symbol]) => {
-        const line = document.createElement("div");
-        line.append(spot(colour, symbol), text);
-        return line;
-      }));
-      button.firstChild.replaceChildren(...Array.from(new Set(items.map(([colour]) => colour)), (colour) => spot(colour)));
-      fold();
-    },
-  };
+  function show(items) {
+    shown = items;
+    const seen = items.map(([colour, ...rest]) => [shade(colour), ...rest]);
+    lines.replaceChildren(...seen.map(([colour, text, symbol]) => {
+      const line = document.createElement("div");
+      line.append(spot(colour, symbol), text);
+      return line;
+    }));
+    button.firstChild.replaceChildren(...Array.from(new Set(seen.map(([colour]) => colour)), (colour) => spot(colour)));
+    fold();
+  }
+  return {show, again: () => show(shown)};
 }
 
-// A patch of a colour, or one of the style's symbols in it: a disc, a ring, a diamond, a line.
+// A patch of a colour, or one of the style's symbols in it: a disc, a ring, a diamond, a line, a cone, a tile, a curl.
 function spot(colour, symbol = "patch") {
   const made = document.createElement("i");
   made.className = symbol;
@@ -112,6 +119,7 @@ const LAG = 0.3;  // s by which the camera is behind what it follows, so that it
 const SLOWEST = 1000;  // ms between pictures that count: a browser that draws few must not fall behind
 const WIDE = 1.2;  // width over height of a picture into which the robot fits; a narrower one shows it smaller
 const LEAST = 0.2;  // zoom, in the smallest window
+const LARGER = 1.5;  // times: labels of a picture that is zoomed out are drawn so much larger, at most
 const REST = 1e-3;  // m: closer than this it is there
 
 // The camera. meshcat's camera node cannot move the point that the mouse turns around.
@@ -143,6 +151,14 @@ function startCamera(viewer, panel) {
     anew = false;
     return way.sub(step).length() > 0;
   }
+  // Labels keep their size where the window is small.
+  function letters(object) {
+    object.traverse((one) => {
+      if (!one.isSprite) return;
+      one.userData.own ??= one.scale.clone();
+      one.scale.copy(one.userData.own).multiplyScalar(Math.min(1 / viewer.camera.zoom, LARGER));
+    });
+  }
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
     const moving = path.length > 0 && go();
@@ -152,6 +168,7 @@ function startCamera(viewer, panel) {
     if (zoom != viewer.camera.zoom) {
       viewer.camera.zoom = zoom;
       viewer.camera.updateProjectionMatrix();
+      letters(viewer.scene);
     }
     if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
     else viewer.camera.clearViewOffset();
@@ -160,6 +177,7 @@ function startCamera(viewer, panel) {
   };
   return {
     aside,
+    letters,
     look(command) {
       viewer.camera.fov = command.fov;
       viewer.camera.position.fromArray(command.position);
@@ -168,7 +186,7 @@ function startCamera(viewer, panel) {
       anew = true;
     },
     follow(command) {
-      path = command.node.split("/").filter((name) => name);
+      path = names(command.node);
       from.fromArray(command.from);
       begin.fromArray(command.begin);
       smooth = command.smooth;

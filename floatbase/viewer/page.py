@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import gzip
 import html
+import json
 from collections.abc import Iterable
 from functools import cache
 from importlib.util import find_spec
@@ -17,6 +18,7 @@ from pathlib import Path
 
 from floatbase.errors import ViewerError
 from floatbase.viewer import wire
+from floatbase.viewer.colours import BACKGROUNDS, NIGHT, hexadecimal
 
 _BODY = """
 <div><div id="meshcat-pane"></div></div>
@@ -26,8 +28,8 @@ _BODY = """
 <button id="fold" type="button" aria-label="panel" aria-expanded="true" title="fold the panel"></button><div id="panel"></div>
 <div id="title"></div>
 <div id="legend"><div id="lines"></div><button aria-controls="lines" aria-expanded="false"><span></span>legend</button></div>
-<div id="notice">The viewer is closed, or its kernel was restarted: run its cell again. A page with the same address comes back
-by itself.</div>
+<div id="notice">The viewer is closed, or its kernel was restarted: run its cell again. A page with the same address \
+comes back by itself.</div>
 <div id="kept" title="This viewer is displayed again further down and live there.">kept picture ·
 <button>make live</button></div>
 <div id="player"><button title="play or pause">▶</button><input type="range" min="0" step="0.001" title="time">
@@ -91,11 +93,19 @@ def _own(name: str) -> str:
 
 
 def _scripts() -> str:
-    return _own("page.js") + _own("panel.js") + _own("manners.js")
+    return "".join(map(_own, ("page.js", "panel.js", "manners.js", "theme.js"))) + _colours()
+
+
+def _colours() -> str:
+    """The backgrounds, and the shades of the dark one, for theme.js."""
+    backgrounds = {name: [hexadecimal(colour) for colour in parts] for name, parts in BACKGROUNDS.items()}
+    night = {hexadecimal(colour): hexadecimal(shade) for colour, shade in NIGHT.items()}
+    return f"const BACKGROUNDS = {json.dumps(backgrounds)}, NIGHT = {json.dumps(night)};"
 
 
 def _page(scripts: str, title: str) -> str:
     return (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><link rel="icon" href="data:,"><title>{html.escape(title)}'
-        f"</title><style>{_own('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
+        f"<title>{html.escape(title)}</title><style>{_own('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
     )

@@ -75,6 +75,7 @@ class Painter:
         *,
         com: bool = True,
         cones: bool = True,
+        arrows: bool = True,
         support: bool = False,
         wrench: npt.ArrayLike | None = None,
         push: tuple[str, npt.ArrayLike] | None = None,
@@ -99,7 +100,7 @@ class Painter:
         picture = {"ground": ground.lines(self.lines, state.com)} | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
             stands = [contact.name not in lifted for contact in contacts for _ in contact.point_names]
-            picture |= self._contacts(contacts, positions, both, cones, stands)
+            picture |= self._contacts(contacts, positions, both, cones, stands, arrows)
             if support:
                 picture |= below("support", marks.support_region(positions[stands], 0.004 * self.size, ground))
             if labels:
@@ -204,7 +205,9 @@ class Painter:
         poses = state.joint_transforms
         return {f"{root}/{name}": Item(look, poses[joint]) for (joint, name), look in zip(self._paths, looks, strict=True)}
 
-    def _contacts(self, contacts: Contacts, positions: Array, forces: Forces, cones: bool, stands: list[bool]) -> Picture:
+    def _contacts(
+        self, contacts: Contacts, positions: Array, forces: Forces, cones: bool, stands: list[bool], arrows: bool
+    ) -> Picture:
         """Forces at every point, and patches and cones at the points that stand on the ground."""
         picture: Picture = {}
         height = self.cone_height(contacts)
@@ -216,7 +219,7 @@ class Painter:
             if cones and stands[i]:
                 force = None if forces.judged is None else forces.judged[i]
                 picture |= below(f"cone/{at}", self._cone(position, normal, float(mu), height, force))
-            for kind, vectors, colour in forces.kinds:
+            for kind, vectors, colour in forces.kinds if arrows else ():
                 if vectors is not None and not self._is_quiet(vectors[i]):
                     vector = self.scale * vectors[i]
                     picture[f"{kind}/{at}"] = shapes.arrow(position, vector, colour, self.size, halo=kind == "planned")
@@ -251,12 +254,18 @@ class Painter:
         return (VISIBLE * self.robot.weight) ** 2
 
     def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
-        """The name of every contact point, beside it and away from the robot."""
+        """The name of every contact, beside it and away from the robot; of a flat foot also the numbers of its corners."""
         picture: Picture = {}
-        for name, position in zip(contacts.point_names, positions, strict=True):
-            away = (position - state.com) * [1.0, 1.0, 0.0]
-            at = position + 0.12 * self.size * away / max(float(np.linalg.norm(away)), 1e-6)
-            picture[f"label/{plain(name)}"] = shapes.label(at, name, 0.06 * self.size)
+        for contact in contacts:
+            rows = [list(contacts.point_names).index(name) for name in contact.point_names]
+            middle = positions[rows].mean(axis=0)
+            away = (middle - state.com) * [1.0, 1.0, 0.0]
+            towards = away / max(float(np.linalg.norm(away)), 1e-6)
+            beyond = 0.12 * self.size + float(np.linalg.norm(positions[rows] - middle, axis=1).max())
+            picture[f"label/{plain(contact.name)}"] = shapes.label(middle + beyond * towards, contact.name, 0.06 * self.size)
+            for i, row in enumerate(rows if len(rows) > 1 else ()):
+                at = positions[row] + 0.25 * (positions[row] - middle)
+                picture[f"label/{plain(contacts.point_names[row])}"] = shapes.label(at, str(i), 0.035 * self.size)
         return picture
 
     def _wrench(self, state: State, value: npt.ArrayLike) -> Picture:

@@ -61,7 +61,12 @@ function startPanel(viewer) {
   const digits = (step) => Math.max(0, Math.min(6, Math.ceil(-Math.log10(step || 1))));
   function slider({name, ...given}, line) {
     const input = Object.assign(document.createElement("input"), {type: "range"}), shown = document.createElement("output");
-    const set = (now) => { input.value = now; shown.textContent = Number(now).toFixed(digits(input.step)); };
+    const say = () => {
+      const words = given.at_most && Number(input.value) >= Number(input.max) ? given.at_most : "";
+      shown.textContent = words || Number(input.value).toFixed(digits(input.step));
+      if (given.at_most) input.setAttribute("aria-valuetext", shown.textContent);
+    };
+    const set = (now) => { input.value = now; say(); };
     const remake = ({value, min, max, step}) => { Object.assign(input, {min, max, step}).dataset.home = value; set(value); };
     input.setAttribute("aria-label", name);
     remake(given);
@@ -183,7 +188,7 @@ function startStrip(section) {
     if (points.length && t < points.at(-1)[0]) points = [];
     points.push([t, value]);
     points = points.filter(([when]) => when > t - HISTORY);
-    const most = Math.max(1, ...points.map(([, y]) => y)) * 1.1, {width: w, height: h} = canvas, draw = canvas.getContext("2d");
+    const peak = Math.max(...points.map(([, y]) => y)), most = Math.max(1, peak) * 1.1, {width: w, height: h} = canvas, draw = canvas.getContext("2d");
     draw.clearRect(0, 0, w, h);
     draw.strokeStyle = getComputedStyle(canvas).color;
     draw.lineWidth = 3;
@@ -191,7 +196,7 @@ function startStrip(section) {
     for (const [when, y] of points) draw.lineTo(w * (1 - (t - when) / HISTORY), h - 4 - (h - 8) * y / most);
     draw.stroke();
     const said = (x) => x < 0.05 ? "0" : x < 10 ? x.toFixed(1) : x.toFixed(0);
-    label.textContent = `${name}: ${said(value)} ${unit} (up to ${said(most / 1.1)} in ${HISTORY} s)`;
+    label.textContent = `${name}: ${said(value)} ${unit} (up to ${said(peak)} in ${HISTORY} s)`;
     canvas.setAttribute("aria-label", label.textContent);
   };
 }

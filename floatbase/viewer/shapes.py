@@ -220,7 +220,8 @@ def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float,
     for end, x in (("/start", 0.0), ("/end", length)):
         where = start + np.array([x, 0.0, 0.0])
         picture[end] = Item(_unit_rod(colour), placed(where, along, (2.2 * thick, 2.2 * thick, thick / 2)))
-    return picture | {"/label": label(text_at, f"{force:g} N", 0.055 * size, colour)}
+    words = _label(f"{force:g} N", 0.055 * size, True, colour, False)  # behind the robot where the bar is
+    return picture | {"/label": Item(words, placed(text_at))}
 
 
 def rod(start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: float, colour: RGB) -> Item:
@@ -333,8 +334,8 @@ def _facet(mu: float, facets: int, inside: bool, turn: float, facet: int) -> Sha
 
 
 @lru_cache(maxsize=256)
-def _label(text: str, height: float, plate: bool, colour: RGB) -> Shape:
-    return lowering.label(text, height, plate, colour)
+def _label(text: str, height: float, plate: bool, colour: RGB, on_top: bool = True) -> Shape:
+    return lowering.label(text, height, plate, colour, on_top)
 
 
 @lru_cache(maxsize=256)

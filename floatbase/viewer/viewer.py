@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +17,10 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import film, marks, page, published, recording, shapes, still, walks, wire
+from floatbase.viewer import film, legend, marks, page, published, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
-from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, LEGEND, RGB, SYMBOLS, hexadecimal
+from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.controls import Controls
 from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
 from floatbase.viewer.painter import Painter, below, kinds
@@ -43,7 +42,7 @@ class Viewer(Controls):
 
     robot: the robot to draw.
     height: height of the picture in a notebook, pixels.
-    background: "white", "light" or "dark".
+    background: "white" or "light", both of which are dark where the page around the picture is, or the browser; or "dark".
     scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's weight about twice as long as
         its centre of mass is high.
     facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
@@ -86,6 +85,7 @@ class Viewer(Controls):
         self.canvas = Canvas(self.window)
         self._moving, self._follow = False, flag("follow", follow)
         self._last: State | None = None
+        self._own: dict[str, tuple[RGB, str]] = {}  # kinds of items that the legend explains beside its own
         super().__init__()
         self._set_stage(background)
 
@@ -115,6 +115,7 @@ class Viewer(Controls):
         *,
         com: bool = True,
         cones: bool = True,
+        arrows: bool = True,
         support: bool = False,
         wrench: npt.ArrayLike | None = None,
         push: tuple[str, npt.ArrayLike] | None = None,
@@ -134,6 +135,7 @@ class Viewer(Controls):
             `planned`.
         com: whether to draw the centre of mass and its projection on the ground.
         cones: whether to draw the friction cones.
+        arrows: whether to draw the forces; where not, they still colour the cones.
         support: whether to draw the convex hull of the contact points.
         wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a ring around its axis; its
             radius is that of a force which has this moment at a lever of half the diagonal of the robot's bounding box.
@@ -147,10 +149,10 @@ class Viewer(Controls):
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
         `ViewerError` when the window is closed.
         """
-        _check_flags(com=com, cones=cones, support=support, labels=labels)
+        _check_flags(com=com, cones=cones, arrows=arrows, support=support, labels=labels)
         _check_texts(title=title, ghost_name=ghost_name)
         picture = self.painter.picture(
-            state, contacts, forces, planned, com=com, cones=cones, support=support, wrench=wrench, push=push,
+            state, contacts, forces, planned, com=com, cones=cones, arrows=arrows, support=support, wrench=wrench, push=push,
             ghost=ghost, frames=frames, labels=labels, extra=extra,
         )  # fmt: skip
         self.draw(picture, title, ghost_name)
@@ -159,6 +161,13 @@ class Viewer(Controls):
             self.canvas.set(*self._looking(View()))
         self._last = state
         return self
+
+    def explain(self, kind: str, colour: RGB, meaning: str) -> None:
+        """Let the legend explain items of one's own, from the next picture on that has any.
+
+        kind: first part of their paths. colour: RGB. meaning: what the legend says.
+        """
+        self._own[text("kind", kind)] = colour, text("meaning", meaning)
 
     def prices(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
         """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle, of a normal force on top.
@@ -348,6 +357,10 @@ class Viewer(Controls):
         _check_texts(title=title)
         return page.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
+    def ending(self, words: str) -> None:
+        """What the page says when this viewer has been closed. words: the text."""
+        self.canvas.set(wire.page_command("set_ending", text=text("words", words)))
+
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
         self.window.close()
@@ -400,19 +413,9 @@ class Viewer(Controls):
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[wire.Update, wire.Update]:
         """The commands for the title, and for the legend of the colours in the picture."""
-        return wire.page_command("set_title", text=title or ""), _legend(frozenset(shown), ghost_name, self.painter.text)
-
-
-@lru_cache(maxsize=64)  # most pictures show what the one before did
-def _legend(shown: frozenset[str], ghost_name: str, text: RGB) -> wire.Update:
-    """The command for the legend of these kinds of items. text: colour of what is drawn as texts are."""
-    colours = dict.fromkeys(("push", "price", "zmp"), text)
-    items = [
-        [hexadecimal(colours.get(kind, colour)), ghost_name if kind == "ghost" else words, SYMBOLS.get(kind, "patch")]
-        for kind, colour, words in LEGEND
-        if kind in shown
-    ]
-    return wire.page_command("set_legend", items=items)
+        return wire.page_command("set_title", text=title or ""), legend.command(
+            frozenset(shown), ghost_name, self.painter.text, tuple((kind, *own) for kind, own in self._own.items())
+        )
 
 
 def _check_flags(**flags: bool) -> None:

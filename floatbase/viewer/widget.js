@@ -40,7 +40,7 @@ function still(model, box) {
   picture.alt = `picture of ${model.get("name")}`;
   picture.style.cssText = "position: absolute; width: 100%; height: 100%; object-fit: contain";
   if (data?.byteLength) picture.src = URL.createObjectURL(new Blob([bytes(data)], {type: "image/png"}));
-  line.style.cssText = "position: absolute; left: 12px; top: 8px; right: 12px; font: 13px system-ui, sans-serif; color: #555";
+  line.style.cssText = "position: absolute; left: 12px; top: 8px; right: 12px; font: 13px system-ui, sans-serif; opacity: 0.75";
   box.append(picture.src ? picture : "", line);
   line.textContent = picture.src ? "" : WAITING;
   return {

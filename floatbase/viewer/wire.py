@@ -25,7 +25,7 @@ Update = tuple[Key, bytes]
 TYPES = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "delete_control",
     "set_control", "move_control", "set_camera", "set_follow", "set_title", "set_legend", "set_theme", "set_kept",
-    "set_text", "set_strip", "set_views",
+    "set_text", "set_strip", "set_views", "set_ending",
 )  # fmt: skip
 
 ANIMATION: Key = ("/", "set_animation", "")
@@ -111,7 +111,7 @@ def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -
 
 
 def page_command(kind: str, **values: Any) -> Update:
-    """A command of page.js that belongs to no object: set_title, set_legend, set_theme or set_kept."""
+    """A command of page.js that belongs to no object, as set_title, set_legend and set_theme."""
     return encode({"type": kind, "path": "", **values})
 
 

@@ -60,10 +60,12 @@ def test_bounds_that_are_not_round_get_a_fine_step(view: fb.Viewer) -> None:
     assert drawn[0] == pytest.approx(2.0 / 3.0, abs=1e-4)
 
 
-def test_a_picture_keeps_its_width_beside_a_note_of_any_length(view: fb.Viewer) -> None:
+def test_a_picture_keeps_its_share_beside_a_note_and_has_a_line_of_its_own_where_it_is_narrow(view: fb.Viewer) -> None:
     panel = slider_panel(view, lambda x: "long " * 200, beside=True, x=(0.0, 0.5, 1.0))
-    picture, note = panel.children[0].children
-    assert (picture.layout.width, picture.layout.flex) == ("62%", "0 0 auto") and note is panel.note
+    row = panel.children[0]
+    picture, note = row.children
+    assert (picture.layout.flex, note.layout.flex, row.layout.flex_flow) == ("1 1 62%", "1 1 30%", "row wrap")
+    assert picture.layout.min_width == "min(380px, 100%)" and note is panel.note
 
 
 def test_a_range_with_no_width_does_not_fail(view: fb.Viewer) -> None:

@@ -110,14 +110,20 @@ def test_motors_of_the_base_do_nothing_unless_the_controller_believes_in_them() 
 def test_gravity_has_no_arrow_where_the_world_has_none() -> None:
     session = Session(GO2)
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
-    assert arrows("gravity", record, 1e-3) and not arrows("gravity", record, 1e-3, ("gravity",))
-    assert arrows("zeros", record, 1e-2, ("zeros",)), "torques are there with motors of the base, too"
+    assert list(arrows("gravity", record, 1e-3, 0.4)) == ["term gravity/m g", "term gravity/m g label"]
+    (word,) = arrows("gravity", record, 1e-3, 0.4, ("gravity",)).values()
+    assert word.shape.name == "m g: switched off"
+    (word,) = arrows("velocity", record, 1e-3, 0.4).values()
+    assert word.shape.name == "C q̇ ≈ 0"
+    assert arrows("zeros", record, 1e-2, 0.4, ("zeros",)), "torques are there with motors of the base, too"
 
 
 def test_arrows_of_masses_are_those_of_the_world() -> None:
     session = Session(GO2, Settings(mass=(1.0, 1.5)))
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
-    lengths = [np.linalg.norm(arrows("gravity", record, 1e-3, (), mass)["term gravity/m g"].matrix[:3, 2]) for mass in (1, 1.5)]
+    lengths = [
+        np.linalg.norm(arrows("gravity", record, 1e-3, 0.4, (), mass)["term gravity/m g"].matrix[:3, 2]) for mass in (1, 1.5)
+    ]
     assert lengths[1] == pytest.approx(1.5 * lengths[0])
     assert lengths[0] == pytest.approx(1e-3 * GO2.weight)
 

@@ -12,7 +12,7 @@ import pytest
 from waiting import until
 
 import floatbase as fb
-from floatbase.simulation import SEEN, Live, advice
+from floatbase.simulation import IDLE, SEEN, Live, advice
 from floatbase.viewer import push_at
 
 ROBOT = judges.load("go2")
@@ -240,8 +240,11 @@ def test_a_status_is_told_as_it_comes(run: Live, slices: list[fb.Rollout]) -> No
 def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
     run = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append, idle=0.2)
     run.start()
-    until(lambda: run.status == "paused")
-    assert slices
+    until(lambda: run.status == IDLE)
+    assert slices and advice(run.status) == f"{IDLE}: press run"
+    before = slices[-1].time[-1]
+    run.start()  # it goes on from there
+    until(lambda: run.status == IDLE and slices[-1].time[-1] > before)
     run.close()
 
 

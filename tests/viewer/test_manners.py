@@ -119,3 +119,24 @@ def test_a_recording_waits_for_who_asked_for_less_motion(browser, go2: Robot, tm
         page.wait_for_function(DRAWN)
         assert page.evaluate("viewer.animator.playing") == (motion != "reduce")
         context.close()
+
+
+def test_a_page_whose_viewer_has_closed_says_what_it_was_told_to(page, go2: Robot, standing: State) -> None:
+    view = Viewer(go2)
+    view.show(standing)
+    view.ending("Start it again with\npython -m floatbase view go2")
+    page.goto(view.url)
+    page.wait_for_function(DRAWN)
+    assert not page.locator("#notice").is_visible()
+    view.close()
+    page.wait_for_selector("#notice", state="visible")
+    assert page.inner_text("#notice") == "Start it again with\npython -m floatbase view go2"
+
+
+def test_labels_keep_their_size_in_a_small_window(framed) -> None:
+    page, inner = framed
+    tall = "viewer.scene_tree.find(['meshcat', 'scale', 'label', '<object>']).object.scale.y * viewer.camera.zoom"
+    before = inner.evaluate(tall)
+    page.set_viewport_size({"width": 390, "height": 800})
+    inner.wait_for_function("viewer.camera.zoom < 0.8 && !viewer.needs_render")
+    assert inner.evaluate(tall) == pytest.approx(before)

@@ -50,6 +50,8 @@ def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Play
     page.evaluate("viewer.gui_controllers['all as at first'].fire()")
     until(lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0, lambda: page.wait_for_timeout(20))
     assert field.session.settings.friction == (0.7, 0.7) and field.session.note == ""
+    said = page.evaluate("[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)")
+    assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["perfect", "perfect"]
     page.wait_for_function("viewer.gui_controllers['friction believed'].getValue() == 0.7")
 
 
@@ -109,6 +111,37 @@ def test_a_challenge_is_chosen_and_left_while_it_runs(field: Playground) -> None
         before = field.session.sim.time
         until(lambda start=before: field.run.status == "running" and field.session.sim.time != start)
     assert field.run.error is None
+
+
+def test_a_challenge_that_asks_for_it_begins_paused_and_goes_on_by_run(field: Playground) -> None:
+    number, card = next((i, card) for i, card in enumerate(CARDS) if card.paused)
+    assert card.title == "Down an icy slope" and "Press run" in card.text and number == 2
+    field.choose(card)
+    until(lambda: field.run.status == "paused" and field.session.settings.slope == card.start.slope)
+    assert field.session.sim.time < 0.1
+    field.run.start()
+    until(lambda: field.session.sim.time > 0.2)
+
+
+def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(page, field: Playground) -> None:
+    first = (field.force, field.towards)
+    controls = ("speed", "push [N]", "show forces", "show gravity")
+
+    def shown() -> list:
+        scene = field.view.window.scene
+        said = [[scene.command(("/", kind, name)) for kind in ("move_control", "set_control")] for name in controls]
+        return [(moved or made)["value"] for moved, made in said]
+
+    before = shown()
+    opened(page, field)
+    for name, value in (("speed", 0.1), ("push [N]", 200.0), ("show forces", "false"), ("show gravity", "true")):
+        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
+    until(lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old], lambda: page.wait_for_timeout(20))
+    until(lambda: "term gravity/m g" in field.view.canvas.picture, lambda: page.wait_for_timeout(20))
+    page.evaluate("viewer.gui_controllers['all as at first'].fire()")
+    until(lambda: shown() == before and (field.force, field.towards) == first, lambda: page.wait_for_timeout(20))
+    until(lambda: "measured/FL_foot" in field.view.canvas.picture, lambda: page.wait_for_timeout(20))
+    assert "term gravity/m g" not in field.view.canvas.picture
 
 
 def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(field: Playground) -> None:

@@ -350,6 +350,36 @@ def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contact
     assert legend(viewer) == []
 
 
+def test_the_legend_explains_items_of_ones_own_while_they_are_shown(viewer: Viewer, standing: State) -> None:
+    viewer.explain("wish", MEASURED, "force wished for")
+    viewer.show(standing, com=False, extra={"wish": shapes.arrow([0, 0, 1], [0, 0, 1], MEASURED)})
+    assert legend(viewer) == ["force wished for"]
+    viewer.show(standing, com=False)
+    assert legend(viewer) == []
+
+
+def test_forces_that_are_not_drawn_still_colour_their_cones(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    def cones() -> dict:
+        return {path: item.colour for path, item in viewer.canvas.picture.items() if path.startswith("cone/")}
+
+    viewer.show(standing, contacts, forces)
+    seen = cones()
+    viewer.show(standing, contacts, forces, arrows=False)
+    assert cones() == seen and len(set(seen.values())) > 1
+    assert not [path for path in viewer.canvas.picture if path.startswith(("measured", "planned"))]
+
+
+def test_a_flat_foot_has_one_name_and_a_number_at_each_corner() -> None:
+    talos = load("talos")
+    view = Viewer(talos)
+    view.show(talos.standing(), Contacts.feet(talos), labels=True)
+    words = [item.shape.name for path, item in view.canvas.picture.items() if path.startswith("label/")]
+    view.close()
+    assert sorted(words) == sorted(["left_sole_link", "right_sole_link", *2 * "0123"])
+
+
 @pytest.mark.parametrize("background", ["light", "dark"])
 def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing: State, background: str) -> None:
     view = Viewer(go2, background=background)

@@ -71,6 +71,16 @@ def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
     assert np.linalg.det(item.matrix[:3, :3]) > 0
 
 
+def test_a_curled_arrow_has_heads_all_round_so_that_its_sense_is_seen_from_anywhere() -> None:
+    data = marks.curled_arrow([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]).shape.lowered["geometries"][0]["data"]["attributes"]["position"]
+    points = np.frombuffer(data["array"].data, "<i2").reshape(-1, 3).astype(float)
+    points *= 1.0 / np.median(np.linalg.norm(points[:, :2], axis=1))
+    beside = np.abs(np.linalg.norm(points[:, :2], axis=1) - 1.0) > 0.1  # what is wider than the ring
+    angles = np.unique(np.round(np.arctan2(points[beside, 1], points[beside, 0]), 1)) % (2.0 * np.pi)
+    gaps = np.diff(np.sort(angles), append=np.sort(angles)[0] + 2.0 * np.pi)
+    assert np.sum(gaps > 1.0) == 3 and gaps.max() < np.radians(200.0)
+
+
 NAN = float("nan")
 
 

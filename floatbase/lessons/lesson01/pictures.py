@@ -32,7 +32,7 @@ def show_arm(view: Viewer, state: fb.State) -> Viewer:
         "tool": tool + [-0.03, 0.0, -0.1],
         "wall": [tool[0], 0.0, 0.95],
     }
-    extra |= {f"label/{name}": shapes.label(at, name, 0.05, plate=False) for name, at in names.items()}
+    extra |= {f"label/{name}": shapes.label(at, name, 0.05) for name, at in names.items()}
     view.show(state, com=False, extra=extra)
     return view.camera(PRESSING_VIEW)
 
@@ -47,6 +47,8 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
     tool = state.point("tool0")
     scene = _wall(tool) | below("bolts", props.bolts(np.zeros(3), 0.11))
 
+    view.explain("f", MEASURED, "forces on the arm, and the moment of the bolts")
+
     def draw(press: float) -> str:
         force = np.array([-press, 0.0, 0.0])
         bolts, moment = -force, -np.cross(tool, force)
@@ -58,9 +60,9 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
             extra["f/wall"] = shapes.arrow(tool, view.scale * force, MEASURED, view.painter.size)
             extra["f/bolts"] = shapes.arrow(start, view.scale * bolts, MEASURED, view.painter.size)
             extra["f/moment"] = marks.curled_arrow([0.0, 0.16, 0.1], 0.003 * moment, MEASURED)
-            extra["label/wall"] = shapes.label(tip + [0.0, 0.0, -0.08], "f{r}", 0.06, plate=False)
-            extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06, plate=False)
-            extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06, plate=False)
+            extra["label/wall"] = shapes.label(tip + [0.0, 0.0, -0.08], "f{r}", 0.06)
+            extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06)
+            extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06)
         view.show(state, com=False, extra=extra)
         tau, limits = abs(state.h - state.frame_jacobian("tool0")[:3].T @ force), state.robot.torque_limits
         busiest = int(np.argmax(tau / limits))
@@ -76,6 +78,7 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
 def play_pressing(view: Viewer, record: Rollout) -> Viewer:
     """The arm on its plate in front of the wall, as the record has it, with the wall's force on the tool."""
     scene = _wall(record.state(0).point("tool0"))
+    view.explain("f", MEASURED, "force of the wall")
 
     def picture(state: fb.State, i: int) -> Picture:
         drawn = _free_arm(view, state) | scene | {"plate": _plate(state)}
@@ -84,7 +87,7 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
                 vector = view.scale * push.force
                 tool = state.point(push.frame)
                 drawn["f/wall"] = shapes.arrow(tool, vector, MEASURED, view.painter.size)
-                drawn["label/wall"] = shapes.label(tool + vector + [0.0, 0.0, 0.07], "f{r}", 0.06, plate=False)
+                drawn["label/wall"] = shapes.label(tool + vector + [0.0, 0.0, 0.07], "f{r}", 0.06)
         return drawn
 
     return _play(view, record, picture, View(100.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
@@ -163,9 +166,10 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
                 vector = view.scale * force
                 start = foot - vector if force[2] > 0 else foot  # below the foot either way, where no leg hides it
                 drawn[f"thrust/{name}"] = shapes.arrow(start, vector, MEASURED, 2 * view.painter.size)
-        view.draw(drawn, title="blue arrows: thrusters")
+        view.draw(drawn)
         return f"f<sub>c</sub> = {vector_text(rate[:3])} N, τ<sub>c</sub> = {vector_text(rate[3:])} N·m"
 
+    view.explain("thrust", MEASURED, "force of a thruster")
     each = (-40.0, 30.0, 40.0, "N")
     panel = slider_panel(view, draw, left_feet=each, right_feet=each, twist=(-40.0, 0.0, 40.0, "N"))
     view.camera(View(50.0, 14.0, 1.0, around=((0.0, 0.0, 0.38), 0.6)))

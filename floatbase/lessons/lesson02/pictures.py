@@ -18,7 +18,7 @@ from floatbase.lessons.lesson02.helpers import DISC_RADIUS, park, wheel
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, MEASURED, PLANNED, Picture, View, Viewer, geometry, hexadecimal, marks, props, shapes
+from floatbase.viewer import COM, GREYS, MEASURED, PLANNED, Picture, View, Viewer, geometry, hexadecimal, marks, props, shapes
 
 MOMENT = 0.01  # m drawn for a newton metre
 
@@ -64,9 +64,9 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         extra = {f"base{path}": item for path, item in drawn.items()} if np.linalg.norm(force) > 1e-6 else {}
         if extra:
             above = base.translation + np.maximum(scale * f, [-np.inf, -np.inf, 0.1]) + [0.0, 0.0, 0.04]  # and above the trunk
-            extra["label/base"] = shapes.label(above, "on the base", 0.028, plate=False)
+            extra["label/base"] = shapes.label(above, "on the base", 0.028)
             ahead = state.point(foot) + [0.14, 0.0, -0.06]  # neither leg nor arrow comes here
-            extra["label/foot"] = shapes.label(ahead, "on the foot", 0.028, plate=False)
+            extra["label/foot"] = shapes.label(ahead, "on the foot", 0.028)
         picture = view.painter.picture(state, contacts, planned=forces, com=False, cones=False, extra=extra)
         view.draw({path.replace("planned/", "force/"): item for path, item in picture.items()})
         torques = ", ".join(f"{x + 0.0:.1f}" for x in np.round(generalised[6:][leg], 1))
@@ -76,6 +76,8 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
             f"joints of this leg {torques} N·m; all other joints {np.abs(rest).max():.0f}"
         )
 
+    view.explain("force", PLANNED, "force on the foot")
+    view.explain("base", COM, "force and moment on the base")
     panel = slider_panel(view, draw, forwards=(-40.0, 0.0, 40.0, "N"), up=(0.0, 60.0, 80.0, "N"))
     view.camera(View(76.0, 14.0, 1.0, around=((0.0, 0.0, 0.31), 0.47)))
     return panel
@@ -115,8 +117,9 @@ def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
     """
     home, colour = forgotten.state(0).point("tool0"), view.painter.text
     pin = {"home/pin": shapes.rod(home, np.eye(3), 0.24, 0.005, colour)}
-    pin["home/name"] = shapes.label(home + [0.0, 0.0, 0.27], "home", 0.035, colour, plate=False)
+    pin["home/name"] = shapes.label(home + [0.0, 0.0, 0.27], "home", 0.035, colour)
     rows = np.linspace(0, len(kept) - 1, 30).astype(int)
+    view.explain("way", GREYS[2], "from home to the tool")
     pictures = []
     for i in rows:
         drawn = view.painter.picture(forgotten.state(i), com=False, ghost=kept.state(i)) | pin
@@ -152,6 +155,7 @@ def play_collapse(
         return drawn
 
     rows = np.linspace(0, len(kept) - 1, 30).astype(int)
+    view.explain("way", view.painter.text, "from where a foot belongs to where it is")
     pictures = [picture(forgotten[i], kept[i]) for i in rows]
     view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(72.0, 10.0, 1.0, around=((0.0, 0.0, 0.16), 0.36)))
@@ -178,7 +182,7 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
             ends = {"start and end": corners[0]}
         for name, at in ends.items():
             picture[f"mark/{name}"] = shapes.contact_patch(at + [0.0, 0.0, 0.002], [0.0, 0.0, 1.0], 0.035)
-            picture[f"name/{name}"] = shapes.label(at + [-0.12, -0.13, 0.0], name, 0.05, plate=False)
+            picture[f"name/{name}"] = shapes.label(at + [-0.12, -0.13, 0.0], name, 0.05)
         view.draw(picture)
         gone = states[-1].q[:2] - states[0].q[:2]
         slip = max(float(np.abs(wheel().slip(state)).max()) for state in states)

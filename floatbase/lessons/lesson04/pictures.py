@@ -27,6 +27,7 @@ def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, lengt
     state = eom.state
     a = state.com_jacobian @ fb.accelerations_from_torques(eom)(tau) + state.com_drift
     arrow = {}
+    view.explain("acceleration", COM, "its acceleration")
     if np.linalg.norm(a) > 1e-6:
         arrow["acceleration"] = shapes.arrow(state.com, length * a, COM, view.painter.size)
     view.show(state, contacts=eom.contacts, planned=fb.forces_from_torques(eom)(tau), extra=arrow)

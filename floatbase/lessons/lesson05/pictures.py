@@ -33,6 +33,7 @@ def show_forces(
     above = np.array([state.com[0], state.com[1], view.painter.box[1][2] + 0.12 * size])
     drawn = below("wrench", marks.wrench(above, scale * wrench[:3], scale / size * wrench[3:], size))
     if wish is not None and np.linalg.norm(wish) > LEAST_FORCE:
+        view.explain("wish", GREYS[1], "force wished for")
         higher = above + [0.0, 0.0, 0.1 * size]
         drawn["wish"] = shapes.arrow(higher, scale * np.asarray(wish, dtype=float), GREYS[1], size)
     view.show(state, contacts=contacts, planned=forces, extra=drawn)
