@@ -125,6 +125,7 @@ EXAMPLES: dict[str, Any] = {
     "PostureTask.acceleration": ZERO, "moving_frame.acceleration": lambda t: UP,
     "actuators": HYDRAULIC, "after_reset": lambda: None, "alpha": 0.1, "angle": 30.0, "angular_acceleration": UP,
     "angular_momentum_rate": UP, "angular_velocity": UP, "around": ((0.0, 0.0, 0.3), 0.5), "axis": NORMAL,
+    "arrows": True, "at_most": "all", "colour": (0.0, 0.5, 1.0), "meaning": "a force",
     "axes": "world", "plots.plot_com.axis": AXES, "plots.plot_forces.axis": AXES, "plots.plot_friction.axis": AXES,
     "plots.plot_torques.axis": AXES, "plots.plot_gait.axis": AXES, "plots.plot_normal_forces.axes": [AXES] * 4,
     "plot_roses.axis": POLAR, "rolling": True, "azimuth": 10.0, "b": ZERO, "background": "dark", "bandwidth": 10.0,

@@ -94,7 +94,7 @@ def test_no_page_loads_anything_from_elsewhere_or_is_large(built: Path) -> None:
 
 
 def test_pages_say_what_they_are_and_figures_what_they_show(built: Path) -> None:
-    made = {"_modules", "genindex.html", "py-modindex.html", "search.html"}
+    made = {"genindex.html", "py-modindex.html", "search.html"}
     texts = [path for path in pages(built) if not made & set(path.parts)]
     assert len(texts) > 25
     assert [path.name for path in texts if not page_at(path).described] == []
@@ -125,9 +125,8 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built: Path, browser: Any
     page.on("console", lambda line: said.append(line.text) if line.type == "error" else None)
     page.on("pageerror", lambda error: said.append(str(error)))
     for path in pages(built):
-        if "_modules" not in path.parts or path.name == "contacts.html":  # code, page by page alike
-            page.goto(path.as_uri())
-            wide += [path.name] if page.evaluate("document.documentElement.scrollWidth") > 390 else []
+        page.goto(path.as_uri())
+        wide += [path.name] if page.evaluate("document.documentElement.scrollWidth") > 390 else []
     page.close()
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert (said, wide) == ([], [])

@@ -48,7 +48,7 @@ class Controls:
         """
         low, high = number("low", low), number("high", high, least=number("low", low))
         value, step = number("value", value, "", low, high), positive("step", step)
-        place = _place(name, section, column) | ({"at_most": text("at_most", at_most)} if at_most else {})
+        place = _place(name, section, column) | ({"at_most": word} if (word := text("at_most", at_most)) else {})
         changed = function("changed", changed, "changed(value)")
         self._control(name, changed, value=value, min=low, max=high, step=step, **place)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, flag, of_kind, positive, said, text, unit_vector, whole
+from floatbase._arrays import Array, checked, flag, of_kind, positive, said, text, unit_vector, whole
 from floatbase.behaviours import Step, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
@@ -165,9 +165,10 @@ class Viewer(Controls):
     def explain(self, kind: str, colour: RGB, meaning: str) -> None:
         """Let the legend explain items of one's own, from the next picture on that has any.
 
-        kind: first part of their paths. colour: RGB. meaning: what the legend says.
+        kind: first part of their paths. colour: RGB, from 0 to 1. meaning: what the legend says.
         """
-        self._own[text("kind", kind)] = colour, text("meaning", meaning)
+        red, green, blue = np.clip(checked("colour", colour, (3,)), 0.0, 1.0).tolist()
+        self._own[text("kind", kind)] = (red, green, blue), text("meaning", meaning)
 
     def prices(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
         """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle, of a normal force on top.

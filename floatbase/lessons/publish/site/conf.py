@@ -13,7 +13,7 @@ author = "The floatbase authors"
 copyright = "the floatbase authors, BSD 3-Clause licence"
 version = release = floatbase.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx_design"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_design"]
 root_doc = "index"
 exclude_patterns = [".doctrees"]
 add_module_names = False
@@ -31,6 +31,7 @@ myst_enable_extensions = ["colon_fence", "dollarmath", "amsmath"]
 myst_heading_anchors = 4
 suppress_warnings = ["myst.header"]  # a lesson may begin a part with a small heading
 
+html_context = {"default_mode": "auto"}
 html_theme = "sphinx_book_theme"
 html_title = "floatbase"
 html_math_renderer = "mathml"
