@@ -1,9 +1,10 @@
-# The course in JupyterLab, for one reader or as the image of a hub, from the exact versions in environment.txt:
+# The course in JupyterLab, for one reader, from the exact versions in environment.txt:
 #
 #     docker build -t floatbase .
 #     docker run --rm -p 127.0.0.1:8888:8888 -v floatbase:/home/learner/floatbase floatbase
 #
-# It prints an address to open. What a reader writes is in the volume.
+# It prints an address to open. What a reader writes is in the volume. A hub that starts containers needs another command:
+# ["sh", "-c", "python -m floatbase.lessons.publish workspace --to floatbase; exec jupyterhub-singleuser"]
 FROM python:3.12-slim
 
 # Code is compiled here for any processor of this kind, so that the first start is as quick as the next.

@@ -12,7 +12,9 @@ Then, at every start:
     .venv/bin/jupyterhub --config .binder/jupyterhub_config.py
 
 The hub's own address is the only one that a browser needs: pictures travel with everything else that Jupyter says. Put https in
-front before students type passwords: `c.JupyterHub.ssl_key` and `ssl_cert`, or a web server.
+front before students type passwords: `c.JupyterHub.ssl_key` and `ssl_cert`, or a web server. Where students may want to harm
+each other, give each server a host name of its own, too, by `c.JupyterHub.subdomain_host`: else a page that one of them makes
+and another opens may do what that other may.
 """
 
 import sys
@@ -20,13 +22,15 @@ import sys
 c = get_config()  # noqa: F821  JupyterHub defines it
 
 c.JupyterHub.bind_url = "http://:8000"
-c.Authenticator.allow_all = (
-    True  # whoever has an account of this machine; or name them: c.Authenticator.allowed_users = {"ada"}
-)
+# whoever has an account of this machine but root; or name them: c.Authenticator.allowed_users = {"ada"}
+c.Authenticator.allow_all = True
+c.Authenticator.blocked_users = {"root"}
 
-# What a student's server does first, as that student: make a folder that no other account can read, for the ways between its
-# processes, and bring the lessons in ~/floatbase up to date, which overwrites no writing.
-START = f"""export JUPYTER_RUNTIME_DIR=$(mktemp -d -t jupyter-XXXXXXXX)
+# What a student's server does first, as that student: keep from other accounts what it writes, make a folder that none of them
+# can read, for the ways between its processes, and bring the lessons in ~/floatbase up to date, which overwrites no writing.
+START = f"""umask 077
+JUPYTER_RUNTIME_DIR=$(mktemp -d -t jupyter-XXXXXXXX) || exit 1
+export JUPYTER_RUNTIME_DIR
 {sys.executable} -m floatbase.lessons.publish workspace --to "$HOME/floatbase"
 exec {sys.executable} -m jupyterhub.singleuser "$@\""""
 c.Spawner.cmd = ["sh", "-c", START, "floatbase"]

@@ -84,5 +84,7 @@ def test_a_release_is_checked_before_it_is_published() -> None:
     for script in re.findall(r"python (\.ci/\S+)", text):
         assert (ROOT / script).exists(), script
     release = text[text.index("  pypi:") : text.index("  site:")]
-    assert "needs: package" in release and "github.ref_type == 'tag'" in release and "id-token: write" in release
+    assert "needs: [package, tests]" in release and "uses: ./.github/workflows/test.yml" in text
+    assert "workflow_call:" in (ROOT / ".github" / "workflows" / "test.yml").read_text(encoding="utf-8")
+    assert "github.ref_type == 'tag'" in release and "id-token: write" in release
     assert "password" not in text and "secrets." not in text

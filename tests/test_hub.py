@@ -211,6 +211,8 @@ def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student])
     assert bob.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
     assert not ada.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
 
+    assert (hub.folder / bob.name / "floatbase").stat().st_mode & 0o077 == 0  # no other account of the machine reads it
+
     assert hub.ports(bob.name)
     for port in hub.ports(bob.name):  # past the hub, at the server itself
         address = f"http://127.0.0.1:{port}/user/{bob.name}/api/kernels"

@@ -39,6 +39,10 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         path.write_text(json.dumps(written, indent=1), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}. Name a folder: hand_in(…, folder=…).") from None
-    right = sum(entry["right"] > 0 for entry in tried.values())
-    print(f"{path}: {right} of {len(all_exercises())} exercises solved, {len(predicted)} predictions. Give this file away.")
+    known = all_exercises()  # an older course may have had others
+    solved = [key for key, entry in tried.items() if entry["right"] and key in known]
+    done = f"{len(solved)} of {len(known)} exercises solved, {len(predicted)} predictions"
+    print(f"{path}: {done}. Give this file to your teacher.")
+    if lost := [key for key in solved if key not in answers]:
+        print(f"An older floatbase did not keep your answers to {', '.join(lost)}: check them once more, then hand in again.")
     return path

@@ -136,9 +136,8 @@ class AlteredSimulation(Simulation):
 
     def _pull_feet(self, applied: Array) -> None:
         """Add the pull of the magnets on each ball that touches the ground."""
-        mujoco.mj_fwdPosition(
-            self.model, self.data
-        )  # contacts where the feet are now: the step before found them where it began
+        # contacts where the feet are now: the step before found them where it began
+        mujoco.mj_fwdPosition(self.model, self.data)
         balls = set(self._balls.tolist())
         for plane, ball in self.data.contact.geom.tolist():
             if ball in balls:

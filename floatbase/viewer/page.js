@@ -342,7 +342,8 @@ function follow(rest) {
 
 // The page in a notebook: it says that it is ready, receives {code} and a port, and follows the window by the port.
 function waitForPort() {
-  window.onmessage = ({data, ports: [port]}) => {
+  window.onmessage = ({data, ports: [port], source}) => {
+    if (source !== parent || !port) return;
     window.onmessage = null;  // the viewer takes it
     load(data.code);
     let hear = () => {};
@@ -391,7 +392,8 @@ function draw(scene) {
 // change in the picture, see `change`.
 function waitForScenes() {
   let near = null, waiting = [];
-  window.onmessage = ({data}) => {
+  window.onmessage = ({data, origin}) => {
+    if (location.protocol != "file:" && origin !== self.origin) return;  // somebody else's page has this one in a frame
     if ("seen" in data) near(data.seen);
     else if (waiting) waiting.push(data);
     else change(data);

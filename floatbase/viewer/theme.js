@@ -18,6 +18,7 @@ function watchAround(look) {
   if (!around) return;
   const again = new MutationObserver(() => { look(); setTimeout(look, RETRY); });
   for (const node of [around.documentElement, around.body]) again.observe(node, {attributes: true});
+  window.addEventListener("pagehide", () => again.disconnect());  // else the page around holds all of a frame that it removes
 }
 
 // legend: is shown anew when the theme changes.
@@ -72,7 +73,7 @@ function startTheme(viewer, legend) {
     legend.again();
     viewer.set_dirty();
   }
-  watchAround(look);
+  watchAround(() => { if ((asked == "dark" || darkAround()) != dark) look(); });
   return {
     ask: ({name}) => { asked = name; look(); },
     colour: (code) => dark ? `#${shade(number(code)).toString(16).padStart(6, "0")}` : code,

@@ -72,6 +72,19 @@ def test_a_file_is_judged_again_and_its_claims_do_not_count(learner: Path, capsy
     assert {mark.result for mark in grades.judged(path).marks if mark.exercise in ("00.1", "01.1")} == {"wrong"}
 
 
+def test_who_solved_an_exercise_before_answers_were_kept_is_asked_to_check_it_again(
+    learner: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    progress.keep("00.1", {"tries": 1, "right": 1})
+    progress.keep("99.1", {"tries": 1, "right": 1})  # of another course
+    hand_in("Ada")
+    said = capsys.readouterr().out
+    assert "1 of" in said and "your answers to 00.1: check them once more" in said
+    check("00.1", LIFTED)
+    hand_in("Ada")
+    assert "once more" not in capsys.readouterr().out
+
+
 def test_code_is_kept_to_be_read_and_never_run(learner: Path) -> None:
     ran = []
 
@@ -83,7 +96,8 @@ def test_code_is_kept_to_be_read_and_never_run(learner: Path) -> None:
     path = hand_in("Ada")
     out = grades.code_to_read([grades.judged(path)])
     assert len(ran) == before > 0
-    assert "def row_to_drop" in out and "--- Ada, C.3" in out
+    assert "    def row_to_drop" in out and "--- Ada, C.3" in out
+    assert [line for line in out.splitlines() if not line.startswith("    ") and line.strip()] == ["--- Ada, C.3"]
 
 
 HOSTILE = (

@@ -271,9 +271,11 @@ class _Quiet(SimpleHTTPRequestHandler):
 def served(folder: Path) -> Iterator[str]:
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(folder)))
     Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    server.server_close()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        server.server_close()
 
 
 @pytest.fixture(scope="module")
@@ -394,6 +396,30 @@ def test_a_recording_waits_where_motion_is_unwanted_plays_on_request_and_rests_o
     panel.wait_for_function("!viewer.resting()", timeout=20_000)
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=str(SCREENSHOTS / "site_picture.png"))
+
+
+FRAMED = """(address) => new Promise((done) => {
+  window.onmessage = ({source}) => {
+    source.postMessage({seen: true}, "*");
+    done();
+  };
+  document.body.append(Object.assign(document.createElement("iframe"), {src: address}));
+})"""
+
+
+@needs_chromium
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])  # the site's own, and another origin on the same machine
+def test_the_viewer_obeys_pages_of_its_own_site_only(site: Path, browser: Any, host: str) -> None:
+    page = browser.new_page()
+    with served(site) as address:
+        page.goto(f"{address}/_static/pictures.css".replace("127.0.0.1", host))
+        page.evaluate(FRAMED, f"{address}/_static/pictures/viewer.html")
+        frame = page.frames[-1]
+        frame.evaluate("() => { window.heard = new Promise((done) => window.addEventListener('message', done)); }")
+        page.evaluate("window[0].postMessage({seen: true}, '*')")
+        frame.evaluate("window.heard.then(() => 0)")
+        assert frame.evaluate("window.viewer !== undefined") == (host == "127.0.0.1")
+    page.close()
 
 
 @needs_chromium

@@ -38,7 +38,7 @@ SECTIONS = (
     Section(
         "§1", "What a floating base is",
         "A robot that is bolted down can push as it likes: the bolts answer for it. Figure 1 sets such an arm beside "
-        "a quadruped, whose base moves freely and is moved by the ground's forces alone.",
+        "a quadruped, whose base is held by nothing: from outside only its weight and the forces of the ground act on it.",
     ),
     Section(
         "§2", "The space of dynamic variables",
@@ -51,8 +51,8 @@ SECTIONS = (
     ),
     Section(
         "§2.2", "How q̈, τ and λ hang together",
-        "The equations of motion are linear in all three, so whatever they leave free is a flat space with as many "
-        "directions as there are motors.",
+        "The equations of motion are linear in all three, so whatever they leave free is a flat space. Where the contacts "
+        "are independent it has as many directions as there are motors.",
     ),
     Section(
         "§3", "Costs, moved between spaces",
@@ -168,9 +168,8 @@ FORMULAS = (
         "(13)", "§2.2", "all motions that are possible",
         r"\begin{bmatrix} \ddot q \\ \tau \\ \lambda \end{bmatrix} = "
         r"\underbrace{B^{\dagger} \begin{bmatrix} -h \\ b \end{bmatrix}}_{v} + V_\perp \beta",
-        r"All solutions of (12): one point v, and d directions, the columns of $V_\perp$, one for each motor. β are "
-        r"the coordinates of a "
-        "motion in this space.",
+        r"All solutions of (12): the smallest one, v, and directions, the columns of $V_\perp$, which span the null space of "
+        "B. Where the contacts are independent there are d, as many as motors. β are the coordinates of a motion here.",
     ),
     Formula(
         "(14)", "§3", "accelerations from torques, η",
@@ -199,28 +198,28 @@ FORMULAS = (
         "(18)", "§3", "a cost on all three, seen from β",
         r"\widetilde Q(\beta) = Q\left(v^{\ddot q} + V_\perp^{\ddot q}\beta,\ v^{\tau} + V_\perp^{\tau}\beta,\ "
         r"v^{\lambda} + V_\perp^{\lambda}\beta\right)",
-        "A cost on accelerations, torques and forces together is a cost on the d numbers β, and there nothing is left to obey.",
+        "A cost on accelerations, torques and forces together is a cost on the numbers β, and there nothing is left to obey.",
     ),
     Formula(
         "(19)", "§3", "a cost on β, seen from one of them",
         r"Q^{\ddot q}(\ddot q) = \widetilde Q\left(\left(V_\perp^{\ddot q}\right)^{\dagger}\left(\ddot q - v^{\ddot "
         r"q}\right)\right)",
-        "The way back: the cost that a cost on β is for accelerations alone, by the smallest β that leads to them. "
-        "Likewise for τ and λ.",
+        "The way back: the cost that a cost on β is for accelerations alone, by the smallest of the β that come closest to "
+        "them. Likewise for τ and λ.",
     ),
     Formula(
         "(20)", "§3.1", "net force, G_f",
         r"f_c = \sum_i f_i = \underbrace{\begin{bmatrix} I & I & I & I \end{bmatrix}}_{G_f} \lambda",
-        "The net force on the centre of mass is the sum of the forces at the feet, four of them here.",
+        "The net force of the ground is the sum of the forces at the feet, four of them here. The weight, which pulls at the "
+        "centre of mass, is not among them.",
     ),
     Formula(
         "(21)", "§3.1", "net moment, G_τ",
         r"\tau_c = \sum_i \left(x_i - x_c\right) \times f_i = "
         r"\underbrace{\begin{bmatrix} \mathcal{X}_1 & \mathcal{X}_2 & \mathcal{X}_3 & \mathcal{X}_4 "
         r"\end{bmatrix}}_{G_\tau} \lambda",
-        r"The net moment about the centre of mass $x_c$: each force $f_i$ times its lever. $\mathcal{X}_i$ is the "
-        r"matrix of this cross "
-        "product.",
+        r"Their net moment about the centre of mass $x_c$: the cross product of each lever with its force $f_i$. "
+        r"$\mathcal{X}_i$ is the matrix that does it.",
     ),
     Formula(
         "(22)", "§3.1", "desired wrench as a cost",
@@ -233,8 +232,8 @@ FORMULAS = (
         "(23)", "§3.1", "preference among contact forces",
         r"h_i(f_i) = \tfrac12 \left\| \left(I - n_i n_i^T\right) f_i \right\|^2 + \tfrac{\alpha}{2} \left\| n_i n_i^T "
         r"f_i - a \right\|^2",
-        r"Many forces make the same wrench. This cost chooses: little along the ground, and about a along the normal "
-        r"$n_i$. α weighs the two.",
+        r"Many forces make the same wrench. This cost chooses: little along the ground, and along the normal $n_i$ about the "
+        r"force a, a vector along $n_i$. α weighs the two.",
     ),
     Formula(
         "(24)", "§3.1", "torques and forces as two maps",
@@ -247,7 +246,7 @@ FORMULAS = (
         "(25)", "§3.1", "smallest torques for desired forces",
         r"\min_{\beta}\ \tfrac12 \left\| f^{\tau}(\beta) \right\|^2 \qquad \text{such that} \qquad \lambda = "
         r"f^{\lambda}(\beta)",
-        "Of all torques that make the ground push with the forces λ, the smallest. The answer is linear in λ.",
+        "Of all torques that make the ground push with the forces λ, the smallest. The answer is affine in λ.",
     ),
     Formula(
         "(26)", "§4.1", "control as a QP: objective",
@@ -259,7 +258,7 @@ FORMULAS = (
         r"\text{such that} \qquad M\,\ddot q + h = S\,\tau + J^T\lambda, \qquad J\,\ddot q = b, \qquad G\,x \le u",
         r"What it must obey: the equations of motion (7), and inequalities on $x = (\ddot q, \tau, \lambda)$, such as "
         r"friction cones and the "
-        "limits of motors and joints.",
+        "limits of motors and joints. Other linear equalities may stand with them.",
     ),
     Formula(
         "(28)", "§4.2", "friction cone",
@@ -271,9 +270,9 @@ FORMULAS = (
     Formula(
         "App. A", "App. A", "fictitious forces",
         r"h(q,\dot q) = \underbrace{C(q,\dot q)\,\dot q}_{\text{Coriolis, centrifugal}} + g(q)",
-        "What h holds: gravity g, and the forces that appear only because the coordinates turn with the robot. They "
-        "depend on velocities "
-        "and never on accelerations. The appendix has no formula; this is the one of the lesson.",
+        "What h holds without friction: gravity g, and the forces that appear only because coordinates turn with the robot. "
+        "Those depend on q and q̇, and never on accelerations. h stands on the left of (1): what acts on the robot is −C q̇ and "
+        "−g. The appendix has no formula; this is the one of the lesson.",
     ),
     Formula(
         "App. B", "App. B", "torque is an abstraction",
@@ -301,7 +300,7 @@ NOTES = {
     7: "λ are Lagrange multipliers: forces on the robot, and minus what the robot does to the ground.",
     8: "The singular value decomposition is not the fastest way to these spaces, but a robust and clear one.",
     9: "A point foot gives a force and no moment; feet with area, as a humanoid's, give both.",
-    10: "Inner forces cancel: the sum of outer forces and their moments is all that moves the whole.",
+    10: "Internal forces cancel: the sum of the external forces and the sum of their moments are all that moves the whole.",
     11: "A normal has length one and points out of the ground.",
     12: "Solvers begin with the answer of the tick before, a warm start.",
     13: "One may work on the equations first, to be quicker; a fast solver does without.",

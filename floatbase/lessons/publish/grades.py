@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,10 @@ from floatbase.lessons.handing_in import FORM
 
 _LARGEST_FILE = 20_000_000  # bytes; all answers of the course take less than 0.1 MB
 _PARTS = {"name": str, "exercises": dict, "predictions": dict}
+_INDENT = "    "  # of code, so that no line of it passes for a heading
 _NEVER, _READ = "·", "to be read"
 _COLUMNS = ("name", "time", "exercise", "result", "tries", "told")
-_FORMULA = ("=", "+", "-", "@")  # a spreadsheet runs a text that begins so
+_FORMULA = tuple("=+-@\t\r\n＝＋－＠")  # a spreadsheet may run a text that begins so
 
 
 @dataclass(frozen=True)
@@ -137,9 +139,9 @@ def overview(everyone: Sequence[HandedIn]) -> str:
 
 
 def code_to_read(everyone: Sequence[HandedIn]) -> str:
-    """All code that was handed in: what a check cannot judge without running it."""
+    """All code that was handed in, indented: what a check cannot judge without running it."""
     found = [(one.name, mark) for one in everyone for mark in one.marks if mark.result == "to be read"]
-    return "\n".join(f"--- {name}, {mark.exercise}\n{_visible(mark.told)}" for name, mark in found)
+    return "\n".join(f"--- {name}, {mark.exercise}\n{indent(_visible(mark.told), _INDENT)}" for name, mark in found)
 
 
 def _visible(code: str) -> str:
