@@ -77,6 +77,7 @@ def test_the_hubs_configuration_says_what_python_understands() -> None:
     set_ = {ast.unparse(node.targets[0]) for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Assign)}
     assert {"c.Spawner.cmd", "c.Spawner.default_url", "c.Spawner.args"} <= set_
     assert "--KernelManager.transport=ipc" in text
+    assert re.search(r'^c\.Authenticator\.blocked_users = \{"root"\}$', text, flags=re.MULTILINE)
 
 
 def test_a_release_is_checked_before_it_is_published() -> None:
