@@ -57,7 +57,8 @@ class _Display:
         self._widget, self._number = weakref.ref(widget), number
         self._server = weakref.ref(server)
         self._pages: dict[str, _Way] = {}
-        server.on_stop.append(self._stop)
+        server.on_stop[:] = [told for told in server.on_stop if told() is not None]
+        server.on_stop.append(weakref.WeakMethod(self._stop))
 
     def hear(self, _: Any, content: Any, buffers: Any) -> None:
         """A message of a page, {page, say}; what no page of ours sends is ignored."""

@@ -6,6 +6,7 @@ import asyncio
 import math
 import socket
 import threading
+import weakref
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
@@ -39,7 +40,8 @@ class Server:
         self.cells = Cells(self.displays.begin_cell)
         self.clients: list[Connection] = []
         self.on_control: Callable[[str, Any], None] | None = None
-        self.on_stop: list[Callable[[], None]] = []  # called when the window closes, in the server's thread
+        # called when the window closes, in the server's thread, as far as their owners still exist
+        self.on_stop: list[weakref.WeakMethod[Callable[[], None]]] = []
         self._http: tornado.httpserver.HTTPServer | None = None
         self._loop = asyncio.new_event_loop()
         # the newest change for which a wake-up was requested, and the newest that a wake-up has dealt with
@@ -107,8 +109,9 @@ class Server:
     async def _shut(self) -> None:
         if self._http is not None:
             self._http.stop()
-        for told in self.on_stop:
-            told()
+        for told in [told() for told in self.on_stop]:
+            if told is not None:
+                told()
         for client in list(self.clients):
             client.line.end("the window was closed")
         if self._http is not None:

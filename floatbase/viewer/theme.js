@@ -8,8 +8,9 @@ const RETRY = 400;  // ms after a change of the page around, whose style may com
 function darkAround() {
   const around = window.frameElement?.parentElement;
   if (!around) return matchMedia("(prefers-color-scheme: dark)").matches;
-  const [red, green, blue] = getComputedStyle(around).color.match(/[\d.]+/g).map(Number);
-  return 0.3 * red + 0.59 * green + 0.11 * blue > 128;
+  const colour = getComputedStyle(around).color, whole = colour.startsWith("color(") ? 1 : 255;  // color(srgb 1 1 1), rgb(255, 255, 255)
+  const [red, green, blue] = colour.match(/[\d.]+/g).map(Number);
+  return 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 * whole;
 }
 
 function watchAround(look) {
@@ -25,7 +26,9 @@ function watchAround(look) {
 function startTheme(viewer, legend) {
   let asked = "light", dark = false;
   const number = (colour) => parseInt(colour.slice(1), 16);
-  const shades = () => {
+  let table = null;  // of shades, for what was asked
+  const shades = () => table ??= made();
+  const made = () => {
     const [paper, , lines, text] = BACKGROUNDS[asked], [night, , dim, bright] = BACKGROUNDS.dark;
     return new Map([...Object.entries(NIGHT), [lines, dim], [text, bright], [paper, night]].map((pair) => pair.map(number)));
   };
@@ -75,7 +78,7 @@ function startTheme(viewer, legend) {
   }
   watchAround(() => { if ((asked == "dark" || darkAround()) != dark) look(); });
   return {
-    ask: ({name}) => { asked = name; look(); },
+    ask: ({name}) => { asked = name; table = null; look(); },
     colour: (code) => dark ? `#${shade(number(code)).toString(16).padStart(6, "0")}` : code,
     // what a command of meshcat's has changed; made: the object that it has made, if any
     after({type, path}, made) {
