@@ -1,0 +1,130 @@
+"""Look at a whole site in a browser: `python .ci/check_site.py build/site`.
+
+Every page is opened. No page may ask another host for anything, every 3-D scene must draw, and every control of every panel must
+change its picture or its note, all without a kernel. Prints for each page how long its first picture took and what was found.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from browsers import launched
+
+WAIT = 60_000  # ms for a picture on a machine that draws by software
+# what a scene shows: where everything is, in which colours and shapes, or that nothing is drawn yet
+SEEN = """() => {
+  if (typeof viewer === "undefined") return null;
+  const found = [];
+  viewer.scene_tree.find(["meshcat"]).object.traverse((one) => {
+    one.updateMatrix();
+    const {geometry, material} = one;
+    found.push(one.name, one.visible, one.matrix.elements.map((x) => x.toFixed(4)).join(), material?.color?.getHex(),
+               geometry?.attributes?.position?.count, geometry?.attributes?.position?.array?.slice(0, 30).join());
+  });
+  return viewer.animator.duration > 0 ? `plays ${viewer.animator.duration}` + found.length : found.join("|");
+}"""
+# moves a control to its nth place; false where it has none
+MOVE = """(one, n) => {
+  const range = one.type === "range", last = range ? Number(one.max) : one.tagName === "SELECT" ? one.options.length - 1 : 1;
+  if (n > last) return false;
+  if (range) one.value = n; else if (one.tagName === "SELECT") one.selectedIndex = n; else one.checked = !one.checked;
+  one.dispatchEvent(new Event(range ? "input" : "change", {bubbles: true}));
+  return true;
+}"""
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_: Any) -> None:
+        pass
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    """The address of a server of this folder."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(folder)))
+    Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/"
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def faults_of(page: Any, address: str) -> Iterator[str]:
+    """What is wrong with a page, and a line on the error stream about what was found."""
+    began = time.perf_counter()
+    page.goto(address)
+    figures, first, moved = page.locator(".floatbase-picture"), 0.0, 0
+    for number in range(figures.count()):
+        figure = figures.nth(number)
+        figure.scroll_into_view_if_needed()
+        frames = [handle.content_frame() for handle in _frames(page, figure)]
+        for frame in frames:
+            frame.wait_for_function(f"({SEEN})()?.length > 20", timeout=WAIT)
+        first = first or time.perf_counter() - began
+        if yields := figure.locator(".floatbase-words", has_text="cannot be loaded").count():
+            yield f"picture {number}: {yields} files are missing"
+        controls = figure.locator(".floatbase-controls :is(input, select)")
+        for which in range(controls.count()):
+            moved += 1
+            if not _answers(page, figure, frames, controls.nth(which)):
+                yield f"picture {number}: control {which} changes nothing"
+    print(f"{address}: {figures.count()} pictures, {moved} controls, first picture after {first:.1f} s", file=sys.stderr)
+
+
+def _frames(page: Any, figure: Any) -> list[Any]:
+    """The frames of a figure's scenes, once there are all of them."""
+    scenes = figure.locator(".floatbase-scene > div").count()
+    for _ in range(scenes):
+        figure.locator("iframe").nth(scenes - 1).wait_for(state="attached", timeout=WAIT)
+    return figure.locator("iframe").element_handles()
+
+
+def _answers(page: Any, figure: Any, frames: list[Any], control: Any) -> bool:
+    """Whether some place of a control changes what is seen."""
+    control.scroll_into_view_if_needed()
+
+    def seen() -> list[Any]:
+        return [figure.locator(".floatbase-note").inner_html(), *(frame.evaluate(SEEN) for frame in frames)]
+
+    before, place = seen(), 0
+    while control.evaluate(MOVE, place):
+        for _ in range(20):
+            if seen() != before:
+                return True
+            page.wait_for_timeout(50)
+        place += 1
+    return False
+
+
+def main() -> int:
+    """The command; 1 when something is wrong."""
+    folder, wrong = Path(sys.argv[1]), 0
+    with served(folder) as address:
+        for browser in launched():
+            elsewhere: list[str] = []
+            page = browser.new_page(viewport={"width": 1280, "height": 900})
+            page.on("request", lambda request: request.url.startswith((address, "data:", "blob:")) or elsewhere.append(request.url))
+            for path in sorted(folder.rglob("*.html")):
+                if "_static" in path.parts:
+                    continue
+                for fault in [*faults_of(page, address + path.relative_to(folder).as_posix()), *elsewhere]:
+                    wrong += 1
+                    print(f"{path.relative_to(folder)}: {fault}")
+                elsewhere.clear()
+    print("nothing is wrong" if not wrong else f"{wrong} faults")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
