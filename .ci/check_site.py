@@ -1,7 +1,7 @@
 """Look at a whole site in a browser: `python .ci/check_site.py build/site`.
 
-Every page is opened. No page may ask another host for anything, every 3-D scene must draw, and every control of every panel must
-change its picture or its note, all without a kernel. Prints for each page how long its first picture took and what was found.
+Every page is opened. No page may ask another host for anything, every 3-D scene must draw, and every control of every panel
+must change its picture or its note, all without a kernel. Prints how long each page's first picture took and what was found.
 """
 
 from __future__ import annotations
@@ -41,6 +41,10 @@ MOVE = """(one, n) => {
   one.dispatchEvent(new Event(range ? "input" : "change", {bubbles: true}));
   return true;
 }"""
+END = """(one) => {
+  if (one.type === "range") one.value = one.max; else if (one.tagName === "SELECT") one.selectedIndex = one.options.length - 1;
+  one.dispatchEvent(new Event(one.type === "range" ? "input" : "change", {bubbles: true}));
+}"""
 
 
 class _Quiet(SimpleHTTPRequestHandler):
@@ -72,12 +76,12 @@ def faults_of(page: Any, address: str) -> Iterator[str]:
         for frame in frames:
             frame.wait_for_function(f"({SEEN})()?.length > 20", timeout=WAIT)
         first = first or time.perf_counter() - began
-        if yields := figure.locator(".floatbase-words", has_text="cannot be loaded").count():
-            yield f"picture {number}: {yields} files are missing"
+        if figure.get_by_text("cannot be loaded").count():
+            yield f"picture {number}: a file is missing"
         controls = figure.locator(".floatbase-controls :is(input, select)")
         for which in range(controls.count()):
             moved += 1
-            if not _answers(page, figure, frames, controls.nth(which)):
+            if not _answers(page, figure, frames, controls, which):
                 yield f"picture {number}: control {which} changes nothing"
     print(f"{address}: {figures.count()} pictures, {moved} controls, first picture after {first:.1f} s", file=sys.stderr)
 
@@ -90,8 +94,20 @@ def _frames(page: Any, figure: Any) -> list[Any]:
     return figure.locator("iframe").element_handles()
 
 
-def _answers(page: Any, figure: Any, frames: list[Any], control: Any) -> bool:
-    """Whether some place of a control changes what is seen."""
+def _answers(page: Any, figure: Any, frames: list[Any], controls: Any, which: int) -> bool:
+    """Whether some place of a control changes what is seen, with the others where they are or at their ends.
+
+    The direction of a push, for instance, changes nothing while the push is 0 N.
+    """
+    if _moves(page, figure, frames, controls.nth(which)):
+        return True
+    for other in range(controls.count()):
+        if other != which:
+            controls.nth(other).evaluate(END)
+    return _moves(page, figure, frames, controls.nth(which))
+
+
+def _moves(page: Any, figure: Any, frames: list[Any], control: Any) -> bool:
     control.scroll_into_view_if_needed()
 
     def seen() -> list[Any]:
@@ -110,19 +126,20 @@ def _answers(page: Any, figure: Any, frames: list[Any], control: Any) -> bool:
 def main() -> int:
     """The command; 1 when something is wrong."""
     folder, wrong = Path(sys.argv[1]), 0
-    with served(folder) as address:
-        for browser in launched():
-            elsewhere: list[str] = []
-            page = browser.new_page(viewport={"width": 1280, "height": 900})
-            page.on("request", lambda request: request.url.startswith((address, "data:", "blob:")) or elsewhere.append(request.url))
-            for path in sorted(folder.rglob("*.html")):
-                if "_static" in path.parts:
-                    continue
-                for fault in [*faults_of(page, address + path.relative_to(folder).as_posix()), *elsewhere]:
-                    wrong += 1
-                    print(f"{path.relative_to(folder)}: {fault}")
-                elsewhere.clear()
-    print("nothing is wrong" if not wrong else f"{wrong} faults")
+    pages = [path for path in sorted(folder.rglob("*.html")) if "_static" not in path.parts]
+    with served(folder) as address, contextmanager(launched)() as browser:
+        elsewhere: list[str] = []
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.on("request", lambda asked: elsewhere.append(asked.url))
+        for path in pages:
+            for fault in faults_of(page, address + path.relative_to(folder).as_posix()):
+                wrong += 1
+                print(f"{path.relative_to(folder)}: {fault}")
+        foreign = {url for url in elsewhere if not url.startswith((address, "data:", "blob:"))}
+    for url in foreign:
+        print(f"asked for: {url}")
+    wrong += len(foreign)
+    print(f"{len(pages)} pages: {f'{wrong} faults' if wrong else 'nothing is wrong'}")
     return 1 if wrong else 0
 
 

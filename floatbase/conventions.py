@@ -52,6 +52,6 @@ Importing
 ---------
 `import floatbase as fb` has the names that most programs need. Everything else is imported from its room: `floatbase.robots`,
 `floatbase.dynamics`, `floatbase.objectives`, `floatbase.friction`, `floatbase.qp`, `floatbase.control`, `floatbase.actuators`,
-`floatbase.simulation`, `floatbase.behaviours`, `floatbase.viewer`, `floatbase.lessons`, and the small `floatbase.affine`,
-`floatbase.linear_algebra` and `floatbase.errors`.
+`floatbase.simulation`, `floatbase.behaviours`, `floatbase.viewer`, `floatbase.lessons`, `floatbase.playground`, and the
+small `floatbase.affine`, `floatbase.linear_algebra` and `floatbase.errors`.
 """

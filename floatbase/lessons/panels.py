@@ -83,7 +83,7 @@ def slider_panel(
     wait: bool = False,
     beside: bool = False,
     stops: Mapping[str, Sequence[float]] | None = None,
-    **ranges: tuple[float, float, float] | tuple[float, float, float, str],
+    **ranges: tuple[float, float, float] | tuple[float, float, float, str] | range,
 ) -> SliderPanel:
     """The live picture of `view` with one slider for each of `ranges`, in the order in which they are given.
 
@@ -94,17 +94,19 @@ def slider_panel(
     beside: the note stands to the right of the picture; otherwise between the picture and the sliders.
     stops: name -> values at which the picture is computed for a site, where no kernel draws; round ones by default.
     ranges: name=(lowest, first, highest) or name=(lowest, first, highest, unit). "_" in a name shows as a blank. The step of
-        a slider is round and meets all three.
+        a slider is round and meets all three. name=range(n) is a slider of whole numbers, 0 to n - 1, that begins at 0.
 
     Where `draw` raises an error of the package, its text is the note.
     """
-    sliders = {name: _range_slider(name, *bounds, wait=wait) for name, bounds in ranges.items()}
+    sliders = {name: _range_slider(name, bounds, wait) for name, bounds in ranges.items()}
     return SliderPanel(view, draw, sliders, beside, stops or {})
 
 
-def _range_slider(name: str, low: float, first: float, high: float, unit: str = "", *, wait: bool) -> widgets.FloatSlider:
-    text = name.replace("_", " ") + (f" [{unit}]" if unit else "")
-    made = _slider(text, low, first, high, _round_step(low, first, high), wait)
+def _range_slider(name: str, bounds: Any, wait: bool) -> widgets.FloatSlider:
+    whole = isinstance(bounds, range)
+    low, first, high, *unit = (bounds[0], bounds[0], bounds[-1]) if whole else bounds
+    text = " ".join([name.replace("_", " "), *(f"[{part}]" for part in unit if part)])
+    made = _slider(text, low, first, high, bounds.step if whole else _round_step(low, first, high), wait)
     made.style.description_width, made.layout.width = "min(12em, 36%)", "80%"
     return made
 

@@ -60,7 +60,7 @@ class Playground:
         self.judge: Judge | None = None
         self._last_push: fb.Push | None = None
         self.shown = {term: term in _SHOWN for term in SYMBOLS}
-        self._waits = [False, False]  # for the reader to press run: after the next reset, after the next slice
+        self._waits = False  # for the reader to press run, after the next slice
         self._requested: dict[str, Any] = {}
         self._lock = threading.Lock()  # over what is requested
         self._drawing = threading.Lock()  # the run draws, and so does who pauses it
@@ -151,7 +151,6 @@ class Playground:
         self.run.reset()
 
     def _begin(self, settings: Settings) -> None:
-        self._waits[0] = self.card is not None and self.card.paused
         self.session.change(**asdict(settings))
         self._panel.follow(self.session.settings)
         self._hand_over()
@@ -179,7 +178,7 @@ class Playground:
     def _restart(self) -> None:
         """After a reset of the simulation, in the run's thread."""
         self.session.restart()
-        self._waits = [False, self._waits[0]]
+        self._waits = self.card is not None and self.card.paused
         card = self.card
         if card is not None:
             self.judge = card.judge()
@@ -231,8 +230,8 @@ class Playground:
             if judge.says != before:
                 self._write()
         self._draw(record)
-        if self._waits[1]:
-            self._waits[1] = False
+        if self._waits:
+            self._waits = False
             self.run.pause()
         if self.robot.is_floating:
             self.view.strip("planned and measured forces differ by", float(record.time[-1]), gap(record), "N")

@@ -110,10 +110,11 @@ def _pictures(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
 
 
 def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
-    from PIL.Image import Dither
+    from PIL.Image import Dither, Quantize
 
     none = Dither.NONE
-    first = next(pictures).quantize(dither=none)  # one palette for all: a palette for each flickers
+    # one palette for all, since a palette for each flickers; the octree keeps the colour of a small thing, such as an arrow
+    first = next(pictures).quantize(method=Quantize.FASTOCTREE, dither=none)
     rest = (picture.quantize(palette=first, dither=none) for picture in pictures)
     first.save(target, save_all=True, append_images=rest, duration=1000 // RATES[".gif"], loop=0)
 

@@ -152,6 +152,7 @@ def test_a_class_is_one_table(learner: Path) -> None:
     )
     rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
     assert len(rows) == 3 * len(all_exercises())
+    assert {row["file"] for row in rows} == {Path(file).name for file in files}
     assert {row["name"] for row in rows} == {"Ada", "Émilie du Châtelet", "'=1+1"}
     with pytest.raises(InputError, match="No file is left to judge"):
         grades.grade([learner / "holiday.json"])

@@ -12,6 +12,7 @@ from waiting import until
 
 import floatbase as fb
 from floatbase.lessons import SliderPanel, live, push_panel, slider_panel
+from floatbase.lessons.stops import of_panel
 from floatbase.simulation import Live
 
 RANGES = [
@@ -94,6 +95,13 @@ def test_a_panel_holds_its_picture_once_it_is_displayed(view: fb.Viewer, beside:
     assert picture.children == ()
     data, _ = panel._repr_mimebundle_()
     assert picture.children[0].name == view.robot.name and "image/png" in data
+
+
+def test_a_slider_of_whole_numbers_has_only_those_also_without_a_kernel() -> None:
+    panel = slider_panel(None, lambda rounds: f"{rounds:g}", rounds=range(31))
+    slider = panel.sliders["rounds"]
+    assert (slider.min, slider.value, slider.max, slider.step, slider.readout_format) == (0, 0, 30, 1, ".0f")
+    assert {value % 1 for value in of_panel(panel)["rounds"]} == {0.0}
 
 
 def test_a_panel_without_a_view_shows_what_its_function_returns() -> None:

@@ -25,6 +25,7 @@ def page() -> str:
             "",
             first,
             *rest,
+            "",
             "Tolerances",
             "----------",
             "Every number that decides a case, where it stands, and why it is what it is. Made from the code by",

@@ -23,7 +23,7 @@ _LARGEST_FILE = 20_000_000  # bytes; all answers of the course take less than 0.
 _PARTS = {"name": str, "exercises": dict, "predictions": dict}
 _INDENT = "    "  # of code, so that no line of it passes for a heading
 _NEVER, _READ = "·", "to be read"
-_COLUMNS = ("name", "time", "exercise", "result", "tries", "told")
+_COLUMNS = ("file", "name", "time", "exercise", "result", "tries", "told")
 _FORMULA = tuple("=+-@\t\r\n＝＋－＠")  # a spreadsheet may run a text that begins so
 
 
@@ -43,11 +43,12 @@ class Mark:
 
 @dataclass(frozen=True)
 class HandedIn:
-    """What a file of `hand_in` is worth. name: the learner's. time: when it was written. marks: of every exercise.
+    """What a file of `hand_in` is worth. file: its name. name: the learner's. time: when it was written.
 
-    predicted: how many predictions were made.
+    marks: of every exercise. predicted: how many predictions were made.
     """
 
+    file: str
     name: str
     time: str
     marks: tuple[Mark, ...]
@@ -61,6 +62,7 @@ def judged(path: str | Path) -> HandedIn:
     """
     found = _read(Path(path))
     return HandedIn(
+        file=_line(Path(path).name),
         name=_line(found["name"]),
         time=_line(found.get("time")),
         marks=tuple(_marks(found["exercises"])),
@@ -128,12 +130,14 @@ def grade(files: Sequence[Path]) -> list[HandedIn]:
 def overview(everyone: Sequence[HandedIn]) -> str:
     """A line for each learner: exercises that are right, lesson by lesson, and all; how much code there is to read."""
     lessons = sorted({mark.exercise.split(".")[0] for mark in everyone[0].marks})
+    names = [one.name for one in everyone]
     rows = [("", *lessons, "all", "to be read", "predictions")]
     for one in everyone:
         rights = [mark.exercise.split(".")[0] for mark in one.marks if mark.result == "right"]
         unread = sum(mark.result == "to be read" for mark in one.marks)
         counts = [rights.count(lesson) for lesson in lessons]
-        rows.append((one.name, *map(str, counts), f"{len(rights)} of {len(one.marks)}", str(unread), str(one.predicted)))
+        name = one.name if names.count(one.name) == 1 else f"{one.name} ({one.file})"
+        rows.append((name, *map(str, counts), f"{len(rights)} of {len(one.marks)}", str(unread), str(one.predicted)))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join("  ".join(f"{part:<{width}}" for part, width in zip(row, widths, strict=True)).rstrip() for row in rows)
 
@@ -151,7 +155,7 @@ def _visible(code: str) -> str:
 
 def write_table(everyone: Sequence[HandedIn], path: Path) -> None:
     """Write a row for each learner and exercise, as CSV. Raises `InputError` where the file cannot be written."""
-    rows = [(one.name, one.time, m.exercise, m.result, m.tries, m.told) for one in everyone for m in one.marks]
+    rows = [(one.file, one.name, one.time, m.exercise, m.result, m.tries, m.told) for one in everyone for m in one.marks]
     try:
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
