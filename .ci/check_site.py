@@ -10,15 +10,12 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from browsers import launched
+from browsers import launched, served
 
 WAIT = 60_000  # ms for a picture on a machine that draws by software
 # what a scene shows: where everything is, in which colours and shapes, or that nothing is drawn yet
@@ -45,23 +42,6 @@ END = """(one) => {
   if (one.type === "range") one.value = one.max; else if (one.tagName === "SELECT") one.selectedIndex = one.options.length - 1;
   one.dispatchEvent(new Event(one.type === "range" ? "input" : "change", {bubbles: true}));
 }"""
-
-
-class _Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, *_: Any) -> None:
-        pass
-
-
-@contextmanager
-def served(folder: Path) -> Iterator[str]:
-    """The address of a server of this folder."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(folder)))
-    Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}/"
-    finally:
-        server.shutdown()
-        server.server_close()
 
 
 def faults_of(page: Any, address: str) -> Iterator[str]:
@@ -132,7 +112,7 @@ def main() -> int:
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.on("request", lambda asked: elsewhere.append(asked.url))
         for path in pages:
-            for fault in faults_of(page, address + path.relative_to(folder).as_posix()):
+            for fault in faults_of(page, f"{address}/{path.relative_to(folder).as_posix()}"):
                 wrong += 1
                 print(f"{path.relative_to(folder)}: {fault}")
         foreign = {url for url in elsewhere if not url.startswith((address, "data:", "blob:"))}

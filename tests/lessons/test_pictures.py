@@ -8,16 +8,12 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 import numpy as np
 import pytest
-from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
+from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium, served
 
 import floatbase as fb
 from floatbase.lessons import ConstantTorques, live, push_panel, slider_panel
@@ -260,22 +256,6 @@ def test_the_game_of_rows_has_every_set_of_rows() -> None:
 # in a browser -----------------------------------------------------------------------------------------------------------
 
 browser = browser_of_a_file
-
-
-class _Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, *args: Any) -> None:
-        """Say nothing."""
-
-
-@contextmanager
-def served(folder: Path) -> Iterator[str]:
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(folder)))
-    Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}"
-    finally:
-        server.shutdown()
-        server.server_close()
 
 
 @pytest.fixture(scope="module")
