@@ -28,7 +28,7 @@ import numpy as np
 from viewer import FLAGS, machine
 
 TURN = 10  # moves of one copy before the next one's turn
-REST = 0.25  # s from move to move: so that each is on its own
+REST = 1.0  # s from move to move: so that each is on its own, also where a processor draws and needs half a second for it
 LONGEST = 180  # s until a notebook has run
 CELL = """
 import floatbase as fb

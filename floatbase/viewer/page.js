@@ -310,6 +310,21 @@ function startWhenSeen(start, sight = onSight) {
   });
 }
 
+const UNSEEN = 500;  // ms in which a page draws that somebody sees
+
+// Call once the next picture is drawn: what the window or the notebook does then must not delay it. Where nobody sees the page,
+// it does not draw.
+function afterDrawing(call) {
+  let late = 0, next = 0;
+  const go = () => {
+    clearTimeout(late);
+    cancelAnimationFrame(next);
+    call();
+  };
+  late = setTimeout(go, UNSEEN);
+  next = requestAnimationFrame(go);  // after the viewer's own, which it has asked for before
+}
+
 // What a page that follows a window does with a message of the window's. connection: its send says something to the window.
 function listener(rest, connection) {
   viewer.connection = connection;
@@ -323,7 +338,7 @@ function listener(rest, connection) {
     } else {
       apply(message);
       viewer.num_messages_received++;
-      connection.send('{"type": "done"}');
+      afterDrawing(() => connection.send('{"type": "done"}'));
     }
   };
 }
@@ -349,7 +364,7 @@ function waitForPort() {
     let hear = () => {};
     port.onmessage = ({data: message}) => message.notice ? say(message.notice) : hear(message);
     startWhenSeen((rest) => {
-      hear = listener(rest, {send: (words) => port.postMessage(words)});
+      window.hear = hear = listener(rest, {send: (words) => port.postMessage(words)});
       port.postMessage("hello");
     });
   };

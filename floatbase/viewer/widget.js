@@ -84,6 +84,14 @@ async function render({model, el}) {
     source.postMessage({code: viewer}, "*", [channel.port2]);
     if (gone) port.postMessage({notice: GONE});
   }
+  // At once, where the notebook lets its pages reach into their frames: a port's message waits behind all that the notebook has
+  // to do, such as its busy sign.
+  function give(said) {
+    let hear = null;
+    try { hear = frame.contentWindow.hear; } catch (error) { /* a frame that nobody may reach into */ }
+    if (hear) hear(said);
+    else port.postMessage(said);
+  }
   function again() {
     if (lost) return;
     lost = true;
@@ -93,12 +101,11 @@ async function render({model, el}) {
     if (message.closed) return leave();
     if (message.page !== page || port === null) return;
     if (message.lost) again();
-    else if (message.text) port.postMessage(message.text);
+    else if (message.text) give(message.text);
     else if (message.frame && !lost) {
       if (message.frame !== received + 1) return again();  // one got lost, so what it said must come again
       received = message.frame;
-      const data = bytes(buffers[0]).slice().buffer;
-      port.postMessage(data, [data]);
+      give(bytes(buffers[0]).slice().buffer);
     }
   }
   // The kernel has gone: the picture stays as it is.
