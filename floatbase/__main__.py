@@ -9,8 +9,14 @@ import sys
 import threading
 from collections.abc import Sequence
 from contextlib import closing
+from typing import TYPE_CHECKING
 
 import floatbase as fb
+
+if TYPE_CHECKING:
+    from floatbase.playground import Playground
+
+_LOOK = 0.05  # s between looks for a page: soon enough for a reader
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,6 +63,14 @@ def _again(given: Sequence[str], asked: int, port: int) -> str:
     return f"This robot has gone. Start it again with\n{command}\nand this page comes back by itself."
 
 
+def start_when_seen(page: Playground, ended: threading.Event) -> None:
+    """Let the robot run once a browser shows it, so that nobody finds it fallen, or paused for want of a reader."""
+    while not (page.view.window.browsers or ended.wait(_LOOK)):
+        pass
+    if not ended.is_set():
+        page.start()
+
+
 def _view(options: argparse.Namespace, given: Sequence[str]) -> int:
     """Show a robot until Ctrl-C or SIGTERM. given: the arguments of the command line, to be told."""
     from floatbase.playground import Playground, Settings  # loads MuJoCo and the viewer, which the other commands do without
@@ -68,11 +82,12 @@ def _view(options: argparse.Namespace, given: Sequence[str]) -> int:
         settings = Settings(friction=(options.friction, options.friction))
         page = Playground(robot, settings, background=options.background, port=options.port)
         with closing(page):
-            page.start()
+            page.view.show(page.session.sim.state)
             page.view.ending(_again(given, options.port, page.view.window.port))
             print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
                 page.view.window.open()
+            start_when_seen(page, ended)
             ended.wait()
     finally:
         for number, handler in before.items():

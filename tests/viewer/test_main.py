@@ -6,14 +6,16 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, suppress
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
 from waiting import until
 
-from floatbase.__main__ import main
+from floatbase.__main__ import main, start_when_seen
 from floatbase.playground import Pace, Playground
 from floatbase.robots import Robot, catalogue, load
 
@@ -58,6 +60,27 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     _, errors = process.communicate(timeout=20)
     compiled = "floatbase compiles its controller, once: about a minute.\n"  # where `make setup` did not
     assert (process.returncode, errors.replace(compiled, "")) == (0, "")
+
+
+def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
+    with closing(Playground(go2)) as playground, ThreadPoolExecutor(1) as other:
+        ended = Event()
+        begun = other.submit(start_when_seen, playground, ended)
+        try:
+            assert not begun.done() and playground.run.status == "paused" and playground.session.sim.time == 0.0
+            page.goto(playground.url)
+            begun.result(30)
+            until(lambda: playground.session.sim.time > 0.0)
+        finally:
+            ended.set()
+
+
+def test_the_end_of_the_program_ends_the_wait_for_a_page(go2: Robot) -> None:
+    ended = Event()
+    ended.set()
+    with closing(Playground(go2)) as playground:
+        start_when_seen(playground, ended)
+        assert playground.run.status == "paused"
 
 
 @pytest.fixture
