@@ -12,14 +12,15 @@ function startViewer() {
   const camera = startCamera(viewer, panel);
   const legend = startLegend(camera, (colour) => theme.colour(colour)), theme = startTheme(viewer, legend);
   const manners = startManners(viewer, camera);
+  new ResizeObserver(([{target}]) => {
+    part("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
+  }).observe(part("title"));
   const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
     set_views: manners.views,
     set_title: (command) => {
-      const title = part("title");
-      title.textContent = command.text;
-      part("board").style.top = `${title.offsetTop + title.offsetHeight + 6}px`;
+      part("title").textContent = command.text;
       manners.describe(command.text);
     },
     set_legend: (command) => { legend.show(command.items); },
@@ -83,6 +84,7 @@ function startLegend(camera, shade) {
     const crowded = away < middle.y  // the camera fits what it looks at into a ball as high as the picture
       || top < part("title").getBoundingClientRect().bottom || (player.width > 0 && right > player.left);
     legend.classList.toggle("folded", crowded && lines.childElementCount > 0);
+    legend.classList.toggle("raised", player.width > 0 && button.getBoundingClientRect().right > player.left);
   }
   const keep = (now) => { open(kept = now); };
   legend.onpointerenter = ({pointerType}) => { if (pointerType == "mouse") open(true); };

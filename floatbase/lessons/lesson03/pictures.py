@@ -65,7 +65,7 @@ def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tu
 
 
 def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
-    """The bars of q̈, τ or λ, SVG, as large as it says: it wraps, but never shrinks. Text has the page's own colour.
+    """The bars of q̈, τ or λ, SVG: it wraps, and shrinks only where a line is narrower. Text has the page's own colour.
 
     title: what stands above, the symbol first.
     colour: of the bars.
@@ -83,7 +83,7 @@ def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float)
             parts.append(f"<g><title>{title.split(',')[0]} {block} {mark}: {number} {unit}</title>")
             parts.append(_bar(x, value / most, colour))
             parts.append(f'<text x="{x + BAR / 2}" y="{bottom + 14}" text-anchor="middle">{mark[0]}</text></g>')
-    size = f'width="{width}" height="{bottom + 32}" role="img" aria-label="{title}"'
+    size = f'width="{width}" viewBox="0 0 {width} {bottom + 32}" style="max-width: 100%" role="img" aria-label="{title}"'
     return f'<svg {size} font-size="11" fill="currentColor">{"".join(parts)}</svg>'
 
 

@@ -56,9 +56,10 @@ class Game(widgets.VBox):
         self._puzzles, self._at = tuple(puzzles), 0
         self._picture, self._told = widgets.HTML(), widgets.HTML()
         self.rows = {str(name): self._button(str(name)) for name in corner_table().inequality_names}
-        self.next = widgets.Button(description="next bowl", layout=widgets.Layout(width="8em"))
+        self.next = widgets.Button(description="next bowl", layout=widgets.Layout(width="8em", flex="0 0 auto"))
         self.next.on_click(self._go_on)
-        super().__init__([self._picture, widgets.HBox([*self.rows.values(), self.next]), self._told])
+        buttons = widgets.HBox([*self.rows.values(), self.next], layout=widgets.Layout(flex_flow="row wrap"))
+        super().__init__([self._picture, buttons, self._told])
         self._begin()
 
     @property
@@ -72,7 +73,7 @@ class Game(widgets.VBox):
         return str(self._told.value)
 
     def _button(self, name: str) -> widgets.Button:
-        made = widgets.Button(description=name, layout=widgets.Layout(width="8em"))
+        made = widgets.Button(description=name, layout=widgets.Layout(width="8em", flex="0 0 auto"))
         made.on_click(lambda _: self._click(name))
         return made
 
