@@ -19,6 +19,7 @@ from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, ad
 from floatbase.viewer import Viewer, published, push_at, with_image
 
 _NARROW = "min(340px, 100%)"  # width below which nothing of a slider is left but its name and its number
+_LETTER = 0.55  # em: of a name's letter, on average and at most
 
 # sliders ----------------------------------------------------------------------------------------------------------------
 
@@ -99,6 +100,9 @@ def slider_panel(
     Where `draw` raises an error of the package, its text is the note.
     """
     sliders = {name: _range_slider(name, bounds, wait) for name, bounds in ranges.items()}
+    longest = max((len(slider.description) for slider in sliders.values()), default=0)
+    for slider in sliders.values():
+        slider.style.description_width = f"max(min(12em, 36%), {min(_LETTER * longest, 12.0):.2f}em)"
     return SliderPanel(view, draw, sliders, beside, stops or {})
 
 
@@ -107,7 +111,7 @@ def _range_slider(name: str, bounds: Any, wait: bool) -> widgets.FloatSlider:
     low, first, high, *unit = (bounds[0], bounds[0], bounds[-1]) if whole else bounds
     text = " ".join([name.replace("_", " "), *(f"[{part}]" for part in unit if part)])
     made = _slider(text, low, first, high, bounds.step if whole else _round_step(low, first, high), wait)
-    made.style.description_width, made.layout.width = "min(12em, 36%)", "80%"
+    made.layout.width = "80%"
     return made
 
 
@@ -122,7 +126,7 @@ def _slider(text: str, low: float, first: float, high: float, step: float, wait:
         readout_format=f".{max(0, -math.floor(math.log10(step)))}f",
         continuous_update=not wait,
         tooltip=text,
-        style={"description_width": "min(8.5em, 36%)"},
+        style={"description_width": "min(8.5em, 42%)"},
         layout=widgets.Layout(width="60%", min_width=_NARROW),
     )
 

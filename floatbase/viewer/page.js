@@ -134,22 +134,25 @@ function startCamera(viewer, panel) {
   const node = (names) => names.reduce((at, name) => at && at.children[name], viewer.scene_tree);
   // while the panel is open, the middle of the picture is left of it by so many pixels
   const aside = () => panel.width() / 2;
-  // and above it where the player would hide the feet
-  const above = () => (part("player").offsetHeight + panel.height()) / 2;
+  // and above it where the player would hide the feet; between the panel below and the terms of an equation
+  const above = () => (part("player").offsetHeight + panel.height() - (panel.height() && part("board").offsetHeight)) / 2;
 
-  // Go with what is followed, at the same height; the scale goes with the camera. Returns whether it is still on its way.
+  // how far up of `up`, m: not with each step, but down with a robot that slides down a slope
+  const rise = (up) => Math.sign(up) * Math.max(0, Math.abs(up) - Math.abs(from.y) / 2);
+  // Go with what is followed; the scale goes with the camera. Returns whether it is still on its way.
   function go() {
     const now = performance.now(), part = smooth && !anew ? 1 - Math.exp(-Math.min(now - clock, SLOWEST) / 1000 / LAG) : 1;
     clock = now;
     const found = node(path), way = new Vector3();
     if (!found) return false;
-    way.copy(found.object.getWorldPosition(new Vector3())).sub(from).setY(0).sub(gone);
+    way.copy(found.object.getWorldPosition(new Vector3())).sub(from);
+    way.setY(rise(way.y)).sub(gone);
     const step = way.clone().multiplyScalar(way.length() < REST ? 1 : part);
     gone.add(step);
     viewer.camera.position.add(step);
     viewer.controls.target.add(step);
     const scale = node(["meshcat", "scale"]);
-    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, 0);  // in our coordinates, z up
+    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, gone.y);  // in our coordinates, z up
     anew = false;
     return way.sub(step).length() > 0;
   }
