@@ -18,8 +18,8 @@ from floatbase.lessons.stops import DIRECTIONS, computed, recorded_pushes
 from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
 from floatbase.viewer import Viewer, published, push_at, with_image
 
-_NARROW = "min(340px, 100%)"  # width below which nothing of a slider is left but its name and its number
-_LETTER = 0.55  # em: of a name's letter, on average and at most
+_NARROW = "min(340px, 100% - 4px)"  # width below which nothing of a slider is left but its name and its number
+_LETTER = 0.47  # em: of a letter, on average over the name of a slider
 
 # sliders ----------------------------------------------------------------------------------------------------------------
 

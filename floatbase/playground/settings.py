@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from floatbase._arrays import Value
 from floatbase.dynamics import Contacts
 from floatbase.playground.equation import EQUATION
-from floatbase.robots import Robot
+from floatbase.robots import Robot, catalogue
 from floatbase.simulation import Push
 
 GAITS = {4: {"trot": "Gait.trot", "crawl": "Gait.crawl"}, 2: {"walk": "Gait.walk"}}  # by number of feet
@@ -174,7 +174,7 @@ class Settings(Value):
         rest = f"{pushes}, control_period={period:g}, actuators=actuators)"
         run = f"run = fb.rollout(sim, controller, {_whole(3.0, period)}{rest}"
         imports = [line for words, line in _IMPORTS if any(word in text for word in words)]
-        lines = [*imports, "", f"robot = fb.load({robot.name!r})"]
+        lines = [*imports, "", f"robot = {_loaded(robot)}"]
         return "\n".join([*lines, *body, run, 'print(run.outcome, f"at {run.time[-1]:.2f} s")', ""])
 
 
@@ -186,6 +186,16 @@ _IMPORTS = (
     (("BaseMotors", "nodding"), "from floatbase.playground import BaseMotors, nodding"),
     (("Altered",), "from floatbase.simulation import AlteredSimulation, World"),
 )
+
+
+def _loaded(robot: Robot) -> str:
+    """The call that loads a robot: one that is no robot of the package's comes from the file that its name tells."""
+    if robot.name in catalogue():
+        return f"fb.load({robot.name!r})"
+    given = [repr(f"{robot.name}.urdf"), *([] if robot.is_floating else ["floating=False"])]
+    if robot.feet:
+        given += [f"feet={[foot.frame for foot in robot.feet]}", f"foot_radius={robot.feet[0].radius:g}"]
+    return f"fb.load_urdf({', '.join(given)})"
 
 
 def _normal(slope: float) -> list[float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import judges
@@ -46,6 +47,13 @@ def test_the_program_runs_and_makes_the_same_robot(name: str, capsys: pytest.Cap
     there = run_of(settings.code(GO2, period, push))
     assert here.outcome == there.outcome and np.array_equal(here.q, there.q) and np.array_equal(here.planned, there.planned)
     assert there.outcome in capsys.readouterr().out
+
+
+def test_the_program_of_a_robot_of_ones_own_loads_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "my.urdf").write_text(judges.load("solo12").urdf)
+    monkeypatch.chdir(tmp_path)
+    own = fb.load_urdf("my.urdf", feet=["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"], foot_radius=0.02)
+    assert run_of(Settings().code(own, 4e-3)).robot == own
 
 
 @pytest.mark.parametrize("name", EACH)

@@ -237,7 +237,7 @@ def test_a_folded_legend_leaves_room_for_the_player_of_a_recording(browser, view
         page.wait_for_function(f"window.viewer && viewer.num_messages_received > 0 && {FOLDED}")
         button, player = (page.evaluate(BOX, name) for name in ("#legend button", "#player"))
         assert player["right"] < width, width
-        assert button["right"] < player["left"] or button["bottom"] <= player["top"] and width < 340, width
+        assert button["right"] < player["left"] or (button["bottom"] <= player["top"] and width < 340), width
         picture(page, f"record_{width}")
     page.close()
 
