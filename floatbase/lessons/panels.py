@@ -19,7 +19,7 @@ from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, ad
 from floatbase.viewer import Viewer, published, push_at, with_image
 
 _NARROW = "min(340px, 100% - 4px)"  # width below which nothing of a slider is left but its name and its number
-_LETTER = 0.47  # em: of a letter, on average over the name of a slider
+_LETTER, _NAME = 0.55, 10.4  # em: of a letter of a slider's name, at most on average; of a name where the page is narrow
 
 # sliders ----------------------------------------------------------------------------------------------------------------
 
@@ -102,7 +102,7 @@ def slider_panel(
     sliders = {name: _range_slider(name, bounds, wait) for name, bounds in ranges.items()}
     longest = max((len(slider.description) for slider in sliders.values()), default=0)
     for slider in sliders.values():
-        slider.style.description_width = f"max(min(12em, 36%), {min(_LETTER * longest, 12.0):.2f}em)"
+        slider.style.description_width = f"max(min(12em, 36%), {min(_LETTER * longest, _NAME):.2f}em)"
     return SliderPanel(view, draw, sliders, beside, stops or {})
 
 

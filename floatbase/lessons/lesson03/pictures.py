@@ -21,6 +21,7 @@ from floatbase.viewer import GHOST, GREYS, PLANNED, Viewer, hexadecimal
 GHOST_TIME = 0.25  # s: the veil shows where an acceleration leads in this time from rest
 FULL = (20.0, 20.0, 100.0)  # m/s² or rad/s², N·m, N: bars of full length
 BAR, FULL_BAR, MIDDLE = 14, 40, 62  # px: width of a bar, length of a full one, and where they begin, below the top
+LETTER = 7  # px: width of a letter of a title, on average and at most
 BLOCK, GAP = 58, 16  # px: a name of a leg, 11 px high, fits below its three bars; between the bars of two legs
 
 _Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]  # name, marks of its three numbers, unit
@@ -51,21 +52,22 @@ def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tu
     """
     legs = ("front left", "front right", "rear left", "rear right")
     joints, axes = ("hip", "thigh", "knee"), ("x", "y", "z")
-    base = [("base", axes, "m/s²"), ("turning", axes, "rad/s²")]
-    groups = (
-        ("q̈", "m/s², rad/s²", GHOST, base + [(leg, joints, "rad/s²") for leg in legs]),
-        ("τ", "N·m", GREYS[1], [(leg, joints, "N·m") for leg in legs]),
-        ("λ", "N", PLANNED, [(leg, axes, "N") for leg in legs]),
+    qdd = np.asarray(qdd)
+    groups = (  # two for q̈: a narrow page has no room for 18 numbers in a line
+        ("q̈", "m/s², rad/s²", GHOST, [("base", axes, "m/s²"), ("turning", axes, "rad/s²")], qdd[:6], full[0]),
+        ("q̈", "rad/s²", GHOST, [(leg, joints, "rad/s²") for leg in legs], qdd[6:], full[0]),
+        ("τ", "N·m", GREYS[1], [(leg, joints, "N·m") for leg in legs], tau, full[1]),
+        ("λ", "N", PLANNED, [(leg, axes, "N") for leg in legs], forces, full[2]),
     )
     drawn = [
         _group(f"{name}, ± {most:g} {units}", hexadecimal(colour), blocks, np.reshape(values, (-1, 3)), most)
-        for (name, units, colour, blocks), values, most in zip(groups, (qdd, tau, forces), full, strict=True)
+        for name, units, colour, blocks, values, most in groups
     ]
     return f'<div style="display: flex; flex-wrap: wrap; gap: 10px 16px">{"".join(drawn)}</div>'
 
 
 def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
-    """The bars of q̈, τ or λ, SVG: it wraps, and shrinks only where a line is narrower. Text has the page's own colour.
+    """The bars of q̈, τ or λ, SVG, as large as it says: it wraps, but never shrinks. Text has the page's own colour.
 
     title: what stands above, the symbol first.
     colour: of the bars.
@@ -83,7 +85,7 @@ def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float)
             parts.append(f"<g><title>{title.split(',')[0]} {block} {mark}: {number} {unit}</title>")
             parts.append(_bar(x, value / most, colour))
             parts.append(f'<text x="{x + BAR / 2}" y="{bottom + 14}" text-anchor="middle">{mark[0]}</text></g>')
-    size = f'width="{width}" viewBox="0 0 {width} {bottom + 32}" style="max-width: 100%" role="img" aria-label="{title}"'
+    size = f'width="{max(width, LETTER * len(title))}" height="{bottom + 32}" role="img" aria-label="{title}"'
     return f'<svg {size} font-size="11" fill="currentColor">{"".join(parts)}</svg>'
 
 
