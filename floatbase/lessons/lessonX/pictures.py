@@ -57,7 +57,7 @@ def plot_missed(box: BlackBox, missed: npt.ArrayLike) -> Figure:
 
 
 def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
-    """Ordered and needed torque of a joint, as SVG, the order after a first-order lag; how well the two fit.
+    """Ordered and needed torque of a joint, as HTML, the order after a first-order lag; how well the two fit.
 
     got: (n - 1, d) N·m, the torques that the motion needed. joint: its number. ms: time constant of the lag.
     """
@@ -72,9 +72,9 @@ def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
         f"{box.robot.joint_names[joint]}, from {frame.low:.0f} to {frame.high:.0f} N·m",
         f"thick: needed; thin: ordered, {ms:.0f} ms late; all joints differ by {off:.2f} N·m in the median",
     )
-    text = "".join(f'<text x="{EDGE}" y="{HEIGHT + 32 + 18 * i}" font-size="13">{line}</text>' for i, line in enumerate(words))
-    size = f'viewBox="0 0 {WIDTH} {HEIGHT + 60}" style="max-width: 100%; width: {WIDTH}px"'
-    return f'<svg {size} fill="currentColor">{drawn}{text}</svg>'
+    text = "".join(f"<div>{line}</div>" for line in words)  # not in the drawing, which shrinks on a narrow page
+    size = f'viewBox="0 0 {WIDTH} {HEIGHT + 32}" style="max-width: 100%; width: {WIDTH}px"'
+    return f'<svg {size} fill="currentColor">{drawn}</svg>{text}'
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class _Frame:
 
     def ticks(self) -> str:
         """Lines at round torques, the one of no torque thicker, and at the tenths of a second."""
-        drawn = f'<text x="{EDGE - 6}" y="{HEIGHT + 12}" font-size="11" text-anchor="end">N·m</text>'
+        drawn = f'<text x="{EDGE - 6}" y="{HEIGHT + 27}" font-size="11" text-anchor="end">N·m</text>'
         for torque in np.asarray(MaxNLocator(5).tick_values(self.low, self.high)).tolist():
             if self.low <= torque <= self.high:
                 y, width = float(self.up(torque)), 0.2 if torque else 0.5
