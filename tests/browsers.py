@@ -17,7 +17,7 @@ SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = [
     "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
-    "--no-first-run", "--disable-background-networking",
+    "--no-first-run", "--disable-background-networking", "--webgl-antialiasing-mode=none",
 ]  # fmt: skip
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: nothing was looked at in a browser")
 

@@ -13,6 +13,7 @@ from typing import Any
 from browsers import SCREENSHOTS
 
 IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push
+WINDOW: dict[str, Any] = {"viewport": {"width": 1100, "height": 800}, "device_scale_factor": 0.5}  # a processor draws it
 LONG = 90.0  # s that a busy machine may take for anything; nothing is taken for absent earlier
 
 NOTEBOOK = "jupyterapp.shell.currentWidget"

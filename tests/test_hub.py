@@ -25,6 +25,7 @@ from browsers import browser_of_a_file, needs_chromium
 from labs import (
     HEIGHT,
     LONG,
+    WINDOW,
     answers,
     answers_to_sliders,
     free_ports,
@@ -147,7 +148,7 @@ def class_(hub: Hub, browser: Any) -> Iterator[list[Student]]:
     with ExitStack() as ends:
         students = []
         for name in STUDENTS:
-            context = browser.new_context(viewport={"width": 1100, "height": 800})
+            context = browser.new_context(**WINDOW)
             ends.callback(context.close)
             page = context.new_page()
             page.set_default_timeout(1000 * LONG)

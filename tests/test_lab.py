@@ -24,6 +24,7 @@ from browsers import browser_of_a_file, needs_chromium
 from labs import (
     LONG,
     NOTEBOOK,
+    WINDOW,
     address_in,
     answers_to_sliders,
     lesson_opened,
@@ -104,7 +105,7 @@ browser = browser_of_a_file
 def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_counts_as_writing(
     lab: str, course: Path, browser: Any, name: str
 ) -> None:
-    page = browser.new_page(viewport={"width": 1100, "height": 800})
+    page = browser.new_page(**WINDOW)
     page.set_default_timeout(1000 * LONG)
     strangers = only(page, lab)
     try:

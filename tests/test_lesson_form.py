@@ -152,12 +152,17 @@ def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
     assert reviewed[0] > max(i for i, _ in named(path, "compare"))
 
 
+@cache
+def the_map() -> str:
+    return equations.table()
+
+
 @LESSONS
 def test_an_equation_is_taught_where_it_is_written_out_with_its_number(path: Path) -> None:
     for teaches, tags in taught(path):
         assert {equation for equation in teaches if not equation.startswith("App.")} == tags
         assert teaches <= set(equations.TITLES), "the map has no such equation"
-    parts = re.split(r"^#+ (?=\(|App)", equations.table(), flags=re.MULTILINE)
+    parts = re.split(r"^#+ (?=\(|App)", the_map(), flags=re.MULTILINE)
     here = {
         equation for equation in equations.TITLES for part in parts if part.startswith(f"{equation} ") and path.name in part
     }

@@ -15,7 +15,7 @@ from typing import Any
 import nbformat
 import pytest
 from browsers import browser_of_a_file, needs_chromium
-from labs import HEIGHT, LONG, answers, free_ports, only, picture_in, push_panel_of, push_until_it_falls, screenshot
+from labs import HEIGHT, LONG, WINDOW, answers, free_ports, only, picture_in, push_panel_of, push_until_it_falls, screenshot
 from waiting import until
 
 from floatbase.lessons.publish import FOLDER, read
@@ -57,7 +57,7 @@ browser = browser_of_a_file
 
 
 def test_the_pictures_of_a_page_without_code_move(voila: str, browser: Any) -> None:
-    page = browser.new_page(viewport={"width": 1100, "height": 800})
+    page = browser.new_page(**WINDOW)
     page.set_default_timeout(1000 * LONG)
     strangers = only(page, voila)
     try:

@@ -43,7 +43,7 @@ from floatbase.lessons.lessonX import (
     sliding,
 )
 
-SEEDS = (1, 2)  # 0 to 41 were tried by hand, 336 boxes: all fell that should, all were found, nobody else was accused
+SEEDS = (1,)  # others with --seed; 0 to 41 were tried by hand, 336 boxes: all fell that should, all were found, no one else
 
 
 @cache

@@ -28,6 +28,7 @@ EACH = {
     "a leg unfelt": Settings(believed_off=("forces",), true_off=("forces",), leg="FR_foot"),
     "no gravity": Settings(believed_off=("gravity",), true_off=("gravity",)),
 }
+SECONDS = 1.0  # of the program's three: the push is over, a trot is under way
 
 
 def run_of(code: str) -> fb.Rollout:
@@ -43,8 +44,10 @@ def test_the_program_runs_and_makes_the_same_robot(name: str, capsys: pytest.Cap
     settings, period = EACH[name], 4e-3
     session = Session(GO2, settings)
     push = fb.Push([20.0, -10.0, 0.0], 0.5)
-    here = fb.rollout(session.sim, session.controller, 3.0, [push], control_period=period, actuators=session.actuators)
-    there = run_of(settings.code(GO2, period, push))
+    here = fb.rollout(session.sim, session.controller, SECONDS, [push], control_period=period, actuators=session.actuators)
+    program = settings.code(GO2, period, push)
+    assert ", controller, 3, [" in program
+    there = run_of(program.replace(", controller, 3, [", f", controller, {SECONDS}, ["))
     assert here.outcome == there.outcome and np.array_equal(here.q, there.q) and np.array_equal(here.planned, there.planned)
     assert there.outcome in capsys.readouterr().out
 

@@ -196,7 +196,7 @@ def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
     return qps
 
 
-@pytest.mark.parametrize(("name", "ticks"), [("go2", 50), ("talos", 20)])
+@pytest.mark.parametrize(("name", "ticks"), [("go2", 50), ("talos", 8)])
 def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks: int) -> None:
     cold, warm, last = [], [], None
     for qp in swaying_qps(name, ticks):

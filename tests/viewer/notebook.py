@@ -123,6 +123,8 @@ window.started = true;
 class Notebook:
     """A web server with a page that shows widgets. What pages say is heard in the server's thread, as in a subshell.
 
+    At `/sealed` it is a page that cannot reach into its frames, as where a notebook seals its outputs off.
+
     sizes: bytes of the buffers of all messages to pages. lose: how many frames from now on do not arrive.
     """
 
@@ -140,7 +142,7 @@ class Notebook:
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         own = {"notebook": self}
-        pages = [(r"/", _Text, {"text": _PAGE, "kind": "text/html"}), (r"/comm", _Comm, own)]
+        pages = [(r"/", _Page, {}), (r"/sealed", _Page, {"policy": "sandbox allow-scripts"}), (r"/comm", _Comm, own)]
         pages += [(r"/widget.js", _Code, own)]
         server = tornado.httpserver.HTTPServer(tornado.web.Application(pages, websocket_max_message_size=64 << 20))
         server.add_sockets(self._listening)
@@ -173,13 +175,13 @@ class Notebook:
         self._thread.join(PATIENCE)
 
 
-class _Text(tornado.web.RequestHandler):
-    def initialize(self, text: str, kind: str) -> None:
-        self.text, self.kind = text, kind
+class _Page(tornado.web.RequestHandler):
+    def initialize(self, policy: str = "") -> None:
+        self.policy = policy
 
     def get(self) -> None:
-        self.set_header("Content-Type", self.kind)
-        self.finish(self.text)
+        self.set_header("Content-Security-Policy", self.policy)
+        self.finish(_PAGE)
 
 
 class _Code(tornado.web.RequestHandler):
@@ -189,12 +191,16 @@ class _Code(tornado.web.RequestHandler):
     def get(self) -> None:
         """The widget's own, which is the same for all; the page asks for it when the first one is shown."""
         self.set_header("Content-Type", "text/javascript")
+        self.set_header("Access-Control-Allow-Origin", "*")  # a sealed page is of no origin
         self.finish(next(iter(self.notebook.widgets.values())).get_state()["_esm"])
 
 
 class _Comm(tornado.websocket.WebSocketHandler):
     def initialize(self, notebook: Notebook) -> None:
         self.notebook = notebook
+
+    def check_origin(self, origin: str) -> bool:
+        return True
 
     def open(self, *_: str, **__: str) -> None:
         self.name = self.get_query_argument("id")

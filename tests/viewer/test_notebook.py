@@ -32,6 +32,9 @@ from .test_window import STRANGE
 MB = 1 << 20
 PACE = 1.0 / 30.0  # s from frame to frame, at least
 BLIND = 0.05  # s, while the page cannot answer
+REACHED = """() => {
+  try { return Boolean(document.querySelector("iframe").contentWindow.hear); } catch (error) { return false; }
+}"""
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 
 
@@ -279,6 +282,21 @@ def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_
     assert frames[0].evaluate("!viewer.scene_tree.find(['meshcat']).children.com?.children.ball")
     for view in (viewer, *others):
         view.close()
+
+
+@pytest.mark.parametrize(("address", "reached"), [("", True), ("sealed", False)])
+def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
+    notebook: Notebook, page: Any, viewer: Viewer, standing: State, address: str, reached: bool
+) -> None:
+    page.goto(f"{notebook.url}{address}")
+    page.wait_for_function("window.started")
+    viewer.show(standing)
+    frame = notebook.show(page, viewer.widget())
+    frame.wait_for_function(DRAWN)
+    assert page.evaluate(REACHED) == reached
+    for i in range(5):
+        viewer.show(standing, title=f"number {i}")
+        frame.wait_for_function(f"document.getElementById('title').textContent == 'number {i}'")
 
 
 @pytest.mark.parametrize("how", ["kernel", "window"])
