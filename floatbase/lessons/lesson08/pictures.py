@@ -26,7 +26,7 @@ _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
 _LIFTED = 0.003  # m above the ground: no flicker with its lines
 _MOST = 600.0  # N: the hardest push of the panel
 _RECORDED = (150.0, 250.0, 350.0)  # N: what both stand, what only steps save, what they save to the side only
-_HALF = widgets.Layout(width="50%")
+_HALF = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")  # below each other where a page is narrow
 
 
 def triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
@@ -118,7 +118,8 @@ class PushTogether(widgets.VBox):
             for title in controllers
         ]
         buttons = widgets.HBox([self.button, self.reset])
-        super().__init__([widgets.HBox(columns), self.force, self.towards, buttons])
+        row = widgets.HBox(columns, layout=widgets.Layout(flex_flow="row wrap"))
+        super().__init__([row, self.force, self.towards, buttons])
 
     def push(self) -> None:
         """Push all of them now, for 0.1 s."""
