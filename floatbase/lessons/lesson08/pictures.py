@@ -154,5 +154,5 @@ class PushTogether(widgets.VBox):
 
 
 def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:
-    layout = widgets.Layout(width="60%")
+    layout = widgets.Layout(width="60%", min_width="min(340px, 100% - 4px)")
     return widgets.FloatSlider(value=first, min=low, max=high, step=step, description=text, readout_format=".0f", layout=layout)
