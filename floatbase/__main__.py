@@ -64,7 +64,7 @@ def _again(given: Sequence[str], asked: int, port: int) -> str:
 
 
 def start_when_seen(page: Playground, ended: threading.Event) -> None:
-    """Let the robot run once a browser shows it, so that nobody finds it fallen, or paused for want of a reader."""
+    """Let the robot run once a page is connected, so that nobody finds it fallen, or paused for want of a reader."""
     while not (page.view.window.browsers or ended.wait(_LOOK)):
         pass
     if not ended.is_set():

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 
 from floatbase._arrays import Value
 from floatbase.dynamics import Contacts
+from floatbase.errors import FloatbaseError
 from floatbase.playground.equation import EQUATION
-from floatbase.robots import Robot, catalogue
+from floatbase.robots import Robot, load
 from floatbase.simulation import Push
 
 GAITS = {4: {"trot": "Gait.trot", "crawl": "Gait.crawl"}, 2: {"walk": "Gait.walk"}}  # by number of feet
@@ -188,13 +191,18 @@ _IMPORTS = (
 )
 
 
+@lru_cache(maxsize=8)
 def _loaded(robot: Robot) -> str:
-    """The call that loads a robot: one that is no robot of the package's comes from the file that its name tells."""
-    if robot.name in catalogue():
-        return f"fb.load({robot.name!r})"
+    """The call that loads a robot: one that `load` does not give comes from the file that its name tells.
+
+    Limits of one's own, locked joints and feet of several radii are not told.
+    """
+    with suppress(FloatbaseError):
+        if load(robot.name) == robot:
+            return f"fb.load({robot.name!r})"
     given = [repr(f"{robot.name}.urdf"), *([] if robot.is_floating else ["floating=False"])]
     if robot.feet:
-        given += [f"feet={[foot.frame for foot in robot.feet]}", f"foot_radius={robot.feet[0].radius:g}"]
+        given += [f"feet={[foot.frame for foot in robot.feet]}", f"foot_radius={robot.feet[0].radius!r}"]
     return f"fb.load_urdf({', '.join(given)})"
 
 

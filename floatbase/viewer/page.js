@@ -137,22 +137,19 @@ function startCamera(viewer, panel) {
   // and above it where the player would hide the feet; between the panel below and the terms of an equation
   const above = () => (part("player").offsetHeight + panel.height() - (panel.height() && part("board").offsetHeight)) / 2;
 
-  // how far up of `up`, m: not with each step, but down with a robot that slides down a slope
-  const rise = (up) => Math.sign(up) * Math.max(0, Math.abs(up) - Math.abs(from.y) / 2);
-  // Go with what is followed; the scale goes with the camera. Returns whether it is still on its way.
+  // Go with what is followed, at the same height; the scale goes with the camera. Returns whether it is still on its way.
   function go() {
     const now = performance.now(), part = smooth && !anew ? 1 - Math.exp(-Math.min(now - clock, SLOWEST) / 1000 / LAG) : 1;
     clock = now;
     const found = node(path), way = new Vector3();
     if (!found) return false;
-    way.copy(found.object.getWorldPosition(new Vector3())).sub(from);
-    way.setY(rise(way.y)).sub(gone);
+    way.copy(found.object.getWorldPosition(new Vector3())).sub(from).setY(0).sub(gone);
     const step = way.clone().multiplyScalar(way.length() < REST ? 1 : part);
     gone.add(step);
     viewer.camera.position.add(step);
     viewer.controls.target.add(step);
     const scale = node(["meshcat", "scale"]);
-    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, gone.y);  // in our coordinates, z up
+    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, 0);  // in our coordinates, z up
     anew = false;
     return way.sub(step).length() > 0;
   }
@@ -315,11 +312,11 @@ function startWhenSeen(start, sight = onSight) {
   });
 }
 
-const UNSEEN = 500;  // ms in which a page draws that somebody sees
+const UNSEEN = 500;  // ms; a picture that nobody scrolls to is not drawn at all
 
-// Call once the next picture is drawn: what the window or the notebook does then must not delay it. Where nobody sees the page,
-// it does not draw.
+// Call once the next picture is drawn, or after half a second: what the window or the notebook does then must not delay it.
 function afterDrawing(call) {
+  if (document.hidden) return call();
   let late = 0, next = 0;
   const go = () => {
     clearTimeout(late);

@@ -130,14 +130,8 @@ def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
     eye, target = (_ours(set_to[name]) for name in ("position", "target"))
     follow = _setting(scene, "set_follow", {"node": ""})
     item = picture.get(follow["node"].removeprefix(ROOT))
-    gone = np.zeros(3) if item is None else _gone(item.matrix[:3, 3], _ours(follow["from"]))
+    gone = np.zeros(3) if item is None else (item.matrix[:3, 3] - _ours(follow["from"])) * [1.0, 1.0, 0.0]
     return Camera(eye + gone, target + gone, set_to["fov"], size)
-
-
-def _gone(place: Array, start: Array) -> Array:
-    """How far the camera goes with what is at `place` and was at `start`: not up and down by less than half its height."""
-    x, y, up = place - start
-    return np.array([x, y, np.sign(up) * max(0.0, abs(up) - abs(start[2]) / 2)])
 
 
 def _ours(point: Sequence[float]) -> Array:

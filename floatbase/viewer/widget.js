@@ -71,6 +71,7 @@ async function render({model, el}) {
     const channel = new MessageChannel();
     port?.close();
     port = channel.port1;
+    lost = true;  // what still comes before the new page's hello is an earlier page's
     port.onmessage = ({data: said}) => {
       if (said === DONE) tell(`{"type": "done", "number": ${++drawn}}`);
       else if (said === "hello") {
@@ -90,7 +91,7 @@ async function render({model, el}) {
     let hear = null;
     try { hear = frame.contentWindow.hear; } catch (error) { /* a frame that nobody may reach into */ }
     if (hear) hear(said);
-    else port.postMessage(said);
+    else port.postMessage(said, typeof said === "string" ? [] : [said]);
   }
   function again() {
     if (lost) return;
@@ -103,7 +104,8 @@ async function render({model, el}) {
     if (message.lost) again();
     else if (message.text) give(message.text);
     else if (message.frame && !lost) {
-      if (message.frame !== received + 1) return again();  // one got lost, so what it said must come again
+      // one got lost, so what it said must come again; before the first, those of an earlier connection may still come
+      if (message.frame !== received + 1) return received ? again() : undefined;
       received = message.frame;
       give(bytes(buffers[0]).slice().buffer);
     }

@@ -66,10 +66,11 @@ def test_a_figure_of_anything_but_forces_has_no_colour_of_a_force_or_a_cone(draw
 
 
 def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_a_colour_of_forces_or_cones() -> None:
-    _, qdd, tau, forces = lesson03.bars(np.ones(18), np.ones(12), np.ones(12)).split("<svg")[1:]
+    base, qdd, tau, forces = lesson03.bars(np.ones(18), np.ones(12), np.ones(12)).split("<svg")[1:]
     assert set(re.findall(CODE, forces)) == {hexadecimal(PLANNED)}
+    assert set(re.findall(CODE, base)) == set(re.findall(CODE, qdd))
     assert len(set(re.findall(CODE, qdd))) == len(set(re.findall(CODE, tau))) == 1
-    assert not set(re.findall(CODE, qdd + tau)) & TAKEN
+    assert not set(re.findall(CODE, base + qdd + tau)) & TAKEN
 
 
 def test_words_and_dots_of_svg_have_the_colour_of_the_page_so_that_a_dark_one_can_be_read() -> None:

@@ -55,6 +55,7 @@ def test_the_program_runs_and_makes_the_same_robot(name: str, capsys: pytest.Cap
 def test_the_program_of_a_robot_of_ones_own_loads_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "my.urdf").write_text(judges.load("solo12").urdf)
     monkeypatch.chdir(tmp_path)
+    assert "fb.load('double_pendulum')" in Settings().code(judges.load("double_pendulum"), 4e-3)
     own = fb.load_urdf("my.urdf", feet=["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"], foot_radius=0.02)
     assert run_of(Settings().code(own, 4e-3)).robot == own
 

@@ -13,7 +13,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from waiting import until
+from waiting import PATIENCE, until
 
 from floatbase.__main__ import main, start_when_seen
 from floatbase.playground import Pace, Playground
@@ -67,9 +67,11 @@ def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
         ended = Event()
         begun = other.submit(start_when_seen, playground, ended)
         try:
-            assert not begun.done() and playground.run.status == "paused" and playground.session.sim.time == 0.0
+            with pytest.raises(TimeoutError):
+                begun.result(0.3)
+            assert playground.run.status == "paused" and playground.session.sim.time == 0.0
             page.goto(playground.url)
-            begun.result(30)
+            begun.result(PATIENCE)
             until(lambda: playground.session.sim.time > 0.0)
         finally:
             ended.set()

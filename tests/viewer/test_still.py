@@ -74,9 +74,6 @@ def test_the_image_goes_with_a_robot_that_is_followed(go2: Robot, standing: Stat
     q[:2] += [2.5, 0.0]  # a whole jump of the grid
     away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
-    q[2] -= 2.0  # down a slope: still in the picture, if lower
-    middle = np.s_[:, away.shape[1] // 3 : 2 * away.shape[1] // 3]  # beside the legend
-    assert hue_pixels(image(viewer.show(State(go2, q)))[middle], COM) > 0.25 * hue_pixels(away[middle], COM) > 10
     viewer.close()
 
 

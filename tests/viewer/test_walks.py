@@ -236,7 +236,7 @@ def moved(state: State, x: float, y: float, z: float = 0.0) -> State:
     return State(state.robot, q)
 
 
-def test_a_live_picture_is_followed_smoothly_and_the_scale_comes_along(
+def test_a_live_picture_is_followed_smoothly_at_one_height_and_the_scale_comes_along(
     page, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
     page.set_viewport_size(SMALL)
@@ -262,10 +262,6 @@ def test_a_live_picture_is_followed_smoothly_and_the_scale_comes_along(
         page.reload()  # a page that comes later looks at the robot where it is
         settle(page, "gone")
         np.testing.assert_allclose(page.evaluate(TARGET), after, atol=SEEN)
-        viewer.show(moved(standing, 1.0, 0.5, -2.0), contacts, forces, title="down a slope")
-        settle(page, "down a slope")
-        free = standing.frame_pose("base").translation[2] / 2
-        assert page.evaluate(TARGET)[1] == pytest.approx(before[1] - 2.0 + free, abs=SEEN)
         viewer.camera("left", follow=False)
         viewer.show(moved(standing, 2.0, 0.5), contacts, forces, title="left behind")
         settle(page, "left behind")
