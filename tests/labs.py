@@ -18,6 +18,12 @@ LONG = 90.0  # s that a busy machine may take for anything; nothing is taken for
 
 NOTEBOOK = "jupyterapp.shell.currentWidget"
 KERNEL_CONNECTED = f"() => {NOTEBOOK}?.sessionContext?.session?.kernel?.connectionStatus === 'connected'"
+KERNEL = f"{NOTEBOOK}.sessionContext.session.kernel"
+# longer than anything here waits
+WORK = f"""() => {{
+  window.works = true;
+  {KERNEL}.requestExecute({{code: "import time; time.sleep(300)"}}).done.finally(() => {{ window.works = false; }});
+}}"""
 CELLS = f"{NOTEBOOK}.content.widgets.map(w => w.model).filter(m => m.type === 'code')"
 FIRST_RAN = f"() => {CELLS}[0].executionCount !== null"
 ALL_RAN = f"() => {CELLS}.every(m => m.executionCount !== null && m.executionState !== 'running')"
@@ -168,6 +174,17 @@ def push_until_it_falls(page: Any, panel: Any, name: str) -> None:
             break
         panel.get_by_role("button", name="push", exact=True).click()
     screenshot(page, f"{name}_fallen")
+
+
+def is_heard_while_the_kernel_works(page: Any, panel: Any) -> None:
+    """Put the fallen robot of a panel back on its feet while the kernel runs something else."""
+    frame = picture_in(panel)
+    lying = frame.evaluate(HEIGHT)
+    page.evaluate(WORK)
+    panel.get_by_role("button", name="reset", exact=True).click()
+    frame.wait_for_function(f"({HEIGHT})() > {1.5 * lying}")
+    assert page.evaluate("works")
+    page.evaluate(f"() => {{ {KERNEL}.interrupt(); }}")
 
 
 def _move(page: Any, handle: Any) -> None:

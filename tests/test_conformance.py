@@ -228,7 +228,7 @@ LEFT_OUT = {
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
         "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
-        "recording.checked_rollout", "Ground.clearances", "with_image",
+        "recording.checked_rollout", "Ground.clearances", "with_image", "hear_at_once",
     ),
     "needs trimesh": ("urdf_visuals",),
     "draws what it is given": ("Viewer.draw", "Viewer.play_pictures", "below", "hexadecimal", "robot_meshes", "appearance"),

@@ -27,6 +27,7 @@ from labs import (
     WINDOW,
     address_in,
     answers_to_sliders,
+    is_heard_while_the_kernel_works,
     lesson_opened,
     only,
     push_panel_of,
@@ -116,6 +117,7 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
         assert answers_to_sliders(page, name) >= MOVES[name]
         if name == LESSONS[0]:
             push_until_it_falls(page, push_panel_of(page), "00")
+            is_heard_while_the_kernel_works(page, push_panel_of(page))
         assert strangers == []
         page.evaluate(SAVE)
         _change(course / f"{name}.ipynb")

@@ -16,7 +16,7 @@ import ipywidgets as widgets
 from floatbase.errors import FloatbaseError
 from floatbase.lessons.stops import DIRECTIONS, computed, recorded_pushes
 from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
-from floatbase.viewer import Viewer, published, push_at, with_image
+from floatbase.viewer import Viewer, hear_at_once, published, push_at, with_image
 
 _NARROW = "min(340px, 100% - 4px)"  # width below which nothing of a slider is left but its name and its number
 _LETTER, _NAME = 0.55, 10.4  # em: of a letter of a slider's name, at most on average; of a name where the page is narrow
@@ -243,6 +243,7 @@ class _Line(widgets.Label):
 def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:
     made = widgets.Button(description=text, layout=widgets.Layout(width="6em", flex="0 0 auto"))
     made.on_click(pressed)
+    hear_at_once(made)
     return made
 
 

@@ -7,6 +7,7 @@ and compasses, and `FIGURES` are the document's figures. `page`, `published` and
 
 from floatbase.viewer import geometry, marks, page, plots, programs, props, published, recording, roses, shapes, walks, wire
 from floatbase.viewer.camera import PRESETS, View
+from floatbase.viewer.cells import hear_at_once
 from floatbase.viewer.colours import (
     ALARM,
     BACKGROUNDS,
@@ -62,6 +63,7 @@ __all__ = [
     "appearance",
     "below",
     "geometry",
+    "hear_at_once",
     "hexadecimal",
     "marks",
     "page",

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 
 class Cells:
@@ -39,3 +40,11 @@ class Cells:
 
     def _end(self, _: object) -> None:
         self.runs, self.ended = False, time.monotonic()
+
+
+def hear_at_once(widget: Any) -> None:
+    """Let a new widget be heard while a cell runs too, where the notebook asks for it, by a subshell of the kernel.
+
+    ipykernel 7.4 gives a page's messages to the thread that opened the widget, and not to the one that the page asks for.
+    """
+    getattr(widget.comm, "__dict__", {}).pop("_reply_subshell_id", None)

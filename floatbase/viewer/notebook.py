@@ -20,6 +20,7 @@ import anywidget
 import traitlets
 
 from floatbase.viewer import page
+from floatbase.viewer.cells import hear_at_once
 from floatbase.viewer.connection import Connection, Line
 from floatbase.viewer.server import Server
 
@@ -45,9 +46,7 @@ class NotebookPicture(anywidget.AnyWidget):
         super().__init__(version=_packed()[0], name=name, height=height, still=still)
         self._to = _Display(self, server, display)
         self.on_msg(self._to.hear)
-        # ipykernel 7.4 gives a page's messages to the thread that opened the widget, and not to the one that the page asks for:
-        # a page that a running cell displays would be heard when the cell has ended
-        getattr(self.comm, "__dict__", {}).pop("_reply_subshell_id", None)
+        hear_at_once(self)
 
 
 class _Display:
