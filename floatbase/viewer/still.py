@@ -105,10 +105,14 @@ def beside(files: Sequence[bytes]) -> bytes:
 def with_image(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """What a notebook stores of a widget, and beside it an image of the pictures in it, for wherever no widget can be.
 
-    bundle: of the widget, as `_repr_mimebundle_` returns it. pictures: widgets of viewers.
+    bundle: of the widget, as `_repr_mimebundle_` returns it.
+    pictures: widgets of viewers. Those that hold a copy of a scene as HTML (`FLOATBASE_VIEWER=static`) are stored as that copy.
     """
     data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
-    files = [picture.still for picture in pictures if getattr(picture, "still", b"")]  # a scene that needs no kernel has none
+    scenes = [picture.value for picture in pictures if not hasattr(picture, "still")]
+    if scenes:
+        data = {**data, "text/html": "".join(scenes)}
+    files = [picture.still for picture in pictures if getattr(picture, "still", b"")]
     if files:
         data = {**data, "image/png": base64.b64encode(beside(files) if len(files) > 1 else files[0]).decode()}
     return data, metadata

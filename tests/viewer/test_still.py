@@ -84,3 +84,12 @@ def test_several_pictures_of_a_panel_are_one_image(viewer: Viewer, standing: Sta
     both = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
     assert both.width == 2 * Image.open(io.BytesIO(one.still)).width
     assert with_image({"text/plain": "x"}) == ({"text/plain": "x"}, {})
+
+
+def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(
+    viewer: Viewer, standing: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLOATBASE_VIEWER", "static")
+    copy = viewer.show(standing).widget()
+    assert "<iframe" in copy.value
+    assert with_image({"text/plain": "x"}, copy) == ({"text/plain": "x", "text/html": copy.value}, {})
