@@ -7,6 +7,8 @@ import base64
 import json
 import queue
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -133,6 +135,8 @@ class Notebook:
         self.sizes: list[int] = []
         self.lose = 0
         self.sockets: dict[str, list[_Comm]] = {}
+        self._said: list[tuple[Any, Any]] | None = None
+        self._newest: tuple[str, dict[str, Any], list[bytes]] | None = None
         self._loop = asyncio.new_event_loop()
         self._listening = tornado.netutil.bind_sockets(0, "127.0.0.1")
         self.url = f"http://127.0.0.1:{self._listening[0].getsockname()[1]}/"
@@ -160,11 +164,33 @@ class Notebook:
 
     def _send(self, name: str, content: dict[str, Any], buffers: list[bytes]) -> None:
         self.sizes += map(len, buffers)
-        if "frame" in content and self.lose:
-            self.lose -= 1
-            return
+        if "frame" in content:
+            self._newest = name, content, buffers
+            if self.lose:
+                self.lose -= 1
+                return
         text = json.dumps({"content": content, "buffers": [base64.b64encode(data).decode() for data in buffers]})
         self._loop.call_soon_threadsafe(lambda: [socket.write_message(text) for socket in self.sockets.get(name, [])])
+
+    def send_again(self) -> None:
+        """Send the newest frame once more."""
+        assert self._newest is not None
+        self._send(*self._newest)
+
+    def hear(self, widget: Any, content: Any) -> None:
+        """Have a message of a page heard, now or later."""
+        if self._said is None:
+            hear(widget, content)
+        else:
+            self._said.append((widget, content))
+
+    @contextmanager
+    def deaf(self) -> Iterator[list[tuple[Any, Any]]]:
+        """A while in which nothing is heard of pages, as by a kernel that runs a cell; what they say is heard afterwards."""
+        said = self._said = []
+        yield said
+        self._said = None
+        self._loop.call_soon_threadsafe(lambda: [hear(*each) for each in said])
 
     def end(self) -> None:
         """End the connections, as a kernel that has gone."""
@@ -207,7 +233,7 @@ class _Comm(tornado.websocket.WebSocketHandler):
         self.notebook.sockets.setdefault(self.name, []).append(self)
 
     def on_message(self, message: str | bytes) -> None:
-        hear(self.notebook.widgets[self.name], json.loads(message))
+        self.notebook.hear(self.notebook.widgets[self.name], json.loads(message))
 
     def on_close(self) -> None:
         self.notebook.sockets[self.name].remove(self)

@@ -41,6 +41,11 @@ COUNTED = """() => {
     return post.apply(this, given);
   };
 }"""
+# how often pages of pictures have loaded
+LOADS = """() => {
+  window.loads = 0;
+  window.addEventListener("message", ({data}) => { window.loads += data?.ready ? 1 : 0; });
+}"""
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 
 
@@ -288,6 +293,27 @@ def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_
     assert frames[0].evaluate("!viewer.scene_tree.find(['meshcat']).children.com?.children.ball")
     for view in (viewer, *others):
         view.close()
+
+
+def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes(
+    notebook: Notebook, page: Any, viewer: Viewer, standing: State
+) -> None:
+    viewer.show(standing)
+    frame = notebook.show(page, viewer.widget())
+    frame.wait_for_function(DRAWN)
+    viewer.show(standing, title="the second frame")
+    frame.wait_for_function("document.getElementById('title').textContent == 'the second frame'")
+    page.evaluate(LOADS)
+    with notebook.deaf() as said:
+        page.evaluate("() => document.body.append(document.querySelector('.output'))")
+        until(lambda: [content for _, content in said if content["say"] == "hello"])
+        for _ in range(20):
+            notebook.send_again()
+            time.sleep(0.05)
+        assert page.evaluate("loads") == 1
+    frame = page.locator(".output iframe").element_handle().content_frame()
+    frame.wait_for_function("document.getElementById('title').textContent == 'the second frame'")
+    assert page.evaluate("loads") == 1
 
 
 @pytest.mark.parametrize(("address", "reached"), [("", True), ("sealed", False)])
