@@ -24,6 +24,11 @@ class Plane(NamedTuple):
     normal: tuple[float, float, float]
     offset: float = 0.0
 
+    @property
+    def planes(self) -> tuple[Plane, ...]:
+        """This plane alone, as `Planes` has several."""
+        return (self,)
+
     def height(self, point: Array) -> float:
         """z of the plane, m, below or above a point, shape (3,), m."""
         x, y, z = self.normal
@@ -50,6 +55,12 @@ class Planes(NamedTuple):
 
 
 LEVEL = Plane((0.0, 0.0, 1.0))
+
+
+def way(ground: Plane | Planes, start: Array, end: Array) -> Array:
+    """From one place to another, shapes (3,), m, and as much up or down as the ground between them."""
+    x, y = (end - start)[:2]
+    return np.array([x, y, ground.height(end) - ground.height(start)])
 
 
 def plane_under(normals: Array, positions: Array) -> Plane:

@@ -18,6 +18,7 @@ function startViewer() {
   const commands = {
     set_camera: camera.look,
     set_follow: camera.follow,
+    set_ground: camera.ground,
     set_views: manners.views,
     set_title: (command) => {
       part("title").textContent = command.text;
@@ -129,7 +130,7 @@ function startCamera(viewer, panel) {
   const {Vector3} = MeshCat.THREE;
   // how far the camera has gone with what it follows, and how far that was from its place at home when the camera was set
   const gone = new Vector3(), begin = new Vector3();
-  let path = [], from = new Vector3(), smooth = false, anew = true, clock = 0;
+  let path = [], from = new Vector3(), planes = [{normal: [0, 1, 0], offset: 0}], smooth = false, anew = true, clock = 0;
   // searched each time, because another picture has another object there, or none
   const node = (names) => names.reduce((at, name) => at && at.children[name], viewer.scene_tree);
   // while the panel is open, the middle of the picture is left of it by so many pixels
@@ -137,19 +138,24 @@ function startCamera(viewer, panel) {
   // and above it where the player would hide the feet; between the panel below and the terms of an equation
   const above = () => (part("player").offsetHeight + panel.height() - (panel.height() && part("board").offsetHeight)) / 2;
 
-  // Go with what is followed, at the same height; the scale goes with the camera. Returns whether it is still on its way.
+  // m: of the ground, below or above a place
+  const height = ({x, z}) =>
+    Math.max(...planes.map(({normal, offset}) => (offset - normal[0] * x - normal[2] * z) / normal[1]));
+
+  // Go with what is followed, at one height over the ground; the scale goes along. Returns whether it is still on its way.
   function go() {
     const now = performance.now(), part = smooth && !anew ? 1 - Math.exp(-Math.min(now - clock, SLOWEST) / 1000 / LAG) : 1;
     clock = now;
-    const found = node(path), way = new Vector3();
+    const found = node(path);
     if (!found) return false;
-    way.copy(found.object.getWorldPosition(new Vector3())).sub(from).setY(0).sub(gone);
+    const at = found.object.getWorldPosition(new Vector3());
+    const way = at.clone().sub(from).setY(height(at) - height(from)).sub(gone);
     const step = way.clone().multiplyScalar(way.length() < REST ? 1 : part);
     gone.add(step);
     viewer.camera.position.add(step);
     viewer.controls.target.add(step);
     const scale = node(["meshcat", "scale"]);
-    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, 0);  // in our coordinates, z up
+    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, begin.y + gone.y);  // in our coordinates, z up
     anew = false;
     return way.sub(step).length() > 0;
   }
@@ -187,6 +193,7 @@ function startCamera(viewer, panel) {
       gone.set(0, 0, 0);
       anew = true;
     },
+    ground(command) { planes = command.planes; },
     follow(command) {
       path = names(command.node);
       from.fromArray(command.from);

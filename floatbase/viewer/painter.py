@@ -135,7 +135,12 @@ class Painter:
 
     def stage(self) -> Picture:
         """A picture of the ground alone."""
-        return {"ground": (self.ground or LEVEL).lines(self.lines)}
+        return {"ground": self.floor.lines(self.lines)}
+
+    @property
+    def floor(self) -> Plane | Planes:
+        """The ground that was given, or level ground."""
+        return self.ground or LEVEL
 
     @cached_property
     def home(self) -> State:
@@ -308,7 +313,7 @@ class Painter:
 
     def _ground(self, contacts: Contacts | None, positions: Array) -> Plane | Planes:
         if self.ground is not None or contacts is None:
-            return self.ground or LEVEL
+            return self.floor
         return plane_under(contacts.normals, positions)
 
     def _check_state(self, state: Any) -> None:

@@ -19,6 +19,7 @@ from PIL import Image, ImageDraw
 from floatbase._arrays import Array
 from floatbase.viewer.canvas import ROOT
 from floatbase.viewer.colours import BACKGROUNDS, RGB, hexadecimal
+from floatbase.viewer.ground import LEVEL, Plane, Planes, way
 from floatbase.viewer.lowering import Shape
 from floatbase.viewer.scene import Scene
 from floatbase.viewer.shapes import Item, Picture
@@ -129,13 +130,18 @@ def _setting(scene: Scene, kind: str, default: dict[str, Any]) -> dict[str, Any]
 
 
 def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
-    """The camera where it was set, gone with what it follows."""
+    """The camera where it was set, gone with what it follows, at the same height over the ground."""
     set_to = _setting(scene, "set_camera", {"position": [2.0, 1.0, 0.0], "target": [0.0, 0.0, 0.0], "fov": 32.0})
     eye, target = (_ours(set_to[name]) for name in ("position", "target"))
     follow = _setting(scene, "set_follow", {"node": ""})
     item = picture.get(follow["node"].removeprefix(ROOT))
-    gone = np.zeros(3) if item is None else (item.matrix[:3, 3] - _ours(follow["from"])) * [1.0, 1.0, 0.0]
+    gone = np.zeros(3) if item is None else way(_ground(scene), _ours(follow["from"]), item.matrix[:3, 3])
     return Camera(eye + gone, target + gone, set_to["fov"], size)
+
+
+def _ground(scene: Scene) -> Plane | Planes:
+    planes = _setting(scene, "set_ground", {"planes": []})["planes"]
+    return Planes(tuple(Plane(tuple(_ours(plane["normal"])), plane["offset"]) for plane in planes)) if planes else LEVEL
 
 
 def _ours(point: Sequence[float]) -> Array:

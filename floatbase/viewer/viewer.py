@@ -22,7 +22,7 @@ from floatbase.viewer.camera import PRESETS, View, target_and_eye
 from floatbase.viewer.canvas import ROOT, Canvas
 from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.controls import Controls
-from floatbase.viewer.ground import LEVEL, STEEPEST, Plane, Planes
+from floatbase.viewer.ground import STEEPEST, Plane, Planes, way
 from floatbase.viewer.painter import Painter, below, kinds
 from floatbase.viewer.shapes import Item, Picture
 from floatbase.viewer.window import Window
@@ -105,6 +105,7 @@ class Viewer(Controls):
     def stand_on(self, ground: Ground | npt.ArrayLike | None) -> None:
         """Draw another ground from the next picture on. ground: as for the viewer."""
         self.painter = self.painter.replace(ground=_ground(ground))
+        self.canvas.set(wire.set_ground(self.painter.floor.planes))
 
     def show(
         self,
@@ -204,7 +205,7 @@ class Viewer(Controls):
 
     @property
     def _look(self) -> walks.Look:
-        return walks.Look(self.painter.size, self.painter.ground or LEVEL, self.painter.text)
+        return walks.Look(self.painter.size, self.painter.floor, self.painter.text)
 
     def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
         """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove everything else."""
@@ -239,7 +240,7 @@ class Viewer(Controls):
         planned: whether to draw the planned forces too.
         com, cones, support, ghost, title, ghost_name: as for `show`.
         steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step` makes them.
-        follow: whether the camera goes with the robot, smoothly and at its own height; afterwards, too.
+        follow: whether the camera goes with the robot, smoothly and at one height over the ground; afterwards, too.
         paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
@@ -292,7 +293,8 @@ class Viewer(Controls):
     def camera(self, view: str | View = "default", follow: bool | None = None) -> Viewer:
         """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`.
 
-        follow: whether the camera goes with the robot when it walks away, smoothly and at its own height; None leaves it so.
+        follow: whether the camera goes with the robot when it walks away, smoothly and at one height over the ground; None
+            leaves it so.
         Every call undoes how the reader has turned the view, so do not call it each time a slider moves.
         Raises `InputError` for another name.
         """
@@ -324,9 +326,9 @@ class Viewer(Controls):
 
     @property
     def _moved(self) -> Array:
-        """How far the robot is from where it stands at home, (3,), m, horizontally."""
-        away = np.zeros(3) if self._last is None else self._last.com - self.painter.home.com
-        return np.array([*away[:2], 0.0])
+        """How far the robot is from where it stands at home, (3,), m, along the ground."""
+        home, now = self.painter.home.com, (self._last or self.painter.home).com
+        return way(self.painter.floor, home, now)
 
     def save(self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)) -> Path:
         """Write the scene to a file, by its name's ending, and return its path.
@@ -410,6 +412,7 @@ class Viewer(Controls):
             wire.set_property("/Grid", "visible", False),
             wire.set_property("/Axes", "visible", False),
             wire.page_command("set_theme", name=background),
+            wire.set_ground(self.painter.floor.planes),
         )
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[wire.Update, wire.Update]:

@@ -25,7 +25,7 @@ Update = tuple[Key, bytes]
 TYPES = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "delete_control",
     "set_control", "move_control", "set_camera", "set_follow", "set_title", "set_legend", "set_theme", "set_kept",
-    "set_text", "set_strip", "set_views", "set_ending",
+    "set_text", "set_strip", "set_views", "set_ending", "set_ground",
 )  # fmt: skip
 
 ANIMATION: Key = ("/", "set_animation", "")
@@ -94,7 +94,7 @@ def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> 
 
 
 def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bool) -> Update:
-    """Let the camera go with the object at the path `node`, at the same height; "" for none.
+    """Let the camera go with the object at the path `node`, at the same height over the ground; "" for none.
 
     start: (3,), m, world, where the object was when the camera was set.
     begin: (3,), m, how far that is from where it is at home; the scale goes there, too.
@@ -102,6 +102,12 @@ def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bo
     """
     at, moved = _upright(start), _upright(begin)
     return encode({"type": "set_follow", "path": "", "node": node, "from": at, "begin": moved, "smooth": smooth})
+
+
+def set_ground(planes: Iterable[tuple[npt.ArrayLike, float]]) -> Update:
+    """The ground, for the height of a camera that follows. planes: normals, (3,), unit, world, upwards; and offsets, m."""
+    upright = [{"normal": _upright(normal), "offset": offset} for normal, offset in planes]
+    return encode({"type": "set_ground", "path": "", "planes": upright})
 
 
 def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:

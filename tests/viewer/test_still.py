@@ -67,11 +67,12 @@ def test_the_image_of_any_robot_is_small(name: str) -> None:
     viewer.close()
 
 
-def test_the_image_goes_with_a_robot_that_is_followed(go2: Robot, standing: State) -> None:
-    viewer = Viewer(go2, follow=True)
+@pytest.mark.parametrize("slope", [0.0, 0.4])
+def test_the_image_goes_with_a_robot_that_is_followed(go2: Robot, standing: State, slope: float) -> None:
+    viewer = Viewer(go2, ground=[np.sin(slope), 0.0, np.cos(slope)], follow=True)
     at_home = image(viewer.show(standing))
     q = standing.q.copy()
-    q[:2] += [2.5, 0.0]  # a whole jump of the grid
+    q[:3] += 2.5 * np.array([np.cos(slope), 0.0, -np.sin(slope)])  # a whole jump of the grid, down the slope
     away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
     viewer.close()

@@ -236,17 +236,19 @@ def moved(state: State, x: float, y: float, z: float = 0.0) -> State:
     return State(state.robot, q)
 
 
-def test_a_live_picture_is_followed_smoothly_at_one_height_and_the_scale_comes_along(
-    page, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_the_scale_comes_along(
+    page, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, slope: float
 ) -> None:
     page.set_viewport_size(SMALL)
-    viewer = Viewer(go2, follow=True)
+    viewer = Viewer(go2, ground=[-np.sin(slope), 0.0, np.cos(slope)], follow=True)
+    rise = float(np.tan(slope))  # m, of the ground over one metre forwards
     try:
         viewer.show(standing, contacts, forces, title="begin")
         page.goto(viewer.url)
         settle(page, "begin")
         before, bar = page.evaluate(TARGET), page.evaluate(BAR)
-        viewer.show(moved(standing, 1.0, 0.5, 0.1), contacts, forces, title="gone")
+        viewer.show(moved(standing, 1.0, 0.5, rise + 0.1), contacts, forces, title="gone")
         ways = page.evaluate("""() => new Promise((resolve) => {
           const seen = [], look = () => {
             seen.push(viewer.controls.target.x);
@@ -256,12 +258,15 @@ def test_a_live_picture_is_followed_smoothly_at_one_height_and_the_scale_comes_a
           look();
         })""")
         assert (np.diff(ways) >= 0.0).all() and len({round(x, 3) for x in ways}) > 4  # on its way, not at once
-        np.testing.assert_allclose(np.subtract(page.evaluate(TARGET), before), [1.0, 0.0, -0.5], atol=SEEN)
-        np.testing.assert_allclose(np.subtract(page.evaluate(BAR), bar), [1.0, 0.5, 0.0], atol=SEEN)
+        np.testing.assert_allclose(np.subtract(page.evaluate(TARGET), before), [1.0, rise, -0.5], atol=SEEN)
+        np.testing.assert_allclose(np.subtract(page.evaluate(BAR), bar), [1.0, 0.5, rise], atol=SEEN)
         after = page.evaluate(TARGET)
         page.reload()  # a page that comes later looks at the robot where it is
         settle(page, "gone")
         np.testing.assert_allclose(page.evaluate(TARGET), after, atol=SEEN)
+        viewer.camera("left")
+        page.wait_for_function("!viewer.needs_render")
+        assert page.evaluate(TARGET)[1] == pytest.approx(before[1] + rise, abs=SEEN)
         viewer.camera("left", follow=False)
         viewer.show(moved(standing, 2.0, 0.5), contacts, forces, title="left behind")
         settle(page, "left behind")
