@@ -16,7 +16,8 @@ class Scene:
     """The newest command of every key, each with the number of the change that brought it.
 
     A page that has seen change n is brought up to date by `since(n)`, whatever it missed. Any thread may write. A change is
-    one assignment under a lock, so an interrupt during a write loses at most that write.
+    one assignment under a lock, so an interrupt during a write loses at most that write. No loop stands under the lock itself:
+    where a loop jumps back from an `if`, Python 3.12 and 3.13 leave the lock locked when an interrupt comes just there.
     """
 
     def __init__(self) -> None:
@@ -28,12 +29,7 @@ class Scene:
     def put(self, updates: Iterable[Update]) -> int:
         """Store updates and return the number of the last one. Readers see all of them or none."""
         with self._lock:
-            for key, command in updates:
-                self.newest += 1
-                self._entries[key] = (self.newest, command)
-                if key[1] == "delete":
-                    self._forget_below(key[0], self.newest)
-            return self.newest
+            return self._store(updates)
 
     def move_control(self, name: object, value: Any, page: str) -> Any:
         """Store the value that a page reports for a control, for all pages to show, and return it as the control allows it.
@@ -52,9 +48,8 @@ class Scene:
     def since(self, number: int) -> tuple[int, list[bytes]]:
         """The number of the newest change, and in order the commands that came after change `number`."""
         with self._lock:
-            newest = self.newest
-            entries = [entry for entry in self._entries.values() if entry[0] > number]
-        return newest, [command for _, command in sorted(entries)]
+            newest, entries = self.newest, list(self._entries.values())
+        return newest, [command for _, command in sorted(entry for entry in entries if entry[0] > number)]
 
     def copy(self) -> Scene:
         """A copy that later changes do not affect. The two share their commands, so a copy is small."""
@@ -112,6 +107,14 @@ class Scene:
         with self._lock:
             entries = sorted((number, key, command) for key, (number, command) in self._entries.items())
         return [(key, command) for _, key, command in entries if not _is_deletion(key)]
+
+    def _store(self, updates: Iterable[Update]) -> int:
+        for key, command in updates:
+            self.newest += 1
+            self._entries[key] = (self.newest, command)
+            if key[1] == "delete":
+                self._forget_below(key[0], self.newest)
+        return self.newest
 
     def _forget_below(self, path: str, number: int) -> None:
         """Drop the entries that the deletion `number` of `path` makes void, and deletions that every page has carried out."""

@@ -6,13 +6,14 @@ import _thread
 import asyncio
 import json
 import os
+import signal
 import socket
 import struct
 import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,9 @@ from waiting import PATIENCE, until
 from floatbase.errors import FloatbaseError, ViewerError
 from floatbase.robots import State
 from floatbase.viewer import Viewer, Window, wire
+from floatbase.viewer.scene import Scene
+
+UPDATES = [wire.set_transform(f"/meshcat/{i}", np.eye(4)) for i in range(100)]
 
 
 def window_threads() -> list[threading.Thread]:
@@ -293,6 +297,25 @@ def test_threads_draw_at_the_same_time(window: Window) -> None:
         thread.join()
     assert {command["matrix"][0] for command in window.scene.commands().values()} == {499.0}
     assert window.scene.newest == 8 * 500
+
+
+@pytest.mark.parametrize("use", [lambda scene: scene.put(UPDATES), lambda scene: scene.since(0)], ids=["put", "since"])
+def test_an_interrupt_never_leaves_a_scene_locked(use: Callable[[Scene], Any]) -> None:
+    scene, interrupted = Scene(), 0
+    scene.put(UPDATES)
+    before = signal.signal(signal.SIGVTALRM, signal.default_int_handler)
+    try:
+        while interrupted < 200:
+            signal.setitimer(signal.ITIMER_VIRTUAL, 1e-4)  # s of this process; in fact at the next tick of the kernel's clock
+            try:
+                while True:
+                    use(scene)
+            except KeyboardInterrupt:
+                interrupted += 1
+            assert not scene._lock.locked()
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
 
 
 def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) -> None:
