@@ -1,6 +1,14 @@
 // The picture in a notebook, as anywidget loads it: a frame that holds floatbase's page, and the messages between it and the
 // kernel. The page's code comes once for all pictures of this page of the notebook.
 
+// Notebook 7 takes the arrow keys of a slider, to go from heading to heading; JupyterLab leaves them to the slider.
+if (!globalThis.floatbaseCodes) {
+  const suppress = "data-lm-suppress-shortcuts";
+  window.addEventListener("keydown", ({target, key}) => {
+    if (target.matches?.(".noUi-handle")) target.toggleAttribute(suppress, /^(Arrow|Page|Home|End)/.test(key));
+  }, true);
+}
+
 const codes = (globalThis.floatbaseCodes ??= new Map());  // version -> promise of {html, viewer}
 const PATIENCE = 20000;  // ms; then each picture asks for the code itself: the one that had asked may be gone
 const DONE = '{"type": "done"}';

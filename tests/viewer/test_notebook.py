@@ -332,6 +332,22 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
     assert (page.evaluate("posted") == 0) == reached
 
 
+def test_keys_that_move_a_slider_are_no_shortcuts_of_the_notebook(notebook: Notebook, page: Any, viewer: Viewer) -> None:
+    notebook.show(page, viewer.widget())
+    page.evaluate("""() => {
+      const slider = document.createElement("div");
+      slider.className = "noUi-handle";
+      slider.tabIndex = 0;
+      document.body.append(slider);
+      slider.focus();
+    }""")
+    suppressed = {}
+    for key in ("ArrowLeft", "ArrowUp", "PageDown", "Home", "Shift+Enter", "End", "a"):
+        page.keyboard.press(key)
+        suppressed[key] = page.evaluate("document.activeElement.hasAttribute('data-lm-suppress-shortcuts')")
+    assert [key for key, is_no_shortcut in suppressed.items() if not is_no_shortcut] == ["Shift+Enter", "a"]
+
+
 @pytest.mark.parametrize("how", ["kernel", "window"])
 def test_a_picture_stays_when_its_kernel_or_its_window_has_gone_and_says_so(
     notebook: Notebook, page: Any, viewer: Viewer, standing: State, how: str
