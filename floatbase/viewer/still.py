@@ -1,7 +1,7 @@
 """A picture as an image, drawn without a browser: for notebooks that are read where nothing runs.
 
-It looks like the page's, more plainly: one light, no gloss, no shadows, lines always behind. Drawing takes about a tenth of a
-second.
+It looks like the page's, more plainly: one light, no gloss, no shadows, lines always behind. Drawing takes some tenths of
+a second.
 """
 
 from __future__ import annotations
@@ -225,8 +225,9 @@ def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
     seen[:, 2] = -1.0 / np.maximum(seen[:, 2], NEAR)  # linear over a triangle in the image, as the distance is not
     corners = np.concatenate([seen, colours], axis=1)[mesh.faces[ahead]].astype(np.float32)
     corners, low, sides = _split(corners, camera.size)
-    for wide, tall in np.unique(sides, axis=0).tolist():
-        rows = np.flatnonzero((sides == (wide, tall)).all(axis=1))
+    kinds = sides @ (_PIECE + 1, 1)  # one number for both sides
+    for kind in np.unique(kinds).tolist():
+        rows, (wide, tall) = np.flatnonzero(kinds == kind), divmod(kind, _PIECE + 1)
         step = max(_AT_ONCE // (wide * tall), 1)
         for part in (rows[i : i + step] for i in range(0, len(rows), step)):
             yield _filled(corners[part], low[part], (wide, tall), camera.size)
