@@ -187,7 +187,7 @@ def test_no_port_of_a_students_kernel_tells_anything(hub: Hub, class_: list[Stud
         assert len(ports) <= 1  # ipykernel's own, which only receives: what processes print that cells have started
         for port in ports:
             with pytest.raises((OSError, HTTPException)):
-                urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5.0)
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=2.0)
 
 
 def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student]) -> None:
@@ -230,7 +230,7 @@ def test_lesson_03_moves_its_robot_arrows_and_veil(hub: Hub, class_: list[Studen
         lesson_opened(page)
         run_all(page)
         ran_without_error(page)
-        assert answers_to_sliders(page, SPACE) >= {"robot", "ghost", "planned"}
+        assert answers_to_sliders(page, SPACE, most=1) >= {"robot", "ghost", "planned"}
         assert strangers == []
     finally:
         screenshot(page, "03_on_a_hub")
