@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import _thread
 import asyncio
 import json
 import os
@@ -13,8 +12,9 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -298,26 +298,48 @@ def test_threads_draw_at_the_same_time(window: Window) -> None:
     assert window.scene.newest == 8 * 500
 
 
+@contextmanager
+def interrupting(timer: int) -> Iterator[Callable[[Callable[[], object], float], bool]]:
+    """A function that repeats another until it is interrupted, a while (s) later as a timer of the signal module measures it.
+
+    It says whether the interrupt came: Python drops one that falls into a destructor.
+    """
+
+    def repeat(use: Callable[[], object]) -> None:  # not in the `try`: where a loop jumps back, Python 3.13 leaves it uncaught
+        stop = time.monotonic() + 1.0
+        while time.monotonic() < stop:
+            use()
+
+    def interrupted(use: Callable[[], object], delay: float) -> bool:
+        try:
+            signal.setitimer(timer, delay)
+            repeat(use)
+        except KeyboardInterrupt:
+            return True
+        return False
+
+    number = {signal.ITIMER_REAL: signal.SIGALRM, signal.ITIMER_VIRTUAL: signal.SIGVTALRM}[timer]
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        yield interrupted
+    finally:
+        signal.setitimer(timer, 0.0)
+        signal.signal(number, before)
+
+
 @pytest.mark.parametrize("use", [lambda scene: scene.put(UPDATES), lambda scene: scene.since(0)], ids=["put", "since"])
 def test_an_interrupt_never_leaves_a_scene_locked(window: Window, use: Callable[[Any], Any]) -> None:
-    scene, interrupted = window.scene, 0
+    scene, count = window.scene, 0
     scene.put(UPDATES)
-    before = signal.signal(signal.SIGVTALRM, signal.default_int_handler)
-    try:
-        while interrupted < 200:
-            signal.setitimer(signal.ITIMER_VIRTUAL, 1e-4)  # s of this process; in fact at the next tick of the kernel's clock
-            try:
-                while True:
-                    use(scene)
-            except KeyboardInterrupt:
-                interrupted += 1
+    stop = time.monotonic() + PATIENCE
+    with interrupting(signal.ITIMER_VIRTUAL) as interrupted:
+        while count < 200 and time.monotonic() < stop:
+            count += interrupted(lambda: use(scene), 1e-4)  # in fact at the next tick of the kernel's clock
             reader = threading.Thread(target=scene.copy, daemon=True)  # waits for ever where the lock is held
             reader.start()
             reader.join(PATIENCE)
-            assert not reader.is_alive(), f"locked after {interrupted} interrupts"
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
-        signal.signal(signal.SIGVTALRM, before)
+            assert not reader.is_alive(), f"locked after {count} interrupts"
+    assert count == 200
 
 
 def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) -> None:
@@ -333,21 +355,20 @@ def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) ->
     page = threading.Thread(target=lambda: asyncio.run(follow()), daemon=True)
     page.start()
     window.wait(PATIENCE)
-    interrupted, i = 0, 0
+    drawn = count = 0
+
+    def draw() -> None:
+        nonlocal drawn
+        drawn += 1
+        window.put([wire.set_transform("/meshcat/a", np.eye(4) * drawn)])
+
     stop = time.monotonic() + PATIENCE
-    while interrupted < 50 and time.monotonic() < stop:
-        timer = threading.Timer(0.002 + 0.0001 * interrupted, _thread.interrupt_main)
-        try:
-            timer.start()
-            again = time.monotonic() + 1.0  # Python drops an interrupt that falls into a destructor
-            while time.monotonic() < again:
-                i += 1
-                window.put([wire.set_transform("/meshcat/a", np.eye(4) * i)])
-        except KeyboardInterrupt:
-            interrupted += 1
-    assert interrupted == 50
-    window.put([wire.set_transform("/meshcat/a", np.eye(4) * (i + 1))])
-    until(lambda: seen == i + 1)
+    with interrupting(signal.ITIMER_REAL) as interrupted:
+        while count < 50 and time.monotonic() < stop:
+            count += interrupted(draw, 0.002 + 0.0001 * count)
+    assert count == 50
+    draw()
+    until(lambda: seen == drawn)
 
 
 STRANGE = [
