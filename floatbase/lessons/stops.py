@@ -105,12 +105,16 @@ def _control(slider: Any, values: Sequence[float], first: int) -> Control:
 def recorded_pushes(
     titles: Mapping[str, tuple[Viewer, Simulation, Controller]], forces: Iterable[float], directions: Sequence[str]
 ) -> dict[str, Any]:
-    """The mimebundle of recorded runs, one for each force (N) in each direction, for a site.
+    """The mimebundle of recorded runs, one for each force (N) in each direction, for a site. Without a push they stand still.
 
-    titles: what stands above each picture -> its viewer, as it is before any push, and what runs in it.
+    titles: what stands above each picture -> its viewer, and what runs in it.
     """
     sizes, views = tuple(forces), [view for view, *_ in titles.values()]
     pack = Pack(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
+    for view, sim, controller in titles.values():
+        standing = rollout(sim, controller, _START)
+        view.show(standing.final, standing.contacts, standing.measured[-1])
+        sim.reset()
     for k in range(len(directions)):
         pack.stop((0, k))
     for (i, force), (k, direction) in product(enumerate(sizes), enumerate(directions)):

@@ -170,7 +170,9 @@ def test_a_push_panel_becomes_recorded_runs(view: fb.Viewer) -> None:
     run = live(sim, controller, view)
     data = data_of(push_panel(run, view, most=480.0))
     assert [len(control["values"]) for control in data["controls"]] == [5, 4]
-    assert not any(key[1] == ANIMATION for key in scene_at(data, "0,1"))
+    unpushed = scene_at(data, "0,1")
+    assert not any(key[1] == ANIMATION for key in unpushed)
+    assert len({key[0].split("/measured/")[1].split("/")[0] for key in unpushed if "/measured/" in key[0]}) == 4
     notes = {stop: data["notes"][about[0]] for stop, about in data["stops"].items()}
     assert notes["1,0"] == "it stands" and notes["4,1"].endswith("it falls") and notes["0,0"] == ""
     moving = [
