@@ -33,6 +33,7 @@ suppress_warnings = ["myst.header"]  # a lesson may begin a part with a small he
 
 html_context = {"default_mode": "auto"}
 html_theme = "sphinx_book_theme"
+html_favicon = "static/icon.svg"
 html_title = "floatbase"
 html_math_renderer = "mathml"
 html_static_path = ["static"]
