@@ -110,11 +110,12 @@ def recorded_pushes(
     titles: what stands above each picture -> its viewer, and what runs in it.
     """
     sizes, views = tuple(forces), [view for view, *_ in titles.values()]
-    pack = Pack(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
     for view, sim, controller in titles.values():
+        sim.reset()
         standing = rollout(sim, controller, _START)
         view.show(standing.final, standing.contacts, standing.measured[-1])
         sim.reset()
+    pack = Pack(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
     for k in range(len(directions)):
         pack.stop((0, k))
     for (i, force), (k, direction) in product(enumerate(sizes), enumerate(directions)):

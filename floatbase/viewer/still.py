@@ -107,7 +107,7 @@ def with_image(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, A
     """What a notebook stores of a widget, and beside it an image of the pictures in it, for wherever no widget can be.
 
     bundle: of the widget, as `_repr_mimebundle_` returns it.
-    pictures: widgets of viewers. Those that hold a copy of a scene as HTML (`FLOATBASE_VIEWER=static`) are stored as that copy.
+    pictures: widgets of viewers. Those that hold a copy of a scene as HTML, as `Viewer.widget` says, are stored as that copy.
     """
     data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
     scenes = [picture.value for picture in pictures if not hasattr(picture, "still")]

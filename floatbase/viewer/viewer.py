@@ -85,6 +85,7 @@ class Viewer(Controls):
         self.canvas = Canvas(self.window)
         self._moving, self._follow = False, flag("follow", follow)
         self._last: State | None = None
+        self._seen: State | None = None  # where the robot was when the camera was set
         self._own: dict[str, tuple[RGB, str]] = {}  # kinds of items that the legend explains beside its own
         super().__init__()
         self._set_stage(background)
@@ -105,7 +106,6 @@ class Viewer(Controls):
     def stand_on(self, ground: Ground | npt.ArrayLike | None) -> None:
         """Draw another ground from the next picture on. ground: as for the viewer."""
         self.painter = self.painter.replace(ground=_ground(ground))
-        self.canvas.set(wire.set_ground(self.painter.floor.planes))
 
     def show(
         self,
@@ -212,7 +212,8 @@ class Viewer(Controls):
         if self._moving:
             self.window.put([self._following(ROBOT), *wire.end_animation()])
             self._moving = False
-        self.canvas.draw(picture, *self._caption(kinds(picture), title, ghost_name))  # at once: a second frame would wait
+        settings = *self._caption(kinds(picture), title, ghost_name), wire.set_ground(self.painter.floor.planes)
+        self.canvas.draw(picture, *settings)  # at once: a second frame would wait
 
     def play(
         self,
@@ -240,7 +241,7 @@ class Viewer(Controls):
         planned: whether to draw the planned forces too.
         com, cones, support, ghost, title, ghost_name: as for `show`.
         steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step` makes them.
-        follow: whether the camera goes with the robot, smoothly and at one height over the ground; afterwards, too.
+        follow: whether the camera goes with the robot, smoothly and at one height over the viewer's ground; afterwards, too.
         paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
@@ -293,8 +294,8 @@ class Viewer(Controls):
     def camera(self, view: str | View = "default", follow: bool | None = None) -> Viewer:
         """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`.
 
-        follow: whether the camera goes with the robot when it walks away, smoothly and at one height over the ground; None
-            leaves it so.
+        follow: whether the camera goes with the robot when it walks away, smoothly and at one height over the viewer's
+            ground; None leaves it so.
         Every call undoes how the reader has turned the view, so do not call it each time a slider moves.
         Raises `InputError` for another name.
         """
@@ -308,27 +309,28 @@ class Viewer(Controls):
 
     def _looking(self, view: View, followed: str = ROBOT) -> tuple[wire.Update, ...]:
         """The commands for a view of the robot where it is now, for what the camera follows from there, and for the presets."""
+        self._seen = self._last
         presets = wire.set_views({name: self._from(preset) for name, preset in PRESETS.items()})
         return wire.set_camera(*self._from(view)), self._following(followed), presets
 
     def _from(self, view: View) -> tuple[Array, Array, float]:
-        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a view of the robot now."""
+        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a view of the robot `_seen`."""
         low, high = self.painter.feet_box if view.feet else self.painter.box
-        target, eye = target_and_eye(view, low + self._moved, high + self._moved)
+        moved = self._moved + [0.0, 0.0, self.painter.floor.height(self.painter.home.com)]
+        target, eye = target_and_eye(view, low + moved, high + moved)
         return eye, target, view.angle
 
     def _following(self, followed: str) -> wire.Update:
         """The command that lets the camera follow the robot, or what stands for it in a recording, if it is to follow."""
         base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
         follows = self._follow and self.robot.is_floating
-        start = (self._last or self.painter.home).joint_transforms[1][:3, 3]
+        start = (self._seen or self.painter.home).joint_transforms[1][:3, 3]
         return wire.set_follow(ROOT + base if follows else "", start, self._moved, smooth=followed == ROBOT)
 
     @property
     def _moved(self) -> Array:
-        """How far the robot is from where it stands at home, (3,), m, along the ground."""
-        home, now = self.painter.home.com, (self._last or self.painter.home).com
-        return way(self.painter.floor, home, now)
+        """How far the robot was from where it stands at home when the camera was set, (3,), m, along the ground."""
+        return way(self.painter.floor, self.painter.home.com, (self._seen or self.painter.home).com)
 
     def save(self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)) -> Path:
         """Write the scene to a file, by its name's ending, and return its path.
@@ -412,7 +414,6 @@ class Viewer(Controls):
             wire.set_property("/Grid", "visible", False),
             wire.set_property("/Axes", "visible", False),
             wire.page_command("set_theme", name=background),
-            wire.set_ground(self.painter.floor.planes),
         )
 
     def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[wire.Update, wire.Update]:

@@ -4,8 +4,9 @@
 // Notebook 7 takes the arrow keys of a slider, to go from heading to heading; JupyterLab leaves them to the slider.
 if (!globalThis.floatbaseCodes) {
   const suppress = "data-lm-suppress-shortcuts";
-  window.addEventListener("keydown", ({target, key}) => {
-    if (target.matches?.(".noUi-handle")) target.toggleAttribute(suppress, /^(Arrow|Page|Home|End)/.test(key));
+  window.addEventListener("keydown", ({target, key, ctrlKey, altKey, metaKey}) => {
+    const moves = !ctrlKey && !altKey && !metaKey && /^(Arrow|Page|Home|End)/.test(key);
+    if (target.matches?.(".noUi-handle")) target.toggleAttribute(suppress, moves);
   }, true);
 }
 

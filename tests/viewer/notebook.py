@@ -179,17 +179,20 @@ class Notebook:
 
     def hear(self, widget: Any, content: Any) -> None:
         """Have a message of a page heard, now or later."""
-        if self._said is None:
+        said = self._said
+        if said is None:
             hear(widget, content)
         else:
-            self._said.append((widget, content))
+            said.append((widget, content))
 
     @contextmanager
     def deaf(self) -> Iterator[list[tuple[Any, Any]]]:
         """A while in which nothing is heard of pages, as by a kernel that runs a cell; what they say is heard afterwards."""
         said = self._said = []
-        yield said
-        self._said = None
+        try:
+            yield said
+        finally:
+            self._said = None
         self._loop.call_soon_threadsafe(lambda: [hear(*each) for each in said])
 
     def end(self) -> None:

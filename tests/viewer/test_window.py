@@ -299,10 +299,10 @@ def test_threads_draw_at_the_same_time(window: Window) -> None:
 
 
 @contextmanager
-def interrupting(timer: int) -> Iterator[Callable[[Callable[[], object], float], bool]]:
-    """A function that repeats another until it is interrupted, a while (s) later as a timer of the signal module measures it.
+def interrupting() -> Iterator[Callable[[Callable[[], object], float], bool]]:
+    """A function that repeats another until it is interrupted, some time of this process (s) later, and says whether it was.
 
-    It says whether the interrupt came: Python drops one that falls into a destructor.
+    The timer of the wall clock is pytest-timeout's. Python drops an interrupt that falls into a destructor.
     """
 
     def repeat(use: Callable[[], object]) -> None:  # not in the `try`: where a loop jumps back, Python 3.13 leaves it uncaught
@@ -312,19 +312,19 @@ def interrupting(timer: int) -> Iterator[Callable[[Callable[[], object], float],
 
     def interrupted(use: Callable[[], object], delay: float) -> bool:
         try:
-            signal.setitimer(timer, delay)
+            signal.setitimer(signal.ITIMER_VIRTUAL, delay)
             repeat(use)
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
         except KeyboardInterrupt:
             return True
         return False
 
-    number = {signal.ITIMER_REAL: signal.SIGALRM, signal.ITIMER_VIRTUAL: signal.SIGVTALRM}[timer]
-    before = signal.signal(number, signal.default_int_handler)
+    before = signal.signal(signal.SIGVTALRM, signal.default_int_handler)
     try:
         yield interrupted
     finally:
-        signal.setitimer(timer, 0.0)
-        signal.signal(number, before)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
 
 
 @pytest.mark.parametrize("use", [lambda scene: scene.put(UPDATES), lambda scene: scene.since(0)], ids=["put", "since"])
@@ -332,9 +332,9 @@ def test_an_interrupt_never_leaves_a_scene_locked(window: Window, use: Callable[
     scene, count = window.scene, 0
     scene.put(UPDATES)
     stop = time.monotonic() + PATIENCE
-    with interrupting(signal.ITIMER_VIRTUAL) as interrupted:
+    with interrupting() as interrupted:
         while count < 200 and time.monotonic() < stop:
-            count += interrupted(lambda: use(scene), 1e-4)  # in fact at the next tick of the kernel's clock
+            count += interrupted(lambda: use(scene), 1e-4)
             reader = threading.Thread(target=scene.copy, daemon=True)  # waits for ever where the lock is held
             reader.start()
             reader.join(PATIENCE)
@@ -363,7 +363,7 @@ def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) ->
         window.put([wire.set_transform("/meshcat/a", np.eye(4) * drawn)])
 
     stop = time.monotonic() + PATIENCE
-    with interrupting(signal.ITIMER_REAL) as interrupted:
+    with interrupting() as interrupted:
         while count < 50 and time.monotonic() < stop:
             count += interrupted(draw, 0.002 + 0.0001 * count)
     assert count == 50
