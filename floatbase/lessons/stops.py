@@ -121,7 +121,7 @@ def recorded_pushes(
     for (i, force), (k, direction) in product(enumerate(sizes), enumerate(directions)):
         records = [_pushed(sim, controller, force, DIRECTIONS[direction]) for _, sim, controller in titles.values()]
         for view, record in zip(views, records, strict=True):
-            view.play(record, rate=_RATE, cones=False)
+            view.play(record, rate=_RATE)
         pack.stop((i + 1, k), ", ".join(_fates(titles, records)))
     return pack.bundle(
         [

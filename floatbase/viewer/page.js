@@ -142,7 +142,7 @@ function startCamera(viewer, panel) {
   const height = ({x, z}) =>
     Math.max(...planes.map(({normal, offset}) => (offset - normal[0] * x - normal[2] * z) / normal[1]));
 
-  // Go with what is followed, at one height over the ground; the scale goes along. Returns whether it is still on its way.
+  // Go with what is followed, at one height over the ground; scale and lights go along. Returns whether it is still on its way.
   function go() {
     const now = performance.now(), part = smooth && !anew ? 1 - Math.exp(-Math.min(now - clock, SLOWEST) / 1000 / LAG) : 1;
     clock = now;
@@ -154,8 +154,9 @@ function startCamera(viewer, panel) {
     gone.add(step);
     viewer.camera.position.add(step);
     viewer.controls.target.add(step);
-    const scale = node(["meshcat", "scale"]);
-    if (scale) scale.object.position.set(begin.x + gone.x, -begin.z - gone.z, begin.y + gone.y);  // in our coordinates, z up
+    for (const one of [["meshcat", "scale"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"]]) {
+      node(one)?.object.position.set(begin.x + gone.x, -begin.z - gone.z, begin.y + gone.y);  // in our coordinates, z up
+    }
     anew = false;
     return way.sub(step).length() > 0;
   }

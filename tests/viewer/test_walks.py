@@ -227,6 +227,11 @@ BAR = """() => {
   const at = viewer.scene_tree.find(["meshcat", "scale", "bar"]).object.getWorldPosition(new MeshCat.THREE.Vector3());
   return [at.x, -at.z, at.y];
 }"""
+# where the two lights are that reach no farther than 10 m, in our coordinates
+LIGHTS = """() => ["PointLightNegativeX", "PointLightPositiveX"].map((name) => {
+  const at = viewer.scene_tree.find(["Lights", name, "<object>"]).object.getWorldPosition(new MeshCat.THREE.Vector3());
+  return [at.x, -at.z, at.y];
+})"""
 SEEN = 0.01  # m: what the eye does not see
 
 
@@ -247,7 +252,7 @@ def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_t
         viewer.show(standing, contacts, forces, title="begin")
         page.goto(viewer.url)
         settle(page, "begin")
-        before, bar = page.evaluate(TARGET), page.evaluate(BAR)
+        before, bar, lights = page.evaluate(TARGET), page.evaluate(BAR), page.evaluate(LIGHTS)
         viewer.show(moved(standing, 1.0, 0.5, rise + 0.1), contacts, forces, title="gone")
         ways = page.evaluate("""() => new Promise((resolve) => {
           const seen = [], look = () => {
@@ -260,6 +265,7 @@ def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_t
         assert (np.diff(ways) >= 0.0).all() and len({round(x, 3) for x in ways}) > 4  # on its way, not at once
         np.testing.assert_allclose(np.subtract(page.evaluate(TARGET), before), [1.0, rise, -0.5], atol=SEEN)
         np.testing.assert_allclose(np.subtract(page.evaluate(BAR), bar), [1.0, 0.5, rise], atol=SEEN)
+        np.testing.assert_allclose(np.subtract(page.evaluate(LIGHTS), lights), [[1.0, 0.5, rise]] * 2, atol=SEEN)
         after = page.evaluate(TARGET)
         page.reload()  # a page that comes later looks at the robot where it is
         settle(page, "gone")
