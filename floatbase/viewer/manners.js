@@ -18,6 +18,7 @@ function startManners(viewer, camera) {
 
   const home = tools.querySelector("button"), menu = tools.querySelector("div");
   home.onclick = () => look("default");
+  tools.onkeydown = ({key}) => { if (key == "Escape") tools.querySelector("details").open = false; };
   for (const name of ["feet", "left", "front", "top"]) {
     const made = Object.assign(document.createElement("button"), {type: "button", textContent: name == "left" ? "side" : name});
     made.onclick = () => look(name);

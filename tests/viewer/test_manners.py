@@ -94,6 +94,9 @@ def test_views_parts_and_keys(framed) -> None:
         for is_seen in (False, True):
             inner.evaluate(press, name)
             inner.wait_for_function(f"{SCENE}['{node}'].object.visible == {str(is_seen).lower()}")
+    inner.evaluate("document.querySelector('#tools summary').focus()")
+    page.keyboard.press("Escape")
+    inner.wait_for_function("!document.querySelector('#tools details').open")
     inner.evaluate("document.querySelector('#tools button').click()")
     inner.evaluate("viewer.renderer.domElement.focus()")
     far = np.linalg.norm(home)
