@@ -111,10 +111,8 @@ def recorded_pushes(
     """
     sizes, views = tuple(forces), [view for view, *_ in titles.values()]
     for view, sim, controller in titles.values():
-        sim.reset()
-        standing = rollout(sim, controller, _START)
+        standing = _pushed(sim, controller, 0.0, 0.0)
         view.show(standing.final, standing.contacts, standing.measured[-1])
-        sim.reset()
     pack = Pack(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
     for k in range(len(directions)):
         pack.stop((0, k))
