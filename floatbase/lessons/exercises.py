@@ -7,12 +7,12 @@ right value by other expressions than the solution does.
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -24,19 +24,26 @@ from floatbase.lessons import progress
 from floatbase.lessons.rounding import about
 
 TRIES = 2  # so many before `reveal` shows a solution
-_NO_ANSWER = "There is no answer yet: replace the placeholder by your expression."
 NEAR = 0.02  # of the right value: as much as a number with two digits may spoil
+Example: TypeAlias = tuple[Any, str]  # an answer, and the name of the hint that it must get; "" where it is right
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What `check` answers; a notebook shows it as a line of text."""
+    """What `check` answers; a notebook shows it as a line of text.
+
+    hint: the name of the mistake that the text speaks of; "" where the answer is right.
+    """
 
     right: bool
     text: str
+    hint: str = ""
 
     def __repr__(self) -> str:
         return f"{'✓ Right.' if self.right else '✗ Not yet.'} {self.text}"
+
+
+NO_ANSWER = Verdict(False, "There is no answer yet: replace the placeholder by your expression.", "no_answer")
 
 
 def least_point(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
@@ -45,15 +52,16 @@ def least_point(answer: Any, n: int, block: str, hint: str = "") -> Array | Verd
     answer: whatever a learner may give. n: how many numbers it is to be on. block: their name. hint: where they are others.
     """
     if answer is None or answer is Ellipsis:
-        return Verdict(False, _NO_ANSWER)
+        return NO_ANSWER
     if not isinstance(answer, Quadratic):
-        return Verdict(False, f"Give the cost, an fb.Quadratic on {block}, not its minimiser or {type(answer).__name__}.")
+        given = type(answer).__name__
+        return Verdict(False, f"Give the cost, an fb.Quadratic on {block}, not its minimiser or {given}.", "no_cost")
     if answer.n != n:
-        return Verdict(False, f"This is a cost on {answer.n} numbers; {block} has {n}.{hint and f' {hint}'}")
+        return Verdict(False, f"This is a cost on {answer.n} numbers; {block} has {n}.{hint and f' {hint}'}", "other_block")
     try:
         return answer.minimiser()
     except FloatbaseError as error:
-        return Verdict(False, f"It has no least point: {error}")
+        return Verdict(False, f"It has no least point: {error}", "no_least_point")
 
 
 def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
@@ -62,18 +70,18 @@ def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
     answer: whatever a learner may give. shapes: those allowed; a message names the first.
     """
     if answer is None or answer is Ellipsis:
-        return Verdict(False, _NO_ANSWER)
+        return NO_ANSWER
     try:
         plain = np.asarray(answer)
         given = np.asarray(plain, dtype=np.float64) if not np.iscomplexobj(plain) else None
     except (TypeError, ValueError):
         given = None
     if given is None:
-        return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.")
+        return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.", "not_numbers")
     if given.shape not in shapes:
-        return Verdict(False, _wrong_shape(given.shape, shapes[0]))
+        return Verdict(False, _wrong_shape(given.shape, shapes[0]), "shape")
     if not np.all(np.abs(given) <= LARGEST):
-        return Verdict(False, "The answer holds numbers that are not finite, or far too large.")
+        return Verdict(False, "The answer holds numbers that are not finite, or far too large.", "not_finite")
     return given
 
 
@@ -101,6 +109,7 @@ class Exercise:
     stub: the code that a learner starts from; it runs.
     solution: the code that replaces the stub.
     judge: answer -> `Verdict`.
+    examples: gives answers, and the names of the hints that they must get, beside those that the judge gives itself.
     explanation: why the solution is right, shown with it.
     names: gives what the stub uses of the lesson, name -> value; numpy it has.
     """
@@ -112,6 +121,7 @@ class Exercise:
     judge: Callable[[Any], Verdict]
     explanation: str = ""
     names: Callable[[], Mapping[str, Any]] = dict
+    examples: Callable[[], Iterable[Example]] = tuple
 
     def placeholder(self) -> Any:
         """What stands there before anybody answers: the stub's variable, or a tuple of them."""
@@ -120,13 +130,23 @@ class Exercise:
         return tuple(made.values()) if len(made) > 1 else next(iter(made.values()))
 
 
+_GENERAL = {
+    "nearly": "Nearly: less than 2 % off. Is a number in it rounded, or a small part left out?",
+    "sign": "The size is right, the sign is not: whose force, and in which direction?",
+    "transpose": "This is the transpose of the answer.",
+    "unknown": "Neither right nor a mistake this check knows. Look at the units, then at the statement again.",
+    "unknown_count": "Neither right nor a mistake this check knows. What is counted, and what is left out or counted twice?",
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Numeric:
     """A judge of numbers and arrays.
 
     right: computes the right value.
     praise: what a right answer is told.
-    mistakes: hint -> computes the value that this kind of mistake leads to.
+    mistakes: name of a hint -> computes the value that this kind of mistake leads to.
+    hints: the same names -> what is said then.
     tolerance: values whose difference is less than this part of the right value's largest number count as equal.
     count: the answer is a number of things, without sign or unit.
     """
@@ -134,6 +154,7 @@ class Numeric:
     right: Callable[[], Any]
     praise: str
     mistakes: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
+    hints: Mapping[str, str] = field(default_factory=dict)
     tolerance: float = 1e-3
     count: bool = False
 
@@ -146,18 +167,26 @@ class Numeric:
             return Verdict(True, self.praise)
         for hint, wrong in self.mistakes.items():
             if self._equal(given, np.asarray(wrong(), dtype=np.float64)):
-                return Verdict(False, hint)
-        if self._equal(given, right, NEAR) and not self.count:
-            return Verdict(False, "Nearly: less than 2 % off. Is a number in it rounded, or a small part left out?")
+                return Verdict(False, self.hints[hint], hint)
+        hint = self._of_any_answer(given, right)
+        return Verdict(False, _GENERAL[hint], hint)
+
+    def examples(self) -> Iterator[Example]:
+        """The right answer, and one for each mistake."""
+        yield self.right(), ""
+        yield from ((wrong(), hint) for hint, wrong in self.mistakes.items())
+
+    def _of_any_answer(self, given: Array, right: Array) -> str:
+        """The hint, one of `_GENERAL`, for a wrong answer that is none of the known mistakes."""
         if self.count:
-            return Verdict(
-                False, "Neither right nor a mistake this check knows. What is counted, and what is left out or counted twice?"
-            )
+            return "unknown_count"
+        if self._equal(given, right, NEAR):
+            return "nearly"
         if self._equal(given, -right):
-            return Verdict(False, "The size is right, the sign is not: whose force, and in which direction?")
+            return "sign"
         if right.ndim == 2 and right.shape[0] == right.shape[1] and self._equal(given, right.T):
-            return Verdict(False, "This is the transpose of the answer.")
-        return Verdict(False, "Neither right nor a mistake this check knows. Look at the units, then at the statement again.")
+            return "transpose"
+        return "unknown"
 
     def _equal(self, a: Any, b: Any, tolerance: float = 0.0) -> bool:
         """Whether they differ by less than this part of b's largest number, or than `self.tolerance`, if that is more."""
@@ -167,7 +196,10 @@ class Numeric:
 
 @dataclass(frozen=True, eq=False)
 class Shaped:
-    """A judge that knows what a wrong shape means, and leaves other shapes to `judge`. shapes: shape -> hint."""
+    """A judge that knows what a wrong shape means, and leaves other shapes to `judge`.
+
+    shapes: shape -> what is said of it. The hint's name is made of it, such as "shape_4x3", or "shape_" of one number.
+    """
 
     judge: Callable[[Any], Verdict]
     shapes: Mapping[tuple[int, ...], str]
@@ -177,8 +209,18 @@ class Shaped:
             shape = np.shape(answer)
         except ValueError:  # rows of different lengths
             return self.judge(answer)
-        hint = self.shapes.get(shape) if answer is not None else None
-        return Verdict(False, hint) if hint else self.judge(answer)
+        if answer is None or shape not in self.shapes:
+            return self.judge(answer)
+        return Verdict(False, self.shapes[shape], self._name(shape))
+
+    def examples(self) -> Iterator[Example]:
+        """Those of `judge`, and an array of each wrong shape."""
+        yield from getattr(self.judge, "examples", tuple)()
+        yield from ((np.zeros(shape), self._name(shape)) for shape in self.shapes)
+
+    @staticmethod
+    def _name(shape: tuple[int, ...]) -> str:
+        return f"shape_{'x'.join(map(str, shape))}"
 
 
 def all_exercises() -> dict[str, Exercise]:

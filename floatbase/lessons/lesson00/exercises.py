@@ -43,19 +43,26 @@ EXERCISES = (
             tolerance=2e-3,  # g may be 9.8
             praise="The ground carries the weight and accelerates the mass: m (g + 2 m/s²).",
             mistakes={
-                "That is the weight alone: with it the robot stays where it is, or goes on as it goes.": _weight,
-                "That is m a, the sum of all forces on the robot. Is the ground's the only one?": lambda: UP * _go2().mass,
-                "That would let it accelerate downwards: draw both forces, and which one is larger.": lambda: (
-                    _weight() - UP * _go2().mass
-                ),
-                "That is an acceleration, in m/s²; a force needs the mass.": lambda: _go2().gravity + UP,
-                "The weight is right; the 2 m/s² must be multiplied by the mass before they are added.": lambda: _weight() + UP,
-                "m a is right, but g without the mass is no force.": lambda: UP * _go2().mass + _go2().gravity,
-                "That takes g as 10 m/s²; the physics here has 9.81.": lambda: (10.0 + UP) * _go2().mass,
-                "That is the share of one foot, on average; the question is about all feet.": lambda: _sum_of_forces() / 4,
-                "That is what the robot does to the ground; the answer is what the ground does to the robot.": lambda: (
-                    -_sum_of_forces()
-                ),
+                "weight_alone": _weight,
+                "ma_alone": lambda: UP * _go2().mass,
+                "downwards": lambda: _weight() - UP * _go2().mass,
+                "acceleration": lambda: _go2().gravity + UP,
+                "mass_on_g_alone": lambda: _weight() + UP,
+                "g_without_mass": lambda: UP * _go2().mass + _go2().gravity,
+                "g_is_10": lambda: (10.0 + UP) * _go2().mass,
+                "one_foot": lambda: _sum_of_forces() / 4,
+                "reaction": lambda: -_sum_of_forces(),
+            },
+            hints={
+                "weight_alone": "That is the weight alone: with it the robot stays where it is, or goes on as it goes.",
+                "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's the only one?",
+                "downwards": "That would let it accelerate downwards: draw both forces, and which one is larger.",
+                "acceleration": "That is an acceleration, in m/s²; a force needs the mass.",
+                "mass_on_g_alone": "The weight is right; the 2 m/s² must be multiplied by the mass before they are added.",
+                "g_without_mass": "m a is right, but g without the mass is no force.",
+                "g_is_10": "That takes g as 10 m/s²; the physics here has 9.81.",
+                "one_foot": "That is the share of one foot, on average; the question is about all feet.",
+                "reaction": "That is what the robot does to the ground; the answer is what the ground does to the robot.",
             },
         ),
         explanation="Newton: the vertical forces of the ground minus the weight give mass times acceleration, so together they "

@@ -102,12 +102,14 @@ def _judge_thrust(answer: Any) -> Verdict:
     # by the momentum that (4) brings about, not by sums of forces and levers
     rate = momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0]
     if abs(rate[2] + 200.0) < 0.2:
-        return Verdict(False, "The size is right, the sign is not: these thrusters push the robot down.")
+        return Verdict(False, "The size is right, the sign is not: these thrusters push the robot down.", "sign")
     if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
-        return Verdict(False, f"The forces add up to {vector_text(rate[:3])} N; they should be (0, 0, 200) N.")
+        return Verdict(False, f"The forces add up to {vector_text(rate[:3])} N; they should be (0, 0, 200) N.", "force")
     if abs(rate[3:]).max() > 0.02:
         where = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
-        return Verdict(False, f"The force is right, but it turns the robot: moment ({where}) N·m about the centre of mass.")
+        return Verdict(
+            False, f"The force is right, but it turns the robot: moment ({where}) N·m about the centre of mass.", "moment"
+        )
     return Verdict(True, "Straight up without turning. Six conditions on twelve numbers: there are many other answers.")
 
 
@@ -122,19 +124,27 @@ EXERCISES = (
             right=_bolts_moment,
             praise="The bolts undo what the wall does: force and moment, each with the opposite sign.",
             mistakes={
-                "This is the wall's own moment about the base. The bolts answer it: look at the sign, or at the order of the "
-                "cross product.": lambda: -_bolts_moment(),
-                "The moment is taken about the centre of mass; the bolts sit at the base.": _about_the_centre_of_mass,
-                "This holds the weight's moment as well; the bolts should answer the wall alone.": _with_the_weight,
-                "Zero would mean that nobody answers the wall. Which lever, and which force?": lambda: np.zeros(3),
-                "This takes the height of the tool alone; it is also 11 cm to the side, and that is a lever too.": (
-                    lambda: np.array([0.0, 60.0 * _pressed()[1][2], 0.0])
-                ),
-                "* multiplies number by number; a moment is the cross product of lever and force.": (
-                    lambda: _pressed()[1] * _pressed()[2]
-                ),
-                "This is a force; a moment needs a lever: how far from the base does the force act?": lambda: -_pressed()[2],
-                "This is f_r itself; a moment needs a lever, and the bolts answer the other way round.": lambda: _pressed()[2],
+                "walls_moment": lambda: -_bolts_moment(),
+                "about_com": _about_the_centre_of_mass,
+                "weight_too": _with_the_weight,
+                "zero": lambda: np.zeros(3),
+                "height_alone": lambda: np.array([0.0, 60.0 * _pressed()[1][2], 0.0]),
+                "elementwise": lambda: _pressed()[1] * _pressed()[2],
+                "minus_force": lambda: -_pressed()[2],
+                "force_itself": lambda: _pressed()[2],
+            },
+            hints={
+                "walls_moment": "This is the wall's own moment about the base. The bolts answer it: look at the sign, or at "
+                "the order of the "
+                "cross product.",
+                "about_com": "The moment is taken about the centre of mass; the bolts sit at the base.",
+                "weight_too": "This holds the weight's moment as well; the bolts should answer the wall alone.",
+                "zero": "Zero would mean that nobody answers the wall. Which lever, and which force?",
+                "height_alone": "This takes the height of the tool alone; it is also 11 cm to the side, and that is a lever "
+                "too.",
+                "elementwise": "* multiplies number by number; a moment is the cross product of lever and force.",
+                "minus_force": "This is a force; a moment needs a lever: how far from the base does the force act?",
+                "force_itself": "This is f_r itself; a moment needs a lever, and the bolts answer the other way round.",
             },
         ),
         explanation="At rest the moments about the base add up to zero: tool × f_r + τ_b = 0.",
@@ -156,11 +166,14 @@ EXERCISES = (
                 right=_actuation_of_solo8,
                 praise="Six rows that no motor reaches, then one row for each motor.",
                 mistakes={
-                    "The base comes first in q, as (2) has it; here its rows stand last.": lambda: np.roll(
-                        _actuation_of_solo8(), -6, axis=0
-                    ),
-                    "Zeros everywhere: no motor drives anything. Where does each torque act?": lambda: np.zeros((14, 8)),
-                    "Is there a torque that pushes a joint backwards? One sign too many.": lambda: -_actuation_of_solo8(),
+                    "base_last": lambda: np.roll(_actuation_of_solo8(), -6, axis=0),
+                    "zeros": lambda: np.zeros((14, 8)),
+                    "sign": lambda: -_actuation_of_solo8(),
+                },
+                hints={
+                    "base_last": "The base comes first in q, as (2) has it; here its rows stand last.",
+                    "zeros": "Zeros everywhere: no motor drives anything. Where does each torque act?",
+                    "sign": "Is there a torque that pushes a joint backwards? One sign too many.",
                 },
             ),
         ),
@@ -177,18 +190,24 @@ EXERCISES = (
             tolerance=2e-3,  # g may be 9.8
             praise="The bolts' answer had no bound. This one is friction times weight, as long as no jump adds to it.",
             mistakes={
-                "That takes g as 10 m/s²; the physics here has 9.81.": lambda: 10 * _carried_by_friction() / 9.81,
-                "That is the weight. A horizontal force has to come from friction.": lambda: _carried_by_friction() / 0.7,
-                "That is the share of one foot; four feet share the work.": lambda: _carried_by_friction() / 4,
-                "All four feet together carry one weight, not four.": lambda: 4 * _carried_by_friction(),
-                "That is friction times mass, in kg; a force needs one more factor.": lambda: _carried_by_friction() / 9.81,
-                "μ multiplies the normal force; it does not divide it.": lambda: _carried_by_friction() / 0.49,
-                "That is what the controller's four-sided pyramid allows. The floor can do more: the round cone.": (
-                    lambda: _carried_by_friction() / np.sqrt(2.0)
-                ),
-                "Friction answers along the floor only as far as the normal force goes: multiply by μ, once.": (
-                    lambda: 0.7 * _carried_by_friction()
-                ),
+                "g_is_10": lambda: 10 * _carried_by_friction() / 9.81,
+                "weight": lambda: _carried_by_friction() / 0.7,
+                "one_foot": lambda: _carried_by_friction() / 4,
+                "four_weights": lambda: 4 * _carried_by_friction(),
+                "mass": lambda: _carried_by_friction() / 9.81,
+                "divided": lambda: _carried_by_friction() / 0.49,
+                "pyramid": lambda: _carried_by_friction() / np.sqrt(2.0),
+                "mu_twice": lambda: 0.7 * _carried_by_friction(),
+            },
+            hints={
+                "g_is_10": "That takes g as 10 m/s²; the physics here has 9.81.",
+                "weight": "That is the weight. A horizontal force has to come from friction.",
+                "one_foot": "That is the share of one foot; four feet share the work.",
+                "four_weights": "All four feet together carry one weight, not four.",
+                "mass": "That is friction times mass, in kg; a force needs one more factor.",
+                "divided": "μ multiplies the normal force; it does not divide it.",
+                "pyramid": "That is what the controller's four-sided pyramid allows. The floor can do more: the round cone.",
+                "mu_twice": "Friction answers along the floor only as far as the normal force goes: multiply by μ, once.",
             },
         ),
         explanation="Each foot gives at most μ times its normal force, and the normal forces add up to the weight.",
@@ -216,29 +235,30 @@ EXERCISES = (
             right=_held_width,
             praise="A harder push needs a wider plate. A robot that walks has no wider plate; it puts a foot there in time.",
             mistakes={
-                "That is the distance from the middle to the rear edge. The plate goes as far to the front.": (
-                    lambda: _held_width() / 2
-                ),
-                "The plate tips about an edge on the floor; the tool's height counts from there, not from the base.": (
-                    lambda: _by_levers(below=PLATE[1])
-                ),
-                "Where does the weight act? The centre of mass is not above the middle of the plate.": (
-                    lambda: _by_levers(ahead=0.0)
-                ),
-                "The centre of mass is ahead of the middle, and the plate tips about its rear edge: is that good or bad?": (
-                    lambda: _by_levers(ahead=-_on_the_plate().com[0])
-                ),
-                "That is the plate as it is, and with 120 N it tips.": lambda: PLATE[0],
-                "What a plate holds does not grow in proportion to its width: part of the lever is there without a plate.": (
-                    _in_proportion
-                ),
-                "That holds 60 N. The arm is to press with 120 N.": lambda: _by_levers(60.0),
-                "That takes the mass for the weight: a force needs one more factor.": (
-                    lambda: _by_levers(weight=_on_the_plate().robot.mass)
-                ),
-                "Height and distance from the edge are exchanged: which lever belongs to the push, which to the weight?": (
-                    lambda: _by_levers(_on_the_plate().robot.weight, weight=120.0)
-                ),
+                "half": lambda: _held_width() / 2,
+                "height_from_base": lambda: _by_levers(below=PLATE[1]),
+                "com_in_middle": lambda: _by_levers(ahead=0.0),
+                "com_sign": lambda: _by_levers(ahead=-_on_the_plate().com[0]),
+                "plate_as_is": lambda: PLATE[0],
+                "in_proportion": (_in_proportion),
+                "half_press": lambda: _by_levers(60.0),
+                "mass": lambda: _by_levers(weight=_on_the_plate().robot.mass),
+                "exchanged": lambda: _by_levers(_on_the_plate().robot.weight, weight=120.0),
+            },
+            hints={
+                "half": "That is the distance from the middle to the rear edge. The plate goes as far to the front.",
+                "height_from_base": "The plate tips about an edge on the floor; the tool's height counts from there, not from "
+                "the base.",
+                "com_in_middle": "Where does the weight act? The centre of mass is not above the middle of the plate.",
+                "com_sign": "The centre of mass is ahead of the middle, and the plate tips about its rear edge: is that good "
+                "or bad?",
+                "plate_as_is": "That is the plate as it is, and with 120 N it tips.",
+                "in_proportion": "What a plate holds does not grow in proportion to its width: part of the lever is there "
+                "without a plate.",
+                "half_press": "That holds 60 N. The arm is to press with 120 N.",
+                "mass": "That takes the mass for the weight: a force needs one more factor.",
+                "exchanged": "Height and distance from the edge are exchanged: which lever belongs to the push, which to the "
+                "weight?",
             },
         ),
         explanation="About the rear edge: 120 N × height = weight × (half the width + how far the centre of mass is ahead).",

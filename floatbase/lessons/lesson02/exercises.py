@@ -10,7 +10,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, vector_text
+from floatbase.lessons.exercises import NO_ANSWER, Example, Exercise, Numeric, Shaped, Verdict, vector_text
 
 
 @cache
@@ -78,18 +78,18 @@ def _standing_go2() -> EquationsOfMotion:
 def _judge_holding(answer: Any) -> Verdict:
     """Torques and forces that keep a standing go2 still, by (4) row by row."""
     if answer is None or answer is Ellipsis or (isinstance(answer, tuple) and any(part is None for part in answer)):
-        return Verdict(False, "There is no answer yet: replace the placeholder by your expression.")
+        return NO_ANSWER
     if not isinstance(answer, (tuple, list)) or len(answer) != 2:
-        return Verdict(False, "The answer should be two arrays, (torques, forces).")
+        return Verdict(False, "The answer should be two arrays, (torques, forces).", "not_two")
     try:
         tau, forces = (np.asarray(part, dtype=np.float64) for part in answer)
     except (TypeError, ValueError):
-        return Verdict(False, "The answer should be two arrays of numbers, (torques, forces).")
+        return Verdict(False, "The answer should be two arrays of numbers, (torques, forces).", "not_numbers")
     if tau.shape != (12,) or forces.shape not in ((12,), (4, 3)):
-        return Verdict(False, f"The shapes are {tau.shape} and {forces.shape}; they should be (12,) and (12,).")
+        return Verdict(False, f"The shapes are {tau.shape} and {forces.shape}; they should be (12,) and (12,).", "shapes")
     forces = forces.ravel()
     if not (np.all(np.isfinite(tau)) and np.all(np.isfinite(forces))):
-        return Verdict(False, "The answer holds numbers that are not finite.")
+        return Verdict(False, "The answer holds numbers that are not finite.", "not_finite")
     state = fb.load("go2").standing()
     contacts = fb.Contacts.points(state.robot)
     # Newton and Euler for the whole robot, then each leg by its own Jacobian: not the rows of eom
@@ -97,13 +97,15 @@ def _judge_holding(answer: Any) -> Verdict:
     up = f.sum(axis=0) - [0.0, 0.0, state.robot.weight]
     moment = np.cross(contacts.positions(state) - state.com, f).sum(axis=0)
     if abs(up[2] + 2 * state.robot.weight) < 0.1:
-        return Verdict(False, "These forces push the robot down: λ is what the ground does to the robot.")
+        return Verdict(False, "These forces push the robot down: λ is what the ground does to the robot.", "sign")
     if np.abs(up).max() > 0.1:
-        return Verdict(False, f"The base's force rows are not balanced: {vector_text(up, 1)} N are left over.")
+        return Verdict(False, f"The base's force rows are not balanced: {vector_text(up, 1)} N are left over.", "force_rows")
     if np.abs(moment).max() > 0.02:
-        return Verdict(False, f"The base's moment rows are not balanced: {vector_text(moment, 1)} N·m are left over.")
+        return Verdict(
+            False, f"The base's moment rows are not balanced: {vector_text(moment, 1)} N·m are left over.", "moment_rows"
+        )
     if f[:, 2].min() < 0.0:
-        return Verdict(False, "It balances, but one foot pulls at the ground, which no ground allows.")
+        return Verdict(False, "It balances, but one foot pulls at the ground, which no ground allows.", "pulls")
     pull = np.zeros(18)
     for contact, force in zip(contacts, f, strict=True):
         pull += contact.jacobian(state).T @ force
@@ -111,13 +113,17 @@ def _judge_holding(answer: Any) -> Verdict:
     if np.abs(tau - (gravity - pull[6:])).max() < 0.02:
         return Verdict(True, "Nothing moves. The base's rows chose the forces, the joints' rows then chose the torques.")
     if np.abs(tau - gravity).max() < 0.02:
-        return Verdict(False, "These torques carry the legs alone: the term Jᵀ λ is missing from the joints' rows.")
+        return Verdict(
+            False, "These torques carry the legs alone: the term Jᵀ λ is missing from the joints' rows.", "gravity_alone"
+        )
     if np.abs(tau - (gravity + pull[6:])).max() < 0.02:
-        return Verdict(False, "In the joints' rows the sign of Jᵀ λ is wrong: S τ + Jᵀ λ stand on the same side.")
+        return Verdict(
+            False, "In the joints' rows the sign of Jᵀ λ is wrong: S τ + Jᵀ λ stand on the same side.", "sign_of_forces"
+        )
     if np.abs(tau + (gravity - pull[6:])).max() < 0.02:
-        return Verdict(False, "The torques' size is right, the sign is not.")
+        return Verdict(False, "The torques' size is right, the sign is not.", "torque_sign")
     worst = float(np.abs(tau - (gravity - pull[6:])).max())
-    return Verdict(False, f"The base is balanced; the joints' rows are not: up to {worst:.1f} N·m are left over.")
+    return Verdict(False, f"The base is balanced; the joints' rows are not: up to {worst:.1f} N·m are left over.", "joint_rows")
 
 
 EXERCISES = (
@@ -136,19 +142,32 @@ EXERCISES = (
             ),
             praise="Three rows for each point, one column for each direction the robot can move in: d + 6.",
             mistakes={
-                "These are the joints' columns alone; the base's directions move a foot too.": lambda: (9, 8),
-                "A base has six directions, not one: φ maps from R^(d+6).": lambda: (9, 9),
-                "15 numbers are in q, where the quaternion has four. J has a column for each direction of velocity.": lambda: (
+                "joints_alone": lambda: (9, 8),
+                "base_is_one": lambda: (9, 9),
+                "quaternion": lambda: (
                     9,
                     15,
                 ),
-                "This is the shape of the transpose.": lambda: (14, 9),
-                "Three rows would be one foot. And the base has columns too.": lambda: (3, 8),
-                "Three rows would be one foot; three feet touch.": lambda: (3, 14),
-                "Three feet touch, not four.": lambda: (12, 14),
-                "The lifted leg's joints are directions, too: their columns are zero.": lambda: (9, 12),
-                "A foot's velocity has three components, however many joints its leg has.": lambda: (6, 14),
-                "18 columns are go2's, with three joints in each leg; solo8 has two.": lambda: (9, 18),
+                "transpose": lambda: (14, 9),
+                "joints_of_one_foot": lambda: (3, 8),
+                "one_foot": lambda: (3, 14),
+                "four_feet": lambda: (12, 14),
+                "lifted_leg": lambda: (9, 12),
+                "joints_for_components": lambda: (6, 14),
+                "go2": lambda: (9, 18),
+            },
+            hints={
+                "joints_alone": "These are the joints' columns alone; the base's directions move a foot too.",
+                "base_is_one": "A base has six directions, not one: φ maps from R^(d+6).",
+                "quaternion": "15 numbers are in q, where the quaternion has four. J has a column for each direction of "
+                "velocity.",
+                "transpose": "This is the shape of the transpose.",
+                "joints_of_one_foot": "Three rows would be one foot. And the base has columns too.",
+                "one_foot": "Three rows would be one foot; three feet touch.",
+                "four_feet": "Three feet touch, not four.",
+                "lifted_leg": "The lifted leg's joints are directions, too: their columns are zero.",
+                "joints_for_components": "A foot's velocity has three components, however many joints its leg has.",
+                "go2": "18 columns are go2's, with three joints in each leg; solo8 has two.",
             },
         ),
         explanation="k = 3 for each of 3 feet, d + 6 = 8 + 6 columns.",
@@ -169,35 +188,34 @@ EXERCISES = (
                 right=_generalised,
                 praise="The same matrix that turns velocities into the foot's velocity turns its force into all rows.",
                 mistakes={
-                    "The sign is turned: λ is what the ground does to the robot, and it stands on the side of S τ.": (
-                        lambda: -_generalised()
-                    ),
-                    "The base's rows are in world axes. v, and so the base's rows, are in the base's own frame.": (
-                        _generalised_in_world_axes
-                    ),
-                    "The base's rows are zero: only motors leave them alone, a foot's force does not.": (
-                        _generalised_joints_only
-                    ),
-                    "This is the Jacobian of the standing robot; `moving` has another posture, so another J.": (
-                        lambda: fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T @ [10.0, -5.0, 40.0]
-                    ),
-                    "This is the J of `eom`: for the standing robot, and for the points that touch the ground.": (
-                        lambda: _standing_go2().J[:3].T @ [10.0, -5.0, 40.0]
-                    ),
-                    "This pushes at the point that touches the ground; `push` acts at the frame's origin, 2 cm off.": (
-                        lambda: fb.equations_of_motion(*_scene()).J[:3].T @ [10.0, -5.0, 40.0]
-                    ),
-                    "`push` is in world axes, and so are the rows of frame_jacobian: nothing has to be turned.": (
+                    "sign": lambda: -_generalised(),
+                    "world_axes": (_generalised_in_world_axes),
+                    "base_zero": (_generalised_joints_only),
+                    "standing": lambda: fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T @ [10.0, -5.0, 40.0],
+                    "eom_standing": lambda: _standing_go2().J[:3].T @ [10.0, -5.0, 40.0],
+                    "contact_point": lambda: fb.equations_of_motion(*_scene()).J[:3].T @ [10.0, -5.0, 40.0],
+                    "turned": (
                         lambda: (
                             _scene()[0].frame_jacobian("FL_foot")[:3].T
                             @ _scene()[0].frame_pose("base").rotation.T
                             @ [10.0, -5.0, 40.0]
                         )
                     ),
-                    "These are the angular rows of the Jacobian; a force at a point takes the linear ones, which come first.": (
-                        lambda: _scene()[0].frame_jacobian("FL_foot")[3:].T @ [10.0, -5.0, 40.0]
-                    ),
-                    "Zero would mean that the force does nothing.": lambda: np.zeros(18),
+                    "angular_rows": lambda: _scene()[0].frame_jacobian("FL_foot")[3:].T @ [10.0, -5.0, 40.0],
+                    "zero": lambda: np.zeros(18),
+                },
+                hints={
+                    "sign": "The sign is turned: λ is what the ground does to the robot, and it stands on the side of S τ.",
+                    "world_axes": "The base's rows are in world axes. v, and so the base's rows, are in the base's own frame.",
+                    "base_zero": "The base's rows are zero: only motors leave them alone, a foot's force does not.",
+                    "standing": "This is the Jacobian of the standing robot; `moving` has another posture, so another J.",
+                    "eom_standing": "This is the J of `eom`: for the standing robot, and for the points that touch the ground.",
+                    "contact_point": "This pushes at the point that touches the ground; `push` acts at the frame's origin, 2 "
+                    "cm off.",
+                    "turned": "`push` is in world axes, and so are the rows of frame_jacobian: nothing has to be turned.",
+                    "angular_rows": "These are the angular rows of the Jacobian; a force at a point takes the linear ones, "
+                    "which come first.",
+                    "zero": "Zero would mean that the force does nothing.",
                 },
             ),
         ),
@@ -212,23 +230,23 @@ EXERCISES = (
             right=_drift,
             praise="That much joint and base acceleration is needed only to keep the foot where it is.",
             mistakes={
-                "This forgets the drift: the foot accelerates even at q̈ = 0, because J changes as the robot moves.": (
-                    lambda: np.zeros(3)
-                ),
-                "This is J̇ q̇ itself. J q̈ + J̇ q̇ = 0: which sign has b?": lambda: -_drift(),
-                "This b is for the point that touches the ground, of a ball that rolls; asked is the frame's origin.": (
-                    lambda: fb.equations_of_motion(*_scene()).b[:3]
-                ),
-                "The right vector in the foot's axes; (5) is written in world axes here.": _drift_in_the_foots_frame,
-                "ω × v is missing: the acceleration of a point is not the spatial acceleration of its body.": (
-                    _drift_of_a_spatial_acceleration
-                ),
-                "This is the velocity of the foot; the answer is an acceleration.": lambda: _velocity_of(
-                    _scene()[0], "FL_foot", 0.0
-                ),
-                "These are the angular rows of the drift; a point takes the linear ones, which come first.": lambda: (
-                    -_scene()[0].frame_drift("FL_foot")[3:]
-                ),
+                "zero": lambda: np.zeros(3),
+                "sign": lambda: -_drift(),
+                "contact_point": lambda: fb.equations_of_motion(*_scene()).b[:3],
+                "foot_axes": _drift_in_the_foots_frame,
+                "spatial": (_drift_of_a_spatial_acceleration),
+                "velocity": lambda: _velocity_of(_scene()[0], "FL_foot", 0.0),
+                "angular_rows": lambda: -_scene()[0].frame_drift("FL_foot")[3:],
+            },
+            hints={
+                "zero": "This forgets the drift: the foot accelerates even at q̈ = 0, because J changes as the robot moves.",
+                "sign": "This is J̇ q̇ itself. J q̈ + J̇ q̇ = 0: which sign has b?",
+                "contact_point": "This b is for the point that touches the ground, of a ball that rolls; asked is the frame's "
+                "origin.",
+                "foot_axes": "The right vector in the foot's axes; (5) is written in world axes here.",
+                "spatial": "ω × v is missing: the acceleration of a point is not the spatial acceleration of its body.",
+                "velocity": "This is the velocity of the foot; the answer is an acceleration.",
+                "angular_rows": "These are the angular rows of the drift; a point takes the linear ones, which come first.",
             },
         ),
         explanation="d²φ/dt² = J q̈ + J̇ q̇ = 0, so b = -J̇ q̇. `frame_drift` is J̇ q̇: linear rows first.",

@@ -41,24 +41,12 @@ def _wrong_squeezes() -> dict[str, Any]:
         return value
 
     return {
-        "The sign: these torques squeeze the other way. Torques and forces must cancel in the joint rows of (7).": torques(
-            after=lambda eom, tau: -tau
-        ),
-        "J instead of its transpose: J turns velocities of joints into velocities of feet, Jᵀ forces into torques.": (
-            lambda: -tilted_squeeze()[0].J[:, 6:] @ tilted_squeeze()[1]
-        ),
-        "The frame: J and the forces are both in world axes here; no rotation of the base is needed.": torques(
-            lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation.T)
-        ),
-        "The frame: the forces are given in world axes already; the base's rotation takes them out of it.": torques(
-            lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation)
-        ),
-        "This is the J of the standing robot; `tilted` has another posture, so another J.": (
-            lambda: -standing_go2().J[:, 6:].T @ tilted_squeeze()[1]
-        ),
-        "h is in it: that would hold the robot up as well. The answer is only what the squeeze adds.": torques(
-            after=lambda eom, tau: tau + eom.h[6:]
-        ),
+        "sign": torques(after=lambda eom, tau: -tau),
+        "transpose": lambda: -tilted_squeeze()[0].J[:, 6:] @ tilted_squeeze()[1],
+        "into_base": torques(lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation.T)),
+        "out_of_base": torques(lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation)),
+        "standing": lambda: -standing_go2().J[:, 6:].T @ tilted_squeeze()[1],
+        "h_too": torques(after=lambda eom, tau: tau + eom.h[6:]),
     }
 
 
@@ -76,77 +64,95 @@ def _judge_unloading(answer: Any) -> Verdict:
     eom = standing_go2()
     before = _standing_forces()
     if np.allclose(forces, before, atol=1e-3):
-        return Verdict(False, f"Nothing has changed yet: the front left foot still carries {forces[2]:.0f} N.")
+        return Verdict(False, f"Nothing has changed yet: the front left foot still carries {forces[2]:.0f} N.", "unchanged")
     off = eom.h[:6] - eom.J[:, :6].T @ forces
     if abs(off[:3]).max() > 0.05:
-        return Verdict(False, "The forces no longer add up to the weight: what one foot loses, the others must take.")
+        return Verdict(False, "The forces no longer add up to the weight: what one foot loses, the others must take.", "weight")
     if abs(off[3:]).max() > 0.01:
-        return Verdict(False, "The sum is right, but the moments are not: the body would turn. Add internal forces only.")
+        return Verdict(
+            False, "The sum is right, but the moments are not: the body would turn. Add internal forces only.", "moments"
+        )
     if abs(forces[2] - 20.0) > 0.05:
         more = " That is more than before: mind the sign." if forces[2] > before[2] + 0.05 else ""
-        return Verdict(False, f"The robot stays at rest, but the front left foot carries {forces[2]:.1f} N, not 20.{more}")
+        return Verdict(
+            False, f"The robot stays at rest, but the front left foot carries {forces[2]:.1f} N, not 20.{more}", "not_20"
+        )
     if forces[2::3].min() < 0.0:
-        return Verdict(False, "It balances, but some foot would have to pull on the ground.")
+        return Verdict(False, "It balances, but some foot would have to pull on the ground.", "pulls")
     return Verdict(True, "The wobbling table: FL gives up 23 N, RR as well, and the other diagonal takes them.")
 
 
-def _wrong_pairs() -> dict[str, Array]:
-    """Hint -> the shortest pair (τ, λ) that this mistake leads to, shape (20,)."""
+def _wrong_pairs() -> dict[tuple[str, str], Array]:
+    """Name of a hint, hint -> the shortest pair (τ, λ) that this mistake leads to, shape (20,)."""
     eom = rising_solo8()
     C, right_side = torque_force_matrix(eom)
     J, M, h, S, b = eom.J, eom.M, eom.h, eom.S, eom.b
-    J_M = np.hstack([J @ M @ S, J @ M @ J.T])
-    wrong = {
-        "b is missing on the right of (10): solo8 moves, and its feet stay only with J q̈ = b, not 0.": (C, right_side - b),
-        "h is missing on the right of (10): this robot has no weight.": (C, b),
-        "The sign of h: in (8) and (10) it comes to the right as + J M⁻¹ h.": (C, 2.0 * b - right_side),
-        "The sign of b: it stands on the right of (10) as in (7), with a plus.": (C, right_side - 2.0 * b),
-        "M is not inverted: a force is divided by the inertia, so J M⁻¹ it is, not J M.": (J_M, b + J @ M @ h),
+    shortest = np.linalg.pinv(C, rcond=RANK_TOLERANCE)
+    not_inverted = np.linalg.pinv(np.hstack([J @ M @ S, J @ M @ J.T]), rcond=RANK_TOLERANCE)
+    b_missing = "b is missing on the right of (10): solo8 moves, and its feet stay only with J q̈ = b, not 0."
+    M_not_inverted = "M is not inverted: a force is divided by the inertia, so J M⁻¹ it is, not J M."
+    return {
+        ("b_missing", b_missing): shortest @ (right_side - b),
+        ("h_missing", "h is missing on the right of (10): this robot has no weight."): shortest @ b,
+        ("sign_of_h", "The sign of h: in (8) and (10) it comes to the right as + J M⁻¹ h."): shortest @ (2.0 * b - right_side),
+        ("sign_of_b", "The sign of b: it stands on the right of (10) as in (7), with a plus."): shortest
+        @ (right_side - 2.0 * b),
+        ("M_not_inverted", M_not_inverted): not_inverted @ (b + J @ M @ h),
     }
-    return {hint: np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ y for hint, (A, y) in wrong.items()}
 
 
 def _same(x: Array, y: Array) -> bool:
     return bool(np.max(np.abs(x - y)) <= SAME * np.max(np.abs(y)))
 
 
-def _fault_of_pair(pair: Array) -> str:
-    """What is wrong with a shortest pair (τ, λ) of (11), or ""."""
+def _fault_of_pair(pair: Array) -> Verdict | None:
+    """What is wrong with a shortest pair (τ, λ) of (11); None where nothing is."""
     eom = rising_solo8()
     C, right_side = torque_force_matrix(eom)
     if _same(pair, torque_force_space(eom).b):
-        return ""
+        return None
     if not pair.any():
-        return "The first column is still zero, and zero does not solve (10)."
+        return Verdict(False, "The first column is still zero, and zero does not solve (10).", "zero")
     if _same(C @ pair, right_side):
-        return (
+        return Verdict(
+            False,
             "The first column solves (10), but it is longer than need be: some of the null space is in it. "
-            "Was something divided by a singular value that is only rounding?"
+            "Was something divided by a singular value that is only rounding?",
+            "longer",
         )
-    fitting = (hint for hint, wrong in _wrong_pairs().items() if _same(pair, wrong))
-    return next(fitting, "The first column does not solve (10). It is v, shape (20,): first τ, then λ.")
+    fitting = (Verdict(False, text, hint) for (hint, text), wrong in _wrong_pairs().items() if _same(pair, wrong))
+    unknown = Verdict(False, "The first column does not solve (10). It is v, shape (20,): first τ, then λ.", "no_solution")
+    return next(fitting, unknown)
 
 
-def _fault_of_directions(V: Array) -> str:
-    """What is wrong with columns that should be V⊥ of (11), or ""."""
+def _fault_of_directions(V: Array) -> Verdict | None:
+    """What is wrong with columns that should be V⊥ of (11); None where nothing is."""
     C = torque_force_matrix(rising_solo8())[0]
     orthonormal = np.allclose(V.T @ V, np.eye(V.shape[1]), atol=SAME)
     if np.max(np.abs(C @ V), initial=0.0) > SAME * np.max(np.abs(C)):
         if orthonormal:
-            return (
+            return Verdict(
+                False,
                 "v is right. The other columns are orthonormal, but C takes some of them not to zero. The SVD gives Vᵀ: "
-                "its rows are the directions, those of the null space come last."
+                "its rows are the directions, those of the null space come last.",
+                "not_null_space",
             )
-        return "v is right, but C takes some of the other columns not to zero."
+        return Verdict(False, "v is right, but C takes some of the other columns not to zero.", "not_to_zero")
     if not orthonormal:
-        return "v is right, and the columns lie in the null space, but they are not orthonormal."
+        return Verdict(
+            False, "v is right, and the columns lie in the null space, but they are not orthonormal.", "not_orthonormal"
+        )
     missing = C.shape[1] - rank(C) - V.shape[1]
     if missing == C.shape[0] - rank(C):
-        return (
+        return Verdict(
+            False,
             "v is right. But these are too few directions: one is taken away for each row of C, and not every row says "
-            "something new. How many singular values are not zero?"
+            "something new. How many singular values are not zero?",
+            "full_rank",
         )
-    return f"v is right, and so are these directions, but not all are there: {missing} missing." if missing else ""
+    if missing:
+        return Verdict(False, f"v is right, and so are these directions, but not all are there: {missing} missing.", "too_few")
+    return None
 
 
 def _judge_all_pairs(answer: Any) -> Verdict:
@@ -159,12 +165,14 @@ def _judge_all_pairs(answer: Any) -> Verdict:
     if isinstance(given, Verdict):
         return given
     if given.ndim != 2 or shape[0] != 20 or not shape[1]:
-        rows = "These are rows; pairs (τ, λ) are columns here." if given.ndim == 2 and shape[1] == 20 else ""
-        motions = "34 rows: that is (13) with q̈; in (11) are τ and λ alone." if shape[:1] == (34,) else ""
+        if given.ndim == 2 and shape[1] == 20:
+            return Verdict(False, "These are rows; pairs (τ, λ) are columns here.", "transpose")
+        if shape[:1] == (34,):
+            return Verdict(False, "34 rows: that is (13) with q̈; in (11) are τ and λ alone.", "with_qdd")
         form = "One matrix is asked for, of 20 rows: 8 torques and 12 forces. v is its first column, then comes V⊥."
-        return Verdict(False, rows or motions or form)
-    fault = _fault_of_pair(given[:, 0]) or _fault_of_directions(given[:, 1:])
-    return Verdict(not fault, fault or "Ten directions for eight motors, and nobody typed a 10: the singular values said so.")
+        return Verdict(False, form, "no_matrix")
+    right = Verdict(True, "Ten directions for eight motors, and nobody typed a 10: the singular values said so.")
+    return _fault_of_pair(given[:, 0]) or _fault_of_directions(given[:, 1:]) or right
 
 
 EXERCISES = (
@@ -179,12 +187,20 @@ EXERCISES = (
             right=lambda: rank(fb.accelerations_from_torques(_on_diagonal()).A),
             praise="Two feet have one internal force, along the line between them; every other direction moves something.",
             mistakes={
-                "That is all of them. One thing can be done between two feet that moves nothing.": lambda: 12,
-                "That is how many do not move it.": lambda: 1,
-                "That is the number of force components k; the answer is the number of directions of β.": lambda: 6,
-                "That is for three feet.": lambda: 9,
-                "That is how many motions of the base two feet can stop; the legs move, too.": lambda: 5,
-                "You have counted more than one internal force. Which pushes of two feet turn nothing?": lambda: 10,
+                "all": lambda: 12,
+                "unmoving": lambda: 1,
+                "components": lambda: 6,
+                "three_feet": lambda: 9,
+                "base_alone": lambda: 5,
+                "more_internal": lambda: 10,
+            },
+            hints={
+                "all": "That is all of them. One thing can be done between two feet that moves nothing.",
+                "unmoving": "That is how many do not move it.",
+                "components": "That is the number of force components k; the answer is the number of directions of β.",
+                "three_feet": "That is for three feet.",
+                "base_alone": "That is how many motions of the base two feet can stop; the legs move, too.",
+                "more_internal": "You have counted more than one internal force. Which pushes of two feet turn nothing?",
             },
         ),
         explanation="d - r + rank J_b = 12 - 6 + 5: about the line through both feet no point foot can stop the base from "
@@ -199,8 +215,19 @@ EXERCISES = (
             Numeric(
                 right=_squeeze_torques,
                 praise="Internal forces are answered joint by joint, in any posture, at any velocity, without M and without h.",
-                mistakes={"These are no torques at all, so the forces stay as they are.": lambda: np.zeros(12)}
-                | _wrong_squeezes(),
+                mistakes={"zero": lambda: np.zeros(12)} | _wrong_squeezes(),
+                hints={
+                    "sign": "The sign: these torques squeeze the other way. Torques and forces must cancel in the joint rows "
+                    "of (7).",
+                    "transpose": "J instead of its transpose: J turns velocities of joints into velocities of feet, Jᵀ forces "
+                    "into torques.",
+                    "into_base": "The frame: J and the forces are both in world axes here; no rotation of the base is needed.",
+                    "out_of_base": "The frame: the forces are given in world axes already; the base's rotation takes them out "
+                    "of it.",
+                    "standing": "This is the J of the standing robot; `tilted` has another posture, so another J.",
+                    "h_too": "h is in it: that would hold the robot up as well. The answer is only what the squeeze adds.",
+                    "zero": "These are no torques at all, so the forces stay as they are.",
+                },
             ),
             {
                 (18,): "18 numbers: these are generalised forces of base and joints. Motors reach the joints alone: see S.",

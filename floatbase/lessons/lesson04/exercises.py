@@ -40,17 +40,17 @@ def _gradients() -> dict[str, Callable[[], Any]]:
 
     right = gradient()
     return {
-        "There is nothing there yet: at a minimum the gradient is zero, but τ = 0 is none.": lambda: np.zeros(12),
-        "The sign: residual = actual - desired, and the gradient points uphill.": lambda: -right(),
-        "The drift is forgotten: the centre of mass accelerates by J_c q̈ + J̇_c q̇.": gradient(drift=0.0),
-        "The drift has the wrong sign.": gradient(drift=-1.0),
-        "η has an offset: with the motors off the robot accelerates too, by `eta_moving.b`.": gradient(offset=0.0),
-        "The offset of η and the drift are both forgotten.": gradient(drift=0.0, offset=0.0),
-        "The frame: `desired` is in world axes, as Jacobian and drift are; do not turn it.": gradient(turned=1),
-        "The frame: `desired` is in world axes already; the base's rotation takes it out of them.": gradient(turned=2),
-        "A gradient comes back by the transpose of η's matrix; a pseudo-inverse is for points.": gradient(back=np.linalg.pinv),
-        "This is the cost of the standing robot; the moving one has another Jacobian and drift.": _gradient_of_standing,
-        "The cost has a ½ in front, so the square's 2 cancels.": lambda: 2 * right(),
+        "zero": lambda: np.zeros(12),
+        "sign": lambda: -right(),
+        "drift_forgotten": gradient(drift=0.0),
+        "drift_sign": gradient(drift=-1.0),
+        "offset_forgotten": gradient(offset=0.0),
+        "offset_and_drift_forgotten": gradient(drift=0.0, offset=0.0),
+        "into_world": gradient(turned=1),
+        "out_of_world": gradient(turned=2),
+        "pseudo_inverse": gradient(back=np.linalg.pinv),
+        "standing": _gradient_of_standing,
+        "half": lambda: 2 * right(),
     }
 
 
@@ -109,17 +109,19 @@ def _judge_design(answer: Any) -> Verdict:
     turning = np.linalg.norm(eta(tau)[3:6])
     friction = np.linalg.norm(zeta(tau).reshape(4, 3)[:, :2], axis=1).max()
     if np.linalg.norm(a + DESIRED) < 0.05:
-        return Verdict(False, "The sign: this accelerates to the right.")
+        return Verdict(False, "The sign: this accelerates to the right.", "sign")
     if np.linalg.norm(a - DESIRED) > 0.01:
         moves = f"The centre of mass accelerates by {_rounded(a)} m/s², not {_rounded(DESIRED)}"
-        return Verdict(False, f"{moves}: weigh that more.")
+        return Verdict(False, f"{moves}: weigh that more.", "com")
     if turning > 0.05:
         return Verdict(
-            False, f"The centre of mass is right, but the base turns at {turning:.1f} rad/s². Which cost is missing?"
+            False, f"The centre of mass is right, but the base turns at {turning:.1f} rad/s². Which cost is missing?", "turning"
         )
     if friction > 6.0:
         most = f"one foot leans on friction with {friction:.1f} N"
-        return Verdict(False, f"It moves as desired, but {most}. Effort does not mind; a cost on λ does, pulled back to τ.")
+        return Verdict(
+            False, f"It moves as desired, but {most}. Effort does not mind; a cost on λ does, pulled back to τ.", "friction"
+        )
     return Verdict(True, "Three costs, each in the space where it is easy to say, added in the space where the motors are.")
 
 
@@ -139,6 +141,19 @@ EXERCISES = (
                 right=_gradient_by_newton,
                 praise="The chain rule: points go forward by η, slopes come back by its transpose.",
                 mistakes=_gradients(),
+                hints={
+                    "zero": "There is nothing there yet: at a minimum the gradient is zero, but τ = 0 is none.",
+                    "sign": "The sign: residual = actual - desired, and the gradient points uphill.",
+                    "drift_forgotten": "The drift is forgotten: the centre of mass accelerates by J_c q̈ + J̇_c q̇.",
+                    "drift_sign": "The drift has the wrong sign.",
+                    "offset_forgotten": "η has an offset: with the motors off the robot accelerates too, by `eta_moving.b`.",
+                    "offset_and_drift_forgotten": "The offset of η and the drift are both forgotten.",
+                    "into_world": "The frame: `desired` is in world axes, as Jacobian and drift are; do not turn it.",
+                    "out_of_world": "The frame: `desired` is in world axes already; the base's rotation takes it out of them.",
+                    "pseudo_inverse": "A gradient comes back by the transpose of η's matrix; a pseudo-inverse is for points.",
+                    "standing": "This is the cost of the standing robot; the moving one has another Jacobian and drift.",
+                    "half": "The cost has a ½ in front, so the square's 2 cancels.",
+                },
             ),
             {
                 (18,): "18 numbers: that is the slope on q̈. One step is left to come back to the torques.",
@@ -161,12 +176,20 @@ EXERCISES = (
             right=lambda: _flat_on_three_feet() - _squeezes_on_three_feet(),
             praise="Three squeezes are left on three feet; the other three flat directions take the free foot where you like.",
             mistakes={
-                "Those are all flat directions. Can three feet still squeeze, and what does that move?": _flat_on_three_feet,
-                "So many are flat for `com` alone, or if squeezes count twice; for com + turn it is six.": _flat_for_com,
-                "Does a free foot have to stay where it is? Neither cost speaks of it.": lambda: 0,
-                "One foot, but a foot can go in more than one direction.": lambda: 1,
-                "Upwards is a direction, too: no ground is in the way.": lambda: 2,
-                "That is all of β. Directions along which the costs are curved do not count.": lambda: _on_three_feet().d,
+                "all_flat": _flat_on_three_feet,
+                "com_alone": _flat_for_com,
+                "none": lambda: 0,
+                "one": lambda: 1,
+                "two": lambda: 2,
+                "all": lambda: _on_three_feet().d,
+            },
+            hints={
+                "all_flat": "Those are all flat directions. Can three feet still squeeze, and what does that move?",
+                "com_alone": "So many are flat for `com` alone, or if squeezes count twice; for com + turn it is six.",
+                "none": "Does a free foot have to stay where it is? Neither cost speaks of it.",
+                "one": "One foot, but a foot can go in more than one direction.",
+                "two": "Upwards is a direction, too: no ground is in the way.",
+                "all": "That is all of β. Directions along which the costs are curved do not count.",
             },
         ),
         explanation="Three feet have 9 forces, of which 9 - 6 = 3 are squeezes. They are flat and move nothing. The other "

@@ -49,15 +49,13 @@ def _moments() -> dict[str, Callable[[], Any]]:
         return state.com
 
     return {
-        "There is nothing there yet: a foot beside the centre of mass has a lever.": lambda: np.zeros((3, 9)),
-        "The opposite moment: the lever goes from x_c to the foot, and r × y, r × x are columns, not rows.": moments(com, -1.0),
-        "These are moments about the base's origin; x_c is another point.": moments(
-            lambda state: state.frame_pose("base").translation
-        ),
-        "These are moments about the world's origin: subtract x_c.": moments(lambda state: np.zeros(3)),
-        "The unit: this is in N·mm; lengths are in m.": moments(com, 1000.0),
-        "The right blocks in the opposite order: λ begins with the first row of `x_feet`.": moments(com, feet=(2, 1, 0)),
-        "The right blocks in a wrong order: λ has the feet as `x_feet` has them.": moments(com, feet=(1, 0, 2)),
+        "zero": lambda: np.zeros((3, 9)),
+        "sign": moments(com, -1.0),
+        "about_base": moments(lambda state: state.frame_pose("base").translation),
+        "about_origin": moments(lambda state: np.zeros(3)),
+        "millimetres": moments(com, 1000.0),
+        "reversed": moments(com, feet=(2, 1, 0)),
+        "order": moments(com, feet=(1, 0, 2)),
     }
 
 
@@ -73,14 +71,14 @@ def _forces() -> dict[str, Callable[[], Any]]:
     m, weight = robot.mass, np.array([0.0, 0.0, robot.weight])
     g = weight / m
     return {
-        "That holds it still. What accelerates it comes on top.": lambda: weight,
-        "Gravity is forgotten: the ground must carry the weight, too.": lambda: m * UPWARDS,
-        "The sign of gravity: it pulls down, so the ground must push up by more.": lambda: m * UPWARDS - weight,
-        "The weight counts twice.": lambda: m * UPWARDS + 2 * weight,
-        "The mass is forgotten: these are m/s², not N.": lambda: UPWARDS + g,
-        "The mass is forgotten in one of the two parts.": lambda: UPWARDS + weight,
-        "9.81 is an acceleration; times the mass it is a force.": lambda: m * UPWARDS + g,
-        "Weight times acceleration: the weight is m g already.": lambda: robot.weight * UPWARDS + weight,
+        "weight_alone": lambda: weight,
+        "no_gravity": lambda: m * UPWARDS,
+        "gravity_sign": lambda: m * UPWARDS - weight,
+        "weight_twice": lambda: m * UPWARDS + 2 * weight,
+        "no_mass": lambda: UPWARDS + g,
+        "no_mass_on_a": lambda: UPWARDS + weight,
+        "g_without_mass": lambda: m * UPWARDS + g,
+        "weight_times_a": lambda: robot.weight * UPWARDS + weight,
     }
 
 
@@ -110,16 +108,16 @@ def _torques() -> dict[str, Callable[[], Any]]:
         return space.forces(standing_still(space))
 
     return {
-        "There is nothing there yet: without torques the feet carry hardly anything.": lambda: np.zeros(18),
-        "The pseudo-inverse of the whole C gives the shortest (τ, λ). λ is not to be chosen: it is `pressed`.": whole,
-        "a is forgotten: gravity is in it.": torques(offset=0.0),
-        "λ is forgotten: move C_λ λ to the right side, then solve for τ.": torques(forces=0.0),
-        "The sign of C_λ λ: it changes when it moves to the right side.": torques(forces=-1.0),
-        "The sign of a.": torques(offset=-1.0),
-        "A transpose is no inverse: use the pseudo-inverse of C_τ.": torques(back=np.transpose),
-        "These hold all joints still, the arm too. The same forces can be had for less.": still(pressed),
-        "These hold the robot still without the squeeze.": still(standing_forces),
-        "These are for the forces of standing still; `pressed` has 20 N more between the front feet.": lambda: (
+        "zero": lambda: np.zeros(18),
+        "whole_C": whole,
+        "a_forgotten": torques(offset=0.0),
+        "forces_forgotten": torques(forces=0.0),
+        "forces_sign": torques(forces=-1.0),
+        "a_sign": torques(offset=-1.0),
+        "transpose": torques(back=np.transpose),
+        "all_still": still(pressed),
+        "no_squeeze": still(standing_forces),
+        "standing": lambda: (
             np.linalg.pinv(fb.forces_from_torques(arm_robot()).A) @ (standing_forces() - fb.forces_from_torques(arm_robot()).b)
         ),
     }
@@ -157,19 +155,21 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
     moment = np.cross(eom.contacts.positions(state) - state.com, points).sum(axis=0)
     if np.linalg.norm(force) > MISSED_FORCE:
         if _is_on_torques(eom, forces):
-            return Verdict(False, "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the pullback.")
+            return Verdict(
+                False, "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the pullback.", "on_torques"
+            )
         f_c = about(points.sum(axis=0), "N", digits=3)
         better = "A smaller weight for the preference, or a better preference."
-        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. {better}")
+        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. {better}", "force")
     if np.linalg.norm(moment) > MISSED_MOMENT:
-        return Verdict(False, f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.")
+        return Verdict(False, f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.", "moment")
     if points[:, 2].min() <= 0:
-        return Verdict(False, "The wrench is right, but a foot pulls on the ground.")
+        return Verdict(False, "The wrench is right, but a foot pulls on the ground.", "pulls")
     lean = leans(eom.contacts, forces)
     if lean.max() > MOST_LEAN + ROUNDING:
         worst = eom.contacts.names[int(np.argmax(np.round(lean, 4)))].split("_")[0]
         prefers = "What does your preference call a good direction for a force, and which would be better?"
-        return Verdict(False, f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}")
+        return Verdict(False, f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}", "leans")
     return None
 
 
@@ -184,7 +184,9 @@ def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
     record = fb.rollout(fb.Simulation(eom.robot, MOST_LEAN), GivenForces(eom.robot, eom.contacts, forces), SHORT)
     slip = record.slip().max() if record.outcome == "completed" else np.inf
     if slip > MOST_SLIP:
-        return Verdict(False, "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further inside.")
+        return Verdict(
+            False, "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further inside.", "slips"
+        )
     speed = record.final.com_velocity[0]
     return Verdict(True, f"On MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
 
@@ -203,6 +205,15 @@ EXERCISES = (
                 right=_moments_by_jacobian,
                 praise="One block for each foot; the base's rows of J say the same.",
                 mistakes=_moments(),
+                hints={
+                    "zero": "There is nothing there yet: a foot beside the centre of mass has a lever.",
+                    "sign": "The opposite moment: the lever goes from x_c to the foot, and r × y, r × x are columns, not rows.",
+                    "about_base": "These are moments about the base's origin; x_c is another point.",
+                    "about_origin": "These are moments about the world's origin: subtract x_c.",
+                    "millimetres": "The unit: this is in N·mm; lengths are in m.",
+                    "reversed": "The right blocks in the opposite order: λ begins with the first row of `x_feet`.",
+                    "order": "The right blocks in a wrong order: λ has the feet as `x_feet` has them.",
+                },
             ),
             {
                 (3, 12): "Twelve columns are for four feet; FL is in the air.",
@@ -222,6 +233,16 @@ EXERCISES = (
             right=_force_by_momentum,
             praise="m a, and m g on top: gravity is the one outside force that is not in λ.",
             mistakes=_forces(),
+            hints={
+                "weight_alone": "That holds it still. What accelerates it comes on top.",
+                "no_gravity": "Gravity is forgotten: the ground must carry the weight, too.",
+                "gravity_sign": "The sign of gravity: it pulls down, so the ground must push up by more.",
+                "weight_twice": "The weight counts twice.",
+                "no_mass": "The mass is forgotten: these are m/s², not N.",
+                "no_mass_on_a": "The mass is forgotten in one of the two parts.",
+                "g_without_mass": "9.81 is an acceleration; times the mass it is a force.",
+                "weight_times_a": "Weight times acceleration: the weight is m g already.",
+            },
         ),
         names=lambda: {"robot": standing_go2().robot},
         explanation="Newton: m a = f_c + m g with g pointing down. `desired_wrench(state, a)` of floatbase.objectives does it.",
@@ -236,6 +257,19 @@ EXERCISES = (
                 right=_smallest_by_zeta,
                 praise="(25) in one line: what λ leaves to τ, by the pseudo-inverse of C_τ alone.",
                 mistakes=_torques(),
+                hints={
+                    "zero": "There is nothing there yet: without torques the feet carry hardly anything.",
+                    "whole_C": "The pseudo-inverse of the whole C gives the shortest (τ, λ). λ is not to be chosen: it is "
+                    "`pressed`.",
+                    "a_forgotten": "a is forgotten: gravity is in it.",
+                    "forces_forgotten": "λ is forgotten: move C_λ λ to the right side, then solve for τ.",
+                    "forces_sign": "The sign of C_λ λ: it changes when it moves to the right side.",
+                    "a_sign": "The sign of a.",
+                    "transpose": "A transpose is no inverse: use the pseudo-inverse of C_τ.",
+                    "all_still": "These hold all joints still, the arm too. The same forces can be had for less.",
+                    "no_squeeze": "These hold the robot still without the squeeze.",
+                    "standing": "These are for the forces of standing still; `pressed` has 20 N more between the front feet.",
+                },
             ),
             {
                 (12,): "12 numbers: those are forces. anymal_kinova has 18 motors.",

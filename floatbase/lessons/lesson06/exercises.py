@@ -83,19 +83,19 @@ def _out_of_balance(f: Array) -> Verdict | None:
     carried = weight * np.array([0.0, 0.0, 1.0])
     missing = float(np.linalg.norm(f.sum(axis=0) - carried))
     sums = {
-        "Nobody carries the robot yet.": 0.0 * n,
-        "The sign: λ is what the ground does to the robot, and it pushes upwards.": -carried,
-        "These forces carry only the weight's part along the normal: the robot slides.": weight * n[2] * n,
-        "They add up to the weight, but along the slope's normal; gravity is vertical.": weight * n,
+        ("nobody", "Nobody carries the robot yet."): 0.0 * n,
+        ("sign", "The sign: λ is what the ground does to the robot, and it pushes upwards."): -carried,
+        ("slides", "These forces carry only the weight's part along the normal: the robot slides."): weight * n[2] * n,
+        ("along_normal", "They add up to the weight, but along the slope's normal; gravity is vertical."): weight * n,
     }
-    for hint, total in sums.items():
+    for (hint, text), total in sums.items():
         if np.linalg.norm(f.sum(axis=0) - total) < BALANCE:
-            return Verdict(False, hint)
+            return Verdict(False, text, hint)
     if missing > BALANCE:
-        return Verdict(False, f"The sum is {missing:.1f} N away from what carries the weight.")
+        return Verdict(False, f"The sum is {missing:.1f} N away from what carries the weight.", "sum")
     moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
     if moment > BALANCE:
-        return Verdict(False, f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.")
+        return Verdict(False, f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.", "moment")
     return None
 
 
@@ -108,12 +108,16 @@ def _judge_margins(f: Array) -> Verdict:
     if margins.min() >= ROOM - SOLVED:
         return Verdict(True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N.")
     if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
-        return Verdict(False, f"In balance. But all feet hold alike against sliding, and the upper ones carry little: {least}.")
+        return Verdict(
+            False, f"In balance. But all feet hold alike against sliding, and the upper ones carry little: {least}.", "alike"
+        )
     if margins.min() >= -BALANCE:
-        return Verdict(False, f"In balance and in the cones, but {least} only.")
+        return Verdict(False, f"In balance and in the cones, but {least} only.", "in_cones")
     if upright.min() >= ROOM:
-        return Verdict(False, f"In balance, with room enough in cones about the vertical; in the slope's own, {least}.")
-    return Verdict(False, f"In balance, but outside of a cone: {least}.")
+        return Verdict(
+            False, f"In balance, with room enough in cones about the vertical; in the slope's own, {least}.", "vertical_cones"
+        )
+    return Verdict(False, f"In balance, but outside of a cone: {least}.", "outside")
 
 
 EXERCISES = (
@@ -132,25 +136,26 @@ EXERCISES = (
                 right=_rows_from_edges,
                 praise="Five half-spaces; where two meet is an edge, and the edges lie on the cone.",
                 mistakes={
-                    "Nothing there yet: zero rows allow every force.": lambda: np.zeros((5, 3)),
-                    "That polyhedron lies outside the cone: its facets touch it in their middle.": partial(
-                        _rows_from_edges, BANK_MU / np.cos(np.pi / 5)
-                    ),
-                    "The normal is not of length one: make it so before its length counts as friction.": lambda: _with_tangents(
-                        BANK_MU * np.cos(np.pi / 5), BANK
-                    ),
-                    "The right half-spaces, in another scale: without the normal's part each row has length one.": lambda: (
-                        _rows_from_edges() / np.linalg.norm(_rows_from_edges(), axis=1)[:, None]
-                    ),
-                    "The sign: rows @ f ≤ 0 must hold for forces inside.": lambda: -_rows_from_edges(),
-                    "The sign of the normal's part: with + the rows forbid to push.": lambda: _with_tangents(
-                        -BANK_MU * np.cos(np.pi / 5)
-                    ),
-                    "μ is missing: these are the facets for μ = 1.": lambda: _rows_from_edges(1.0),
-                    "The facets are turned by half a facet: facet 0 must face t1.": lambda: _rows_from_edges(turn=np.pi / 5),
-                    "These are the rows of level ground: use the normal that is given.": lambda: _rows_from_edges(
-                        normal=[0.0, 0.0, 1.0]
-                    ),
+                    "zero": lambda: np.zeros((5, 3)),
+                    "outside": partial(_rows_from_edges, BANK_MU / np.cos(np.pi / 5)),
+                    "not_unit": lambda: _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK),
+                    "scale": lambda: _rows_from_edges() / np.linalg.norm(_rows_from_edges(), axis=1)[:, None],
+                    "sign": lambda: -_rows_from_edges(),
+                    "normal_sign": lambda: _with_tangents(-BANK_MU * np.cos(np.pi / 5)),
+                    "no_mu": lambda: _rows_from_edges(1.0),
+                    "turned": lambda: _rows_from_edges(turn=np.pi / 5),
+                    "level": lambda: _rows_from_edges(normal=[0.0, 0.0, 1.0]),
+                },
+                hints={
+                    "zero": "Nothing there yet: zero rows allow every force.",
+                    "outside": "That polyhedron lies outside the cone: its facets touch it in their middle.",
+                    "not_unit": "The normal is not of length one: make it so before its length counts as friction.",
+                    "scale": "The right half-spaces, in another scale: without the normal's part each row has length one.",
+                    "sign": "The sign: rows @ f ≤ 0 must hold for forces inside.",
+                    "normal_sign": "The sign of the normal's part: with + the rows forbid to push.",
+                    "no_mu": "μ is missing: these are the facets for μ = 1.",
+                    "turned": "The facets are turned by half a facet: facet 0 must face t1.",
+                    "level": "These are the rows of level ground: use the normal that is given.",
                 },
             ),
             {
@@ -170,23 +175,26 @@ EXERCISES = (
             right=_slip_angle,
             praise="Two degrees less than the cone itself: the price of flat facets.",
             mistakes={
-                "At 45° a force straight up needs μ = 1.": lambda: 45.0,
-                "That is in radians.": lambda: np.deg2rad(_slip_angle()),
-                "That is the round cone. A facet faces uphill, as this force leans; its middle allows less than μ.": partial(
-                    _slip_angle, None
-                ),
-                "That is the angle in radians, and of the round cone.": lambda: np.deg2rad(_slip_angle(None)),
-                "A sine: on a slope α_∥ / α_⊥ is a tangent.": lambda: np.rad2deg(np.arcsin(MU * np.cos(np.pi / 8))),
-                "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet allows less than μ.": lambda: np.rad2deg(
-                    np.arcsin(MU)
-                ),
-                "That is for 4 facets, as before; here are 8.": partial(_slip_angle, 4),
-                "That is for facets outside the cone; ask what their middle allows inside.": lambda: np.rad2deg(
-                    np.arctan(MU / np.cos(np.pi / 8))
-                ),
-                "That is the loss in degrees on the angle itself; the cosine goes with μ.": lambda: (
-                    _slip_angle(None) * np.cos(np.pi / 8)
-                ),
+                "45": lambda: 45.0,
+                "radians": lambda: np.deg2rad(_slip_angle()),
+                "round": partial(_slip_angle, None),
+                "round_radians": lambda: np.deg2rad(_slip_angle(None)),
+                "sine": lambda: np.rad2deg(np.arcsin(MU * np.cos(np.pi / 8))),
+                "round_sine": lambda: np.rad2deg(np.arcsin(MU)),
+                "four_facets": partial(_slip_angle, 4),
+                "outside": lambda: np.rad2deg(np.arctan(MU / np.cos(np.pi / 8))),
+                "cosine_on_angle": lambda: _slip_angle(None) * np.cos(np.pi / 8),
+            },
+            hints={
+                "45": "At 45° a force straight up needs μ = 1.",
+                "radians": "That is in radians.",
+                "round": "That is the round cone. A facet faces uphill, as this force leans; its middle allows less than μ.",
+                "round_radians": "That is the angle in radians, and of the round cone.",
+                "sine": "A sine: on a slope α_∥ / α_⊥ is a tangent.",
+                "round_sine": "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet allows less than μ.",
+                "four_facets": "That is for 4 facets, as before; here are 8.",
+                "outside": "That is for facets outside the cone; ask what their middle allows inside.",
+                "cosine_on_angle": "That is the loss in degrees on the angle itself; the cosine goes with μ.",
             },
         ),
         explanation="α_∥ / α_⊥ of a vertical force is the slope's tangent, and the middle of a facet allows μ cos(π/8).",
@@ -201,16 +209,20 @@ EXERCISES = (
             right=partial(_fewest, _lost_force),
             praise="With 10 facets 4.9 % are lost in their middle, nothing at the edges.",
             mistakes={
-                "That many are needed to lose less than 5 % of the area; the question is about force.": partial(
-                    _fewest, _lost_area
-                ),
-                "That is for a polyhedron outside: what its edges promise too much.": lambda: _fewest(
-                    partial(_lost_force, inside=False)
-                ),
-                "One facet too few: it loses 6 %.": lambda: _fewest(_lost_force) - 1,
-                "Four lose 29 %.": lambda: 4,
-                "Eight lose 7.6 %.": lambda: 8,
-                "Enough, but not the fewest.": lambda: 16,
+                "area": partial(_fewest, _lost_area),
+                "outside": lambda: _fewest(partial(_lost_force, inside=False)),
+                "one_too_few": lambda: _fewest(_lost_force) - 1,
+                "four": lambda: 4,
+                "eight": lambda: 8,
+                "not_fewest": lambda: 16,
+            },
+            hints={
+                "area": "That many are needed to lose less than 5 % of the area; the question is about force.",
+                "outside": "That is for a polyhedron outside: what its edges promise too much.",
+                "one_too_few": "One facet too few: it loses 6 %.",
+                "four": "Four lose 29 %.",
+                "eight": "Eight lose 7.6 %.",
+                "not_fewest": "Enough, but not the fewest.",
             },
         ),
         explanation="1 - cos(π/n) < 0.05; for small angles it is about 5 / n².",

@@ -44,32 +44,36 @@ def _judge_rows(answer: Any) -> Verdict:
     if isinstance(G, Verdict):
         return G
     if not np.any(G):
-        return Verdict(False, "There is nothing there yet: rows of zeros forbid nothing.")
+        return Verdict(False, "There is nothing there yet: rows of zeros forbid nothing.", "zero")
     felt = [i for i in range(42) if np.any(G[:, i])]
     if not set(felt) <= {36, 37, 38}:
-        return Verdict(False, f"These rows feel {_places(felt)}. RL is the third foot of λ: which columns of x are its own?")
+        return Verdict(
+            False, f"These rows feel {_places(felt)}. RL is the third foot of λ: which columns of x are its own?", "columns"
+        )
     if not np.all(np.any(G, axis=1)):
-        return Verdict(False, "One of the four rows is zero: a pyramid has four sides.")
+        return Verdict(False, "One of the four rows is zero: a pyramid has four sides.", "zero_row")
     own = G[:, 36:39]
     if _agrees(own, INNER):
         return Verdict(True, "Four rows of 42 numbers, three of them at work: that is all a solver knows of a friction cone.")
-    for hint, wrong in {
-        "The sign: these rows are G x ≥ 0. A force straight up must give G x ≤ 0.": _agrees(-own, INNER),
-        "This pyramid lies around the cone: at its edges it believes in more than μ. Inside, μ' is μ cos 45°.": _agrees(
-            own, MU
-        ),
-        "np.cos takes radians: 45° is π/4.": _agrees(own, MU * np.cos(45)),
-        "This is the pyramid of a ground with μ = 1/0.7: which of the two forces is at most how much of the other?": _agrees(
-            own, 1 / INNER
-        ),
-    }.items():
-        if wrong:
-            return Verdict(False, hint)
+    if _agrees(-own, INNER):
+        return Verdict(False, "The sign: these rows are G x ≥ 0. A force straight up must give G x ≤ 0.", "sign")
+    if _agrees(own, MU):
+        around = "This pyramid lies around the cone: at its edges it believes in more than μ. Inside, μ' is μ cos 45°."
+        return Verdict(False, around, "around")
+    if _agrees(own, MU * np.cos(45)):
+        return Verdict(False, "np.cos takes radians: 45° is π/4.", "radians")
+    if _agrees(own, 1 / INNER):
+        turned = "This is the pyramid of a ground with μ = 1/0.7: which of the two forces is at most how much of the other?"
+        return Verdict(False, turned, "inverse_mu")
     if np.any(own @ [0.0, 0.0, 1.0] > 0):
-        return Verdict(False, "A force straight up is forbidden by these rows: look at the signs of the last column.")
+        return Verdict(
+            False, "A force straight up is forbidden by these rows: look at the signs of the last column.", "up_forbidden"
+        )
     if np.all(own @ [0.2, 0.0, 1.0] <= 0) and np.all(own @ [2.0, 0.0, 1.0] <= 0):
-        return Verdict(False, "These rows let the foot lean forwards as far as it likes.")
-    return Verdict(False, "These rows allow other forces than the pyramid with its sides towards ±x and ±y does.")
+        return Verdict(False, "These rows let the foot lean forwards as far as it likes.", "leans_freely")
+    return Verdict(
+        False, "These rows allow other forces than the pyramid with its sides towards ±x and ±y does.", "other_forces"
+    )
 
 
 def _places(columns: list[int]) -> str:
@@ -116,15 +120,15 @@ def _changes() -> dict[str, Callable[[], Any]]:
         return value
 
     return {
-        "There is nothing there yet: an active row has a price.": lambda: 0.0,
-        "The sign: more room never raises the least ψ.": change(sign=1.0),
-        "The factor of the facets is missing: with 8 of them μ' is μ cos(π/8).": change(cos=0.0),
-        "That is the factor of 4 facets, cos(π/4); here are 8.": change(cos=np.pi / 4),
-        "Each row gets the room of its own foot, μ' times that foot's normal force, not that of all feet.": change(part="all"),
-        "The normal forces are missing: a row d·f ≤ μ' n·f gets as much more room as n·f says.": change(part="1"),
-        "The room of a row grows with the normal force of its foot, not with how far it leans.": change(part="tangent"),
-        "So much for Δμ = 1; μ grows by 0.005.": change(grows=1.0),
-        "So much for Δμ = 0.01; here it is 0.005.": change(grows=2 * STEP),
+        "zero": lambda: 0.0,
+        "sign": change(sign=1.0),
+        "no_facets": change(cos=0.0),
+        "four_facets": change(cos=np.pi / 4),
+        "all_feet": change(part="all"),
+        "no_normal": change(part="1"),
+        "leaning": change(part="tangent"),
+        "whole_mu": change(grows=1.0),
+        "twice_as_much": change(grows=2 * STEP),
     }
 
 
@@ -142,29 +146,35 @@ def _judge_design(answer: Any) -> Verdict:
     if isinstance(given, Verdict):
         return given
     if np.any(given < 0) or given[2] == 0:
-        return Verdict(False, "Gains and weights are not negative, and the centre of mass needs a weight above 0.")
+        return Verdict(False, "Gains and weights are not negative, and the centre of mass needs a weight above 0.", "negative")
     try:
         record = _record(tuple(given.tolist()))
     except InputError as error:
-        return Verdict(False, str(error))
+        return Verdict(False, str(error), "input_error")
     if record.outcome != "completed":
-        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.")
+        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.", "falls")
     away = 1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
     strayed = 1e3 * record.slip().max()
     end = about(round(away[-1], 1), "mm", floor=0.5)
     told = f"{about(away.max(), 'mm')} away, {end} at the end; a foot strays {about(strayed, 'mm')}"
     if away.max() > AWAY and away[-1] > BACK:
-        return Verdict(False, f"It goes too far and does not come back: {told}. Look at what each gain does to e.")
+        return Verdict(
+            False, f"It goes too far and does not come back: {told}. Look at what each gain does to e.", "stays_away"
+        )
     if away[-1] > BACK:
-        return Verdict(False, f"It creeps home too slowly: {told}. A damper without a spring behind it forgets the place.")
+        return Verdict(
+            False, f"It creeps home too slowly: {told}. A damper without a spring behind it forgets the place.", "creeps"
+        )
     if away.max() > AWAY and strayed > STRAYED:
         return Verdict(
-            False, f"It goes too far, and a foot strays: {told}. A spring pulls hardest at the far end, a damper earlier."
+            False,
+            f"It goes too far, and a foot strays: {told}. A spring pulls hardest at the far end, a damper earlier.",
+            "too_far_and_strays",
         )
     if away.max() > AWAY:
-        return Verdict(False, f"It goes too far: {told}. When is there most to gain, early or late in the push?")
+        return Verdict(False, f"It goes too far: {told}. When is there most to gain, early or late in the push?", "too_far")
     if strayed > STRAYED:
-        return Verdict(False, f"A foot strays: {told}. It pulls home harder than it needs to.")
+        return Verdict(False, f"A foot strays: {told}. It pulls home harder than it needs to.", "strays")
     return Verdict(
         True, f"On the physics: {told}. Damping brakes while the push still lasts; the spring then only brings it home."
     )
@@ -181,15 +191,26 @@ EXERCISES = (
             right=_rows_on_three_feet,
             praise="Six sides and a normal force for each foot that stands, two limits for each motor.",
             mistakes={
-                "Those are the motors alone. What does each foot that stands add?": lambda: 24,
-                "That is the lesson's own count: four feet with four facets.": lambda: 44,
-                "The rows of the normal forces are missing: feet do not pull.": lambda: 3 * 6 + 24,
-                "A motor has two limits, one each way.": lambda: 3 * 7 + 12,
-                "The motors are missing.": lambda: 3 * 7,
-                "Four facets, or nine motors? Each foot has six facets here, and all twelve motors count.": lambda: 3 * 5 + 24,
-                "The normal forces are missing, and a motor has two limits, one each way.": lambda: 3 * 6 + 12,
-                "That is for four feet; one of them is in the air.": lambda: 4 * 7 + 24,
-                "The rows of (7) are equalities: 18 of motion and 9 for three feet do not count here.": lambda: 3 * 7 + 24 + 27,
+                "motors_alone": lambda: 24,
+                "of_the_lesson": lambda: 44,
+                "no_normal": lambda: 3 * 6 + 24,
+                "one_limit": lambda: 3 * 7 + 12,
+                "no_motors": lambda: 3 * 7,
+                "four_facets": lambda: 3 * 5 + 24,
+                "no_normal_one_limit": lambda: 3 * 6 + 12,
+                "four_feet": lambda: 4 * 7 + 24,
+                "equalities": lambda: 3 * 7 + 24 + 27,
+            },
+            hints={
+                "motors_alone": "Those are the motors alone. What does each foot that stands add?",
+                "of_the_lesson": "That is the lesson's own count: four feet with four facets.",
+                "no_normal": "The rows of the normal forces are missing: feet do not pull.",
+                "one_limit": "A motor has two limits, one each way.",
+                "no_motors": "The motors are missing.",
+                "four_facets": "Four facets, or nine motors? Each foot has six facets here, and all twelve motors count.",
+                "no_normal_one_limit": "The normal forces are missing, and a motor has two limits, one each way.",
+                "four_feet": "That is for four feet; one of them is in the air.",
+                "equalities": "The rows of (7) are equalities: 18 of motion and 9 for three feet do not count here.",
             },
         ),
         explanation="A lifted foot takes its 7 rows along, and 3 of the equalities, and 3 of the variables.",
@@ -228,6 +249,17 @@ EXERCISES = (
             right=_change_of_psi,
             praise="Price times room, summed over the active rows: a derivative, read off a solution that you had anyway.",
             mistakes=_changes(),
+            hints={
+                "zero": "There is nothing there yet: an active row has a price.",
+                "sign": "The sign: more room never raises the least ψ.",
+                "no_facets": "The factor of the facets is missing: with 8 of them μ' is μ cos(π/8).",
+                "four_facets": "That is the factor of 4 facets, cos(π/4); here are 8.",
+                "all_feet": "Each row gets the room of its own foot, μ' times that foot's normal force, not that of all feet.",
+                "no_normal": "The normal forces are missing: a row d·f ≤ μ' n·f gets as much more room as n·f says.",
+                "leaning": "The room of a row grows with the normal force of its foot, not with how far it leans.",
+                "whole_mu": "So much for Δμ = 1; μ grows by 0.005.",
+                "twice_as_much": "So much for Δμ = 0.01; here it is 0.005.",
+            },
             tolerance=0.01,
         ),
         explanation="For small changes ψ falls by the sum of price times room. Torque limits that are not active cost nothing.",

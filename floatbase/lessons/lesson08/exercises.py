@@ -51,27 +51,19 @@ def _shifts() -> dict[str, Callable[[], Any]]:
 
     usual = state.robot.standing()
     return {
-        "There is nothing there yet: where is the centre of mass, and where may it be without FR?": lambda: np.zeros(2),
-        "The sign: this way leads further away from the other three feet.": lambda: -1e3 * shortest_shift(state, FOOT),
-        "In mm, please; these are metres.": lambda: shortest_shift(state, FOOT),
-        "That is the way for the usual stance; here RR stands further back.": lambda: 1e3 * shortest_shift(usual, FOOT),
-        "The feet are those of the usual stance; contacts.positions(uneven) tells where they stand here.": lambda: (
-            1e3 * shortest_shift(usual, FOOT, lambda _: state.com[:2])
-        ),
-        "The order: first forwards, then to the left.": lambda: 1e3 * shortest_shift(state, FOOT)[::-1],
-        "To the left is positive, as y is.": lambda: 1e3 * shortest_shift(state, FOOT) * [1.0, -1.0],
-        "Forwards is positive, as x is.": lambda: 1e3 * shortest_shift(state, FOOT) * [-1.0, 1.0],
-        "That way frees FL. Which two feet does FR's triangle share with the other one?": lambda: (
-            1e3 * shortest_shift(state, "FL_foot")
-        ),
-        "It starts in the middle of the feet. The weight acts at the centre of mass.": lambda: (
-            1e3 * shortest_shift(state, FOOT, lambda _: middle)
-        ),
-        "That ends in the middle of the three feet: safe, and longer than it must be.": lambda: (
-            1e3 * (triangle - state.com[:2])
-        ),
-        "Straight back it works, too, and it is longer than it must be.": lambda: along(0),
-        "Straight to the left it works, too, and it is longer than it must be.": lambda: along(1),
+        "zero": lambda: np.zeros(2),
+        "sign": lambda: -1e3 * shortest_shift(state, FOOT),
+        "metres": lambda: shortest_shift(state, FOOT),
+        "usual_stance": lambda: 1e3 * shortest_shift(usual, FOOT),
+        "usual_feet": lambda: 1e3 * shortest_shift(usual, FOOT, lambda _: state.com[:2]),
+        "order": lambda: 1e3 * shortest_shift(state, FOOT)[::-1],
+        "y_sign": lambda: 1e3 * shortest_shift(state, FOOT) * [1.0, -1.0],
+        "x_sign": lambda: 1e3 * shortest_shift(state, FOOT) * [-1.0, 1.0],
+        "other_foot": lambda: 1e3 * shortest_shift(state, "FL_foot"),
+        "from_middle": lambda: 1e3 * shortest_shift(state, FOOT, lambda _: middle),
+        "to_middle": lambda: 1e3 * (triangle - state.com[:2]),
+        "straight_back": lambda: along(0),
+        "straight_left": lambda: along(1),
     }
 
 
@@ -92,21 +84,15 @@ def _bump() -> Array:
 
 
 _BUMPS: Mapping[str, Callable[[], Any]] = {
-    "There is nothing there yet: it stays on the ground.": lambda: np.zeros(7),
-    "A parabola: it is not at rest at either end.": lambda: CLEARANCE * np.array([0, 4, -4, 0, 0, 0, 0]),
-    "This is the lesson's own bump: its acceleration jumps at both ends.": lambda: (
-        CLEARANCE * np.array([0, 0, 16, -32, 16, 0, 0])
-    ),
-    "This goes up and stays there: at u = 1 the foot must be down again.": lambda: (
-        CLEARANCE * np.array([0, 0, 0, 10, -15, 6, 0])
-    ),
-    "The shape is right and the height is not: how much is u³ (1 - u)³ half-way?": lambda: (
-        CLEARANCE * np.array([0, 0, 0, 1, -3, 3, -1])
-    ),
-    "The shape is right; its height is 1. It should be 0.05 m.": lambda: np.array([0, 0, 0, 64, -192, 192, -64]),
-    "In metres, please: this is in mm.": lambda: 1e3 * CLEARANCE * np.array([0, 0, 0, 64, -192, 192, -64]),
-    "The order: the first number belongs to u⁰, the last to u⁶.": lambda: CLEARANCE * np.array([-64, 192, -192, 64, 0, 0, 0]),
-    "The sign: this foot digs.": lambda: -CLEARANCE * np.array([0, 0, 0, 64, -192, 192, -64]),
+    "zero": lambda: np.zeros(7),
+    "parabola": lambda: CLEARANCE * np.array([0, 4, -4, 0, 0, 0, 0]),
+    "of_the_lesson": lambda: CLEARANCE * np.array([0, 0, 16, -32, 16, 0, 0]),
+    "stays_up": lambda: CLEARANCE * np.array([0, 0, 0, 10, -15, 6, 0]),
+    "height": lambda: CLEARANCE * np.array([0, 0, 0, 1, -3, 3, -1]),
+    "height_1": lambda: np.array([0, 0, 0, 64, -192, 192, -64]),
+    "millimetres": lambda: 1e3 * CLEARANCE * np.array([0, 0, 0, 64, -192, 192, -64]),
+    "order": lambda: CLEARANCE * np.array([-64, 192, -192, 64, 0, 0, 0]),
+    "sign": lambda: -CLEARANCE * np.array([0, 0, 0, 64, -192, 192, -64]),
 }
 
 
@@ -163,18 +149,18 @@ def _pushes() -> dict[str, Callable[[], Any]]:
         return float(state.robot.mass * omega**2 * s / -np.expm1(-omega * PUSH))
 
     return {
-        "There is nothing there yet: where must the capture point stay?": lambda: 0.0,
-        "That is the impulse, N·s. Over how long a time does the push give it?": push(duration=1.0),
-        "That is its weight in place of its mass.": push(mass="weight"),
-        "ω is √(g/h), not √(h/g).": push(power=-1.0),
-        "ω is √(g/h): the root is missing.": push(power=2.0),
-        "h is the height of the centre of mass above the feet, not that of the base.": push(height="base"),
-        "That ω is go2's; this robot's centre of mass is higher.": of_go2(omega=True),
-        "That mass is go2's.": of_go2(mass=True),
-        "Mass and ω are go2's.": of_go2(mass=True, omega=True),
-        "That is a push forwards, against the front feet.": push(edge="front"),
-        "Measure from the centre of mass, not from the world's origin.": push(edge="origin"),
-        "That is finer than what is asked: it lets the ground push back while the push lasts. Take an impulse.": long,
+        "zero": lambda: 0.0,
+        "impulse": push(duration=1.0),
+        "weight": push(mass="weight"),
+        "inverse": push(power=-1.0),
+        "no_root": push(power=2.0),
+        "base_height": push(height="base"),
+        "omega_of_go2": of_go2(omega=True),
+        "mass_of_go2": of_go2(mass=True),
+        "both_of_go2": of_go2(mass=True, omega=True),
+        "forwards": push(edge="front"),
+        "from_origin": push(edge="origin"),
+        "too_fine": long,
     }
 
 
@@ -188,28 +174,34 @@ def _judge_crawl(answer: Any) -> Verdict:
         return given
     swing, pause, forwards = given.tolist()
     if min(swing, pause) < SLOWEST:
-        return Verdict(False, f"Swing and pause are times in seconds, {SLOWEST} s or more; the third number is the speed, m/s.")
+        return Verdict(
+            False,
+            f"Swing and pause are times in seconds, {SLOWEST} s or more; the third number is the speed, m/s.",
+            "too_short",
+        )
     if forwards < 0:
-        return Verdict(False, "Forwards, please.")
+        return Verdict(False, "Forwards, please.", "backwards")
     try:
         record = crawled(swing, pause, forwards)
     except InputError as error:
-        return Verdict(False, str(error))
+        return Verdict(False, str(error), "input_error")
     if record.outcome != "completed":
-        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.")
+        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.", "falls")
     far = 1e3 * float((record.com[-1] - record.com[0])[0])
     inside, pressed = 1e3 * least_margin(record), float(record.measured[:, 2::3].max())
     told = f"{far:.0f} mm in {CRAWL:g} s, at least {inside:.0f} mm inside, at most {pressed:.0f} N at a foot"
     if far < FAR and inside < INSIDE:
-        return Verdict(False, f"Too slow, and too near to the edge: {told}. Speed and pause are two different numbers.")
+        return Verdict(
+            False, f"Too slow, and too near to the edge: {told}. Speed and pause are two different numbers.", "slow_and_near"
+        )
     if far < FAR:
-        return Verdict(False, f"Too slow: {told}. The speed costs little; look how little the others change with it.")
+        return Verdict(False, f"Too slow: {told}. The speed costs little; look how little the others change with it.", "slow")
     if inside < INSIDE and pressed > PRESSED:
-        return Verdict(False, f"Too near to the edge, and a foot stamps: {told}. Both want more time.")
+        return Verdict(False, f"Too near to the edge, and a foot stamps: {told}. Both want more time.", "near_and_stamps")
     if inside < INSIDE:
-        return Verdict(False, f"Too near to the edge: {told}. The centre of mass shifts while all feet stand.")
+        return Verdict(False, f"Too near to the edge: {told}. The centre of mass shifts while all feet stand.", "near")
     if pressed > PRESSED:
-        return Verdict(False, f"A foot stamps: {told}. How fast does a foot fly for a step of that length?")
+        return Verdict(False, f"A foot stamps: {told}. How fast does a foot fly for a step of that length?", "stamps")
     return Verdict(True, f"On the physics: {told}. Pauses buy margin, slow swings quiet feet; the price is longer steps.")
 
 
@@ -228,6 +220,22 @@ EXERCISES = (
                 right=_shift,
                 praise="The nearest point of the diagonal FL-RR: there RL carries nothing, and a bit further FR may lift.",
                 mistakes=_shifts(),
+                hints={
+                    "zero": "There is nothing there yet: where is the centre of mass, and where may it be without FR?",
+                    "sign": "The sign: this way leads further away from the other three feet.",
+                    "metres": "In mm, please; these are metres.",
+                    "usual_stance": "That is the way for the usual stance; here RR stands further back.",
+                    "usual_feet": "The feet are those of the usual stance; contacts.positions(uneven) tells where they stand "
+                    "here.",
+                    "order": "The order: first forwards, then to the left.",
+                    "y_sign": "To the left is positive, as y is.",
+                    "x_sign": "Forwards is positive, as x is.",
+                    "other_foot": "That way frees FL. Which two feet does FR's triangle share with the other one?",
+                    "from_middle": "It starts in the middle of the feet. The weight acts at the centre of mass.",
+                    "to_middle": "That ends in the middle of the three feet: safe, and longer than it must be.",
+                    "straight_back": "Straight back it works, too, and it is longer than it must be.",
+                    "straight_left": "Straight to the left it works, too, and it is longer than it must be.",
+                },
                 tolerance=0.02,
             ),
             {(3,): "Two numbers: heights do not count.", (): "Two numbers: how far forwards and how far to the left."},
@@ -246,6 +254,17 @@ EXERCISES = (
                 right=_bump,
                 praise="64 u³ (1 - u)³: a factor of three at each end for position, velocity and acceleration.",
                 mistakes=_BUMPS,
+                hints={
+                    "zero": "There is nothing there yet: it stays on the ground.",
+                    "parabola": "A parabola: it is not at rest at either end.",
+                    "of_the_lesson": "This is the lesson's own bump: its acceleration jumps at both ends.",
+                    "stays_up": "This goes up and stays there: at u = 1 the foot must be down again.",
+                    "height": "The shape is right and the height is not: how much is u³ (1 - u)³ half-way?",
+                    "height_1": "The shape is right; its height is 1. It should be 0.05 m.",
+                    "millimetres": "In metres, please: this is in mm.",
+                    "order": "The order: the first number belongs to u⁰, the last to u⁶.",
+                    "sign": "The sign: this foot digs.",
+                },
             ),
             {
                 (5,): "Five numbers end at u⁴: with three conditions at each end and one half-way it takes seven.",
@@ -268,6 +287,21 @@ EXERCISES = (
             right=_hardest,
             praise="F T = m ω s: mass, pendulum, and the way to the edge.",
             mistakes=_pushes(),
+            hints={
+                "zero": "There is nothing there yet: where must the capture point stay?",
+                "impulse": "That is the impulse, N·s. Over how long a time does the push give it?",
+                "weight": "That is its weight in place of its mass.",
+                "inverse": "ω is √(g/h), not √(h/g).",
+                "no_root": "ω is √(g/h): the root is missing.",
+                "base_height": "h is the height of the centre of mass above the feet, not that of the base.",
+                "omega_of_go2": "That ω is go2's; this robot's centre of mass is higher.",
+                "mass_of_go2": "That mass is go2's.",
+                "both_of_go2": "Mass and ω are go2's.",
+                "forwards": "That is a push forwards, against the front feet.",
+                "from_origin": "Measure from the centre of mass, not from the world's origin.",
+                "too_fine": "That is finer than what is asked: it lets the ground push back while the push lasts. Take an "
+                "impulse.",
+            },
             tolerance=0.005,
         ),
         explanation="The push gives the velocity v = F T / m; the capture point x + v/ω must not pass the hind feet.",

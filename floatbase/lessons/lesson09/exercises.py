@@ -103,14 +103,16 @@ def _judge_lean(answer: Any) -> Verdict:
         return given
     seconds, posture = given.tolist()
     if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
-        return Verdict(False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.")
+        return Verdict(False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.", "range")
     try:
         record = leaned(seconds, posture)
     except InputError as error:
-        return Verdict(False, str(error))
+        return Verdict(False, str(error), "input_error")
     if record.outcome != "completed":
         why = " Hardly any wish says what arms and trunk do." if posture < _LOOSE else ""
-        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.{why}")
+        return Verdict(
+            False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.{why}", "falls"
+        )
     return _judge_record(record, seconds)
 
 
@@ -120,7 +122,9 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     toes, heels = record.foot_positions[..., 0].max(axis=1), record.foot_positions[..., 0].min(axis=1)
     pushed = pressure(record)[:, 0]
     if np.isnan(pushed[settled]).any():
-        return Verdict(False, "For a moment no corner touches the ground. Arms and trunk are thrown about: what holds them?")
+        return Verdict(
+            False, "For a moment no corner touches the ground. Arms and trunk are thrown about: what holds them?", "in_the_air"
+        )
     ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
     where = "short" if short >= 0.0 else "too far"
@@ -128,18 +132,18 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     told += f"the centre of pressure stays {about(ahead, 'mm', floor=0.5)} from the toes "
     told += f"and {about(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
-        return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.")
+        return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.", "tips")
     if ahead < EDGE and abs(short) > NEAR:
-        return Verdict(False, f"Too near to the toes, and it does not get there either: {told}.")
+        return Verdict(False, f"Too near to the toes, and it does not get there either: {told}.", "toes_and_short")
     if ahead < EDGE:
-        return Verdict(False, f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?")
+        return Verdict(False, f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?", "toes")
     if short > NEAR:
-        return Verdict(False, f"It does not get there: {told}. Another wish holds it back.")
+        return Verdict(False, f"It does not get there: {told}. Another wish holds it back.", "short")
     if short < -NEAR:
-        return Verdict(False, f"It goes beyond: {told}. Nothing brakes the rest of the body.")
+        return Verdict(False, f"It goes beyond: {told}. Nothing brakes the rest of the body.", "beyond")
     if seconds > QUICK:
         slow = about(seconds, "s", digits=3)
-        return Verdict(False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.")
+        return Verdict(False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.", "slow")
     return Verdict(True, f"On the physics: {told}.")
 
 
@@ -154,20 +158,29 @@ EXERCISES = (
             right=_pushed,
             praise="The tangential force has a lever as long as the ankle is high.",
             mistakes={
-                "Nothing there yet: that is the point below the sensor.": lambda: np.zeros(2),
-                "The ankle's height is missing: the formula of the lesson is about a point on the ground.": _read(0.0),
-                "The height goes in with the wrong sign: the ground is below the sensor.": _read(ANKLE),
-                "x and y are swapped: a push that is further ahead makes a moment about y.": _read(swap=True),
-                "Height forgotten, and x and y swapped.": _read(0.0, swap=True),
-                "The sign: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).": lambda: (
+                "zero": lambda: np.zeros(2),
+                "no_height": _read(0.0),
+                "height_sign": _read(ANKLE),
+                "swapped": _read(swap=True),
+                "no_height_swapped": _read(0.0, swap=True),
+                "sign": lambda: (
                     np.array([ankle_sensor()[4] + ANKLE * ankle_sensor()[0], -ankle_sensor()[3] + ANKLE * ankle_sensor()[1]])
                     / ankle_sensor()[2]
                 ),
-                "That is in mm.": lambda: 1e3 * _pushed(),
-                "Divide by the normal force: these are moments.": lambda: _pushed() * ankle_sensor()[2],
-                "The normal force is f_z alone, not the length of f.": lambda: (
-                    _pushed() * ankle_sensor()[2] / np.linalg.norm(ankle_sensor()[:3])
-                ),
+                "millimetres": lambda: 1e3 * _pushed(),
+                "not_divided": lambda: _pushed() * ankle_sensor()[2],
+                "whole_force": lambda: _pushed() * ankle_sensor()[2] / np.linalg.norm(ankle_sensor()[:3]),
+            },
+            hints={
+                "zero": "Nothing there yet: that is the point below the sensor.",
+                "no_height": "The ankle's height is missing: the formula of the lesson is about a point on the ground.",
+                "height_sign": "The height goes in with the wrong sign: the ground is below the sensor.",
+                "swapped": "x and y are swapped: a push that is further ahead makes a moment about y.",
+                "no_height_swapped": "Height forgotten, and x and y swapped.",
+                "sign": "The sign: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).",
+                "millimetres": "That is in mm.",
+                "not_divided": "Divide by the normal force: these are moments.",
+                "whole_force": "The normal force is f_z alone, not the length of f.",
             },
         ),
         explanation="Moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x - h f_y and τ_y + h f_x.",
@@ -185,18 +198,24 @@ EXERCISES = (
                 tolerance=1e-6,
                 count=True,
                 mistakes={
-                    "That is for four corners each.": lambda: np.array([12, 18, 44]),
-                    "That is one sole: there are two.": lambda: np.array([12, 12, 50]),
-                    "J has rank 12, however many corners a rigid sole has.": lambda: np.array([12, 30, 44]),
-                    "Rows of corners are no rows of motion: J has 36 rows and rank 12.": lambda: np.array([0, 30, 32]),
-                    "The first two are swapped.": lambda: np.array([30, 24, 56]),
-                    "The first two are right. dim β = d + k - r, with k = 36.": lambda: np.array([24, 30, 44]),
-                    "The first and the last are right. What the base feels has six dimensions, not twelve.": lambda: np.array(
-                        [24, 24, 56]
-                    ),
-                    "36 is the length of λ; what is left once each sole's six numbers are taken off?": lambda: np.array(
-                        [36, 30, 56]
-                    ),
+                    "four_corners": lambda: np.array([12, 18, 44]),
+                    "one_sole": lambda: np.array([12, 12, 50]),
+                    "rank": lambda: np.array([12, 30, 44]),
+                    "rows_of_corners": lambda: np.array([0, 30, 32]),
+                    "swapped": lambda: np.array([30, 24, 56]),
+                    "beta": lambda: np.array([24, 30, 44]),
+                    "base_twelve": lambda: np.array([24, 24, 56]),
+                    "length_of_forces": lambda: np.array([36, 30, 56]),
+                },
+                hints={
+                    "four_corners": "That is for four corners each.",
+                    "one_sole": "That is one sole: there are two.",
+                    "rank": "J has rank 12, however many corners a rigid sole has.",
+                    "rows_of_corners": "Rows of corners are no rows of motion: J has 36 rows and rank 12.",
+                    "swapped": "The first two are swapped.",
+                    "beta": "The first two are right. dim β = d + k - r, with k = 36.",
+                    "base_twelve": "The first and the last are right. What the base feels has six dimensions, not twelve.",
+                    "length_of_forces": "36 is the length of λ; what is left once each sole's six numbers are taken off?",
                 },
             ),
             {(): "Three numbers are asked for: np.array([…, …, …])."},
@@ -213,27 +232,30 @@ EXERCISES = (
             right=_twist,
             praise="Each corner pushes at a right angle to its lever, as hard as friction lets it.",
             mistakes={
-                "Nothing there yet.": lambda: 0.0,
-                "That is for pyramids with four facets inside the cones; here they are round.": lambda: _twist(4),
-                "That is μ f_z times half the length: the lever of a corner goes from the middle to the corner.": lambda: (
-                    SOLE_MU * LOAD * LENGTH / 2
-                ),
-                "That is μ f_z times half the width: the lever of a corner goes from the middle to the corner.": lambda: (
-                    SOLE_MU * LOAD * WIDTH / 2
-                ),
-                "Half the sides, not the sides: the levers begin in the middle.": lambda: (
-                    SOLE_MU * LOAD * float(np.hypot(LENGTH, WIDTH))
-                ),
-                "That is one corner; four carry.": lambda: _twist() / 4,
-                "Four corners share the 400 N: each has 100 N.": lambda: 4 * _twist(),
-                "μ is missing: friction gives less than the normal force.": lambda: _twist() / SOLE_MU,
-                "That is with the μ of the lesson; here it is 0.6.": lambda: _twist(mu=MU),
-                "Half the length plus half the width is the lever for square pyramids; use the distance.": lambda: (
-                    SOLE_MU * LOAD * (LENGTH + WIDTH) / 2
-                ),
-                "That is a disc of the sole's length that presses evenly: 2/3 μ f_z times its radius.": lambda: (
-                    2 / 3 * SOLE_MU * LOAD * LENGTH / 2
-                ),
+                "zero": lambda: 0.0,
+                "pyramids": lambda: _twist(4),
+                "half_length": lambda: SOLE_MU * LOAD * LENGTH / 2,
+                "half_width": lambda: SOLE_MU * LOAD * WIDTH / 2,
+                "whole_sides": lambda: SOLE_MU * LOAD * float(np.hypot(LENGTH, WIDTH)),
+                "one_corner": lambda: _twist() / 4,
+                "four_times": lambda: 4 * _twist(),
+                "no_mu": lambda: _twist() / SOLE_MU,
+                "mu_of_lesson": lambda: _twist(mu=MU),
+                "square": lambda: SOLE_MU * LOAD * (LENGTH + WIDTH) / 2,
+                "disc": lambda: 2 / 3 * SOLE_MU * LOAD * LENGTH / 2,
+            },
+            hints={
+                "zero": "Nothing there yet.",
+                "pyramids": "That is for pyramids with four facets inside the cones; here they are round.",
+                "half_length": "That is μ f_z times half the length: the lever of a corner goes from the middle to the corner.",
+                "half_width": "That is μ f_z times half the width: the lever of a corner goes from the middle to the corner.",
+                "whole_sides": "Half the sides, not the sides: the levers begin in the middle.",
+                "one_corner": "That is one corner; four carry.",
+                "four_times": "Four corners share the 400 N: each has 100 N.",
+                "no_mu": "μ is missing: friction gives less than the normal force.",
+                "mu_of_lesson": "That is with the μ of the lesson; here it is 0.6.",
+                "square": "Half the length plus half the width is the lever for square pyramids; use the distance.",
+                "disc": "That is a disc of the sole's length that presses evenly: 2/3 μ f_z times its radius.",
             },
         ),
         explanation="The levers of all corners are as long, so however they share the load: μ f_z times the distance.",

@@ -43,25 +43,31 @@ def _judge_gains(answer: Any) -> Verdict:
         return given
     kp, kd = map(float, given)
     if min(kp, kd) <= 0.0:
-        return Verdict(False, "A gain that is not above zero draws nothing back, or pushes it away.")
+        return Verdict(False, "A gain that is not above zero draws nothing back, or pushes it away.", "not_above_zero")
     if kp < kd:
-        return Verdict(False, "kp comes first, in 1/s², and then kd, in 1/s: here kp is the smaller one.")
+        return Verdict(False, "kp comes first, in 1/s², and then kd, in 1/s: here kp is the smaller one.", "swapped")
     if kd > MOST_DAMPING:
-        return Verdict(False, f"kd = {about(kd)} is more than the {MOST_DAMPING:g} that the measured velocities allow.")
+        return Verdict(
+            False, f"kd = {about(kd)} is more than the {MOST_DAMPING:g} that the measured velocities allow.", "damping"
+        )
     outcome, off, swing = comes_back(kp, kd)
     far = f"{about(off)} mm off in the end"
     if outcome != "completed" or off > LOST:
         what = far if outcome == "completed" else outcome
         if kp < SOFT:
-            return Verdict(False, f"{what}: too soft. What leaks pushes it aside before the loops have learned how much it is.")
-        return Verdict(False, f"{what}: far too much kp for this kd. A late torque feeds the swing that it was to end.")
+            return Verdict(
+                False, f"{what}: too soft. What leaks pushes it aside before the loops have learned how much it is.", "soft"
+            )
+        return Verdict(False, f"{what}: far too much kp for this kd. A late torque feeds the swing that it was to end.", "hard")
     if off <= NEAR_HOME:
         return Verdict(True, f"{far}: stiff enough for what leaks, and not yet too stiff for a torque that comes late.")
     if swing > off:
         why = "A late torque lags more behind a quick swing: less kp, or more kd, if you may."
-        return Verdict(False, f"{far}, and it still swings, by {about(swing)} mm. {why}")
+        return Verdict(False, f"{far}, and it still swings, by {about(swing)} mm. {why}", "swings")
     return Verdict(
-        False, f"{far}, but nearly at rest there. What leaks pushes it aside, and kp is the spring that holds against it."
+        False,
+        f"{far}, but nearly at rest there. What leaks pushes it aside, and kp is the spring that holds against it.",
+        "leaks",
     )
 
 
@@ -76,29 +82,32 @@ EXERCISES = (
             right=_torque,
             praise="Force times dℓ/dq: which is the distance of the joint from the line of the cylinder.",
             mistakes={
-                "That would be so if crank and cylinder were square. They are not here.": lambda: PISTON * CRANK,
-                "γ is the angle at the joint, between crank and foot. What counts is the angle between the crank and the "
-                "cylinder, along which the force goes.": lambda: PISTON * CRANK * np.sin(GAMMA),
-                "The cosine is along the crank, and has no lever. And γ is not the angle between crank and cylinder.": lambda: (
-                    PISTON * CRANK * np.cos(GAMMA)
-                ),
-                "That is the crank times the sine of the angle at the foot. It goes with the other side: a.": lambda: (
-                    PISTON * CRANK * CRANK * np.sin(GAMMA) / _length(GAMMA)
-                ),
-                "That lever is a sin γ: the distance of the foot from the line of the crank.": lambda: (
-                    PISTON * FOOT * np.sin(GAMMA)
-                ),
-                "The derivative of ℓ²/2 is a b sin γ. You want that of ℓ: one more division by ℓ.": lambda: (
-                    PISTON * FOOT * CRANK * np.sin(GAMMA)
-                ),
-                "The derivative of the cosine is a sine.": lambda: PISTON * FOOT * CRANK * np.cos(GAMMA) / _length(GAMMA),
-                "np.sin and np.cos take radians; this is the sine of 50 radians.": lambda: (
+                "square": lambda: PISTON * CRANK,
+                "sin_gamma": lambda: PISTON * CRANK * np.sin(GAMMA),
+                "cosine": lambda: PISTON * CRANK * np.cos(GAMMA),
+                "other_side": lambda: PISTON * CRANK * CRANK * np.sin(GAMMA) / _length(GAMMA),
+                "foot_lever": lambda: PISTON * FOOT * np.sin(GAMMA),
+                "not_divided": lambda: PISTON * FOOT * CRANK * np.sin(GAMMA),
+                "cosine_derivative": lambda: PISTON * FOOT * CRANK * np.cos(GAMMA) / _length(GAMMA),
+                "degrees": lambda: (
                     PISTON * FOOT * CRANK * np.sin(50.0) / np.sqrt(FOOT**2 + CRANK**2 - 2 * FOOT * CRANK * np.cos(50.0))
                 ),
-                "The law of cosines has a minus: at γ = 0 the crank points to the foot, and ℓ is shortest.": lambda: (
-                    PISTON * FOOT * CRANK * np.sin(GAMMA) / _length(GAMMA, 1.0)
-                ),
-                "That is the lever, in m. The torque is the piston's force times it.": lambda: _torque() / PISTON,
+                "plus": lambda: PISTON * FOOT * CRANK * np.sin(GAMMA) / _length(GAMMA, 1.0),
+                "lever_alone": lambda: _torque() / PISTON,
+            },
+            hints={
+                "square": "That would be so if crank and cylinder were square. They are not here.",
+                "sin_gamma": "γ is the angle at the joint, between crank and foot. What counts is the angle between the crank "
+                "and the "
+                "cylinder, along which the force goes.",
+                "cosine": "The cosine is along the crank, and has no lever. And γ is not the angle between crank and cylinder.",
+                "other_side": "That is the crank times the sine of the angle at the foot. It goes with the other side: a.",
+                "foot_lever": "That lever is a sin γ: the distance of the foot from the line of the crank.",
+                "not_divided": "The derivative of ℓ²/2 is a b sin γ. You want that of ℓ: one more division by ℓ.",
+                "cosine_derivative": "The derivative of the cosine is a sine.",
+                "degrees": "np.sin and np.cos take radians; this is the sine of 50 radians.",
+                "plus": "The law of cosines has a minus: at γ = 0 the crank points to the foot, and ℓ is shortest.",
+                "lever_alone": "That is the lever, in m. The torque is the piston's force times it.",
             },
         ),
         explanation="ℓ² = a² + b² - 2 a b cos γ, so dℓ/dγ = a b sin γ / ℓ; and τ q̇ = F ℓ̇.",
@@ -113,26 +122,27 @@ EXERCISES = (
             right=_opening(lambda wanted, got: wanted - got),
             praise="Too little of a pull asks for oil on the other side; beyond the dead point out and in change their roles.",
             mistakes={
-                "That is the error of the torque. The piston knows nothing of the joint: which force should it have?": lambda: (
-                    GAIN * (WANTED - GOT)
-                ),
-                "'Too little: open it more' is not enough: for more *pull* the valve must open to the other side.": _opening(
-                    lambda wanted, got: abs(wanted) - abs(got)
-                ),
-                "A size has lost its sign: u says to which side the valve opens.": _opening(
-                    lambda wanted, got: abs(wanted - got)
-                ),
-                "All the other way: this lets out where oil is missing.": _opening(lambda wanted, got: got - wanted),
-                "The lever's sign got lost: beyond the dead point the rod must go *in* to turn the joint forwards.": lambda: (
-                    GAIN * (WANTED - GOT) / abs(LEVER)
-                ),
-                "The right sides. But a short lever needs a larger force for the same torque: divide by it.": lambda: (
-                    GAIN * (WANTED - GOT) * np.sign(LEVER)
-                ),
-                "Force is torque divided by the lever, not times it.": lambda: GAIN * (WANTED - GOT) * LEVER,
-                "That opens for what is wanted, and never looks at what is there: no loop.": _opening(
-                    lambda wanted, got: wanted
-                ),
+                "torque_error": lambda: GAIN * (WANTED - GOT),
+                "sizes": _opening(lambda wanted, got: abs(wanted) - abs(got)),
+                "no_sign": _opening(lambda wanted, got: abs(wanted - got)),
+                "sign": _opening(lambda wanted, got: got - wanted),
+                "no_lever_sign": lambda: GAIN * (WANTED - GOT) / abs(LEVER),
+                "lever_sign_alone": lambda: GAIN * (WANTED - GOT) * np.sign(LEVER),
+                "times_lever": lambda: GAIN * (WANTED - GOT) * LEVER,
+                "no_loop": _opening(lambda wanted, got: wanted),
+            },
+            hints={
+                "torque_error": "That is the error of the torque. The piston knows nothing of the joint: which force should "
+                "it have?",
+                "sizes": "'Too little: open it more' is not enough: for more *pull* the valve must open to the other side.",
+                "no_sign": "A size has lost its sign: u says to which side the valve opens.",
+                "sign": "All the other way: this lets out where oil is missing.",
+                "no_lever_sign": "The lever's sign got lost: beyond the dead point the rod must go *in* to turn the joint "
+                "forwards.",
+                "lever_sign_alone": "The right sides. But a short lever needs a larger force for the same torque: divide by "
+                "it.",
+                "times_lever": "Force is torque divided by the lever, not times it.",
+                "no_loop": "That opens for what is wanted, and never looks at what is there: no loop.",
             },
         ),
         explanation="F = τ / L, with L's sign. u > 0 feeds A, and the force grows; u < 0 feeds B, and it falls.",

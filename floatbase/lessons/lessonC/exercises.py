@@ -124,9 +124,9 @@ def _judge_step(answer: Any) -> Verdict:
 def _tried(answer: Any, cases: Sequence[Callable[[], str]], praise: str) -> Verdict:
     """Run cases of a learner's function; the first that has something to say decides."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: give your function, without brackets.")
+        return Verdict(False, "There is no answer yet: give your function, without brackets.", "no_answer")
     if not callable(answer):
-        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.")
+        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.", "no_function")
     for case in cases:
         try:
             with np.errstate(all="ignore"):
@@ -169,20 +169,22 @@ def _judge_drop(answer: Any) -> Verdict:
 def _judge_guess(answer: Any) -> Verdict:
     """One system of equations with the rows of the guess, as in the game; whether it is the optimum a solver says."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: list the names of rows.")
+        return Verdict(False, "There is no answer yet: list the names of rows.", "no_answer")
     if not isinstance(answer, list | tuple) or not all(isinstance(name, str) for name in answer):
-        return Verdict(False, "The answer is a list of names, such as those in qp.inequality_names.")
+        return Verdict(False, "The answer is a list of names, such as those in qp.inequality_names.", "no_names")
     qp = braking()
     names = list(dict.fromkeys(answer))
     if unknown := [name for name in names if name not in qp.inequality_names]:
-        return Verdict(False, f"There is no row {unknown[0]!r}; qp.inequality_names has all of them.")
+        return Verdict(False, f"There is no row {unknown[0]!r}; qp.inequality_names has all of them.", "no_such_row")
     if not names:
-        return Verdict(False, "With no row on, the plan pulls on the ground. Which feet does the push lift off?")
+        return Verdict(False, "With no row on, the plan pulls on the ground. Which feet does the push lift off?", "no_row")
     rows = [qp.inequality_names.index(name) for name in names]
     small, Z = qp.reduced, qp.reduced.G[rows]
     if np.linalg.matrix_rank(Z / np.linalg.norm(Z, axis=1)[:, None], 1e-9) < len(rows):
         return Verdict(
-            False, "These rows depend on one another: a foot has three numbers, and no more than three rows can be on at it."
+            False,
+            "These rows depend on one another: a foot has three numbers, and no more than three rows can be on at it.",
+            "dependent",
         )
     k = len(rows)
     found = np.linalg.solve(np.block([[small.H, Z.T], [Z, np.zeros((k, k))]]), np.concatenate([-small.g, small.h[rows]]))
@@ -192,10 +194,14 @@ def _judge_guess(answer: Any) -> Verdict:
     if not broken and not pulls:
         return Verdict(True, "One system of equations, and nothing to correct: a solver that begins here is done in one round.")
     if not any("foot" in name for name in names):
-        return Verdict(False, "Motors are far from their limits here. What does a push do to the feet?")
+        return Verdict(False, "Motors are far from their limits here. What does a push do to the feet?", "motors")
     told = [f"{len(broken)} rows are broken, {_kinds(broken)}"] if broken else []
     told += [f"{len(pulls)} of yours pull, {_kinds(pulls)}"] if pulls else []
-    return Verdict(False, f"With your rows on, {' and '.join(told)}. Correct the guess as the solver would, and check again.")
+    return Verdict(
+        False,
+        f"With your rows on, {' and '.join(told)}. Correct the guess as the solver would, and check again.",
+        "corrections",
+    )
 
 
 def _kinds(names: Sequence[str]) -> str:
@@ -243,16 +249,24 @@ EXERCISES = (
             right=_price,
             praise="Three equations: two say that the row balances the slope, one that the marble lies on it.",
             mistakes={
-                "The sign: with H x + g + Gᵀ μ = 0 the price of a table that pushes is positive.": lambda: -_price(),
-                "That is the slope's length. A price belongs to the row as it is written; this one has length √1.25.": (
-                    lambda: _price() * np.sqrt(1.25)
-                ),
-                "That is the price of a level table. Here along and up pay together.": lambda: 8.0,
-                "The curvature of 4 is missing.": lambda: _price_of([1.0, 1.0]),
-                "The objective has a ½ before each square.": lambda: 2.0 * _price(),
-                "That is where the marble lies along the table.": lambda: float(fb.solve(slanted()).x[0]),
-                "That is how high the marble lies.": lambda: float(fb.solve(slanted()).x[1]),
-                "That is the distance by which the row is broken at the bowl's lowest point.": lambda: 3.0,
+                "sign": lambda: -_price(),
+                "length": lambda: _price() * np.sqrt(1.25),
+                "level": lambda: 8.0,
+                "no_curvature": lambda: _price_of([1.0, 1.0]),
+                "no_half": lambda: 2.0 * _price(),
+                "along": lambda: float(fb.solve(slanted()).x[0]),
+                "height": lambda: float(fb.solve(slanted()).x[1]),
+                "distance": lambda: 3.0,
+            },
+            hints={
+                "sign": "The sign: with H x + g + Gᵀ μ = 0 the price of a table that pushes is positive.",
+                "length": "That is the slope's length. A price belongs to the row as it is written; this one has length √1.25.",
+                "level": "That is the price of a level table. Here along and up pay together.",
+                "no_curvature": "The curvature of 4 is missing.",
+                "no_half": "The objective has a ½ before each square.",
+                "along": "That is where the marble lies along the table.",
+                "height": "That is how high the marble lies.",
+                "distance": "That is the distance by which the row is broken at the bowl's lowest point.",
             },
         ),
         explanation="On the row up = 0.5 along, so ψ = ½(a - 2)² + 2(0.5 a + 2)² with a = along, which is least at a = -1: the "

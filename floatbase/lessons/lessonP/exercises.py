@@ -26,20 +26,24 @@ def _load() -> float:
     return BAG / fb.load("go2").mass
 
 
-def _stiffness_slips() -> dict[str, float]:
-    """Hint -> the kp that this kind of mistake leads to."""
+def _stiffness_slips() -> dict[tuple[str, str], float]:
+    """Name of a hint, hint -> the kp that this kind of mistake leads to."""
     right, ratio = _load() * G / (MOST / 1e3), _load()
     return {
-        "That carries the robot and the bag; it knows its own weight. Only what it does not know makes it sink.": right
-        * (1.0 + ratio)
-        / ratio,
-        "That would be for the robot's own weight. Only the bag is not known.": right / ratio,
-        "Metres: 10 mm are 0.01 m, and kp is for metres.": right / 1e3,
-        "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the controller believes.": right
-        * fb.load("go2").mass,
-        "The controller plans forces for the mass that it believes, the smaller one: divide by that.": right / (1.0 + ratio),
-        "That looks like kd = 2 √kp, which acts on velocities; at rest there are none.": 2.0 * right**0.5,
-        "Without g that is no acceleration.": right / G,
+        (
+            "robot_too",
+            "That carries the robot and the bag; it knows its own weight. Only what it does not know makes it sink.",
+        ): right * (1.0 + ratio) / ratio,
+        ("robot_alone", "That would be for the robot's own weight. Only the bag is not known."): right / ratio,
+        ("metres", "Metres: 10 mm are 0.01 m, and kp is for metres."): right / 1e3,
+        (
+            "newtons",
+            "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the controller believes.",
+        ): right * fb.load("go2").mass,
+        ("true_mass", "The controller plans forces for the mass that it believes, the smaller one: divide by that."): right
+        / (1.0 + ratio),
+        ("damping", "That looks like kd = 2 √kp, which acts on velocities; at rest there are none."): 2.0 * right**0.5,
+        ("no_g", "Without g that is no acceleration."): right / G,
     }
 
 
@@ -50,19 +54,19 @@ def _judge_stiffness(answer: Any) -> Verdict:
         return given
     kp = float(given)
     if kp <= 0.0:
-        return Verdict(False, "A spring that pulls back needs kp > 0.")
-    for hint, slip in _stiffness_slips().items():
+        return Verdict(False, "A spring that pulls back needs kp > 0.", "not_above_zero")
+    for (hint, text), slip in _stiffness_slips().items():
         if abs(kp - slip) <= NEAR * slip:
-            return Verdict(False, hint)
+            return Verdict(False, text, hint)
     if kp > STIFFEST:
-        return Verdict(False, "No motor follows that: the controller looks at the robot only every 4 ms.")
+        return Verdict(False, "No motor follows that: the controller looks at the robot only every 4 ms.", "too_stiff")
     below = 1e3 * sinks(kp)
     if not np.isfinite(below):
-        return Verdict(False, "So soft that the robot sinks to the ground.")
+        return Verdict(False, "So soft that the robot sinks to the ground.", "ground")
     if below > MOST + ROUNDING:
-        return Verdict(False, f"On physics it sinks by {below:.1f} mm: too soft.")
+        return Verdict(False, f"On physics it sinks by {below:.1f} mm: too soft.", "soft")
     if below < LEAST:
-        return Verdict(False, f"On physics it sinks by {below:.1f} mm only: softer would do, and is kinder to motors.")
+        return Verdict(False, f"On physics it sinks by {below:.1f} mm only: softer would do, and is kinder to motors.", "hard")
     return Verdict(True, f"On physics it sinks by {below:.1f} mm. (A kp does not weigh: the bag is still not known.)")
 
 
@@ -96,24 +100,28 @@ _SHIFT = Numeric(
     right=_nearest,
     praise="",
     mistakes={
-        "Nothing is moved yet: the centre of mass is beside the diagonal, so the robot tips.": lambda: np.zeros(3),
-        "That is over the other diagonal, of FR and RL, which are to be lifted.": lambda: _nearest("FR_foot", "RL_foot"),
-        "The other way round: from the centre of mass to the line, not from the line.": lambda: -_nearest(),
-        "That is over the diagonal, but it is not the shortest way: a plumb line meets it at a right angle.": lambda: _towards(
-            lambda feet: (feet["FL_foot"] + feet["RR_foot"]) / 2.0
-        ),
-        "That is over a foot. Standing on one end of the diagonal is harder than on both.": lambda: _towards(
-            lambda feet: feet["FL_foot"]
-        ),
-        "That is over the foot RR. Standing on one end of the diagonal is harder than on both.": lambda: _towards(
-            lambda feet: feet["RR_foot"]
-        ),
-        "Metres, please: that would be as many millimetres.": lambda: 1e3 * _nearest(),
-        "That is the part of the way *along* the diagonal; the part across it is needed.": lambda: (
-            _towards(lambda feet: feet["FL_foot"]) - _nearest()
-        ),
-        "Halfway. The centre of mass is not over the line yet.": lambda: 0.5 * _nearest(),
-        "That is a direction: a unit vector along the diagonal.": lambda: np.append(_unit_line(), 0.0),
+        "zero": lambda: np.zeros(3),
+        "other_diagonal": lambda: _nearest("FR_foot", "RL_foot"),
+        "sign": lambda: -_nearest(),
+        "not_shortest": lambda: _towards(lambda feet: (feet["FL_foot"] + feet["RR_foot"]) / 2.0),
+        "on_FL": lambda: _towards(lambda feet: feet["FL_foot"]),
+        "on_RR": lambda: _towards(lambda feet: feet["RR_foot"]),
+        "metres": lambda: 1e3 * _nearest(),
+        "along": lambda: _towards(lambda feet: feet["FL_foot"]) - _nearest(),
+        "halfway": lambda: 0.5 * _nearest(),
+        "direction": lambda: np.append(_unit_line(), 0.0),
+    },
+    hints={
+        "zero": "Nothing is moved yet: the centre of mass is beside the diagonal, so the robot tips.",
+        "other_diagonal": "That is over the other diagonal, of FR and RL, which are to be lifted.",
+        "sign": "The other way round: from the centre of mass to the line, not from the line.",
+        "not_shortest": "That is over the diagonal, but it is not the shortest way: a plumb line meets it at a right angle.",
+        "on_FL": "That is over a foot. Standing on one end of the diagonal is harder than on both.",
+        "on_RR": "That is over the foot RR. Standing on one end of the diagonal is harder than on both.",
+        "metres": "Metres, please: that would be as many millimetres.",
+        "along": "That is the part of the way *along* the diagonal; the part across it is needed.",
+        "halfway": "Halfway. The centre of mass is not over the line yet.",
+        "direction": "That is a direction: a unit vector along the diagonal.",
     },
     tolerance=0.02,
 )
@@ -125,13 +133,13 @@ def _judge_shift(answer: Any) -> Verdict:
     if isinstance(given, Verdict):
         return given
     if abs(given[2]) > HEIGHT:
-        return Verdict(False, "Seen from above: the centre of mass keeps its height, so the third number is 0.")
+        return Verdict(False, "Seen from above: the centre of mass keeps its height, so the third number is 0.", "height")
     verdict = _SHIFT(given)
     if not verdict.right:
         return verdict
     times = [on_two_feet(shift) for shift in (np.zeros(3), given)]
     if times[1] < UP:
-        return Verdict(False, f"On physics it stood on two feet for {times[1]:.1f} s only.")
+        return Verdict(False, f"On physics it stood on two feet for {times[1]:.1f} s only.", "short")
     return Verdict(True, f"On physics it stays up on FL and RR for {times[1]:.1f} s, and for {times[0]:.1f} s where it was.")
 
 
@@ -176,19 +184,26 @@ EXERCISES = (
             right=lambda: HIDDEN,
             praise="Measured forces weigh, whatever anybody believes. (This is how a scale works, and a good robot has four.)",
             mistakes={
-                "That is what it believes.": lambda: 1.0,
-                "That is the first row, before the ground has answered: wait until it is at rest.": lambda: _measured(0),
-                "That is planned. It plans for an acceleration that never comes; take what was measured.": _planned,
-                "That is what is missing, as a part; the question is all of it.": lambda: HIDDEN - 1.0,
-                "The other way round: believed for true.": lambda: 1.0 / HIDDEN,
-                "That is a mass in kg; as a multiple of what is believed, please.": lambda: HIDDEN * fb.load("go2").mass,
-                "Those are newtons; as a multiple of the weight that is believed, please.": lambda: (
-                    HIDDEN * fb.load("go2").weight
-                ),
-                "That is one foot's part on average: four feet carry.": lambda: HIDDEN / 4.0,
-                "That is from how far it sank, with kp = 100. Who says that kp was 100? Forces do not need it.": lambda: (
-                    _by_sinking(100.0)
-                ),
+                "believed": lambda: 1.0,
+                "first_row": lambda: _measured(0),
+                "planned": _planned,
+                "missing": lambda: HIDDEN - 1.0,
+                "inverse": lambda: 1.0 / HIDDEN,
+                "kilograms": lambda: HIDDEN * fb.load("go2").mass,
+                "newtons": lambda: HIDDEN * fb.load("go2").weight,
+                "one_foot": lambda: HIDDEN / 4.0,
+                "sinking": lambda: _by_sinking(100.0),
+            },
+            hints={
+                "believed": "That is what it believes.",
+                "first_row": "That is the first row, before the ground has answered: wait until it is at rest.",
+                "planned": "That is planned. It plans for an acceleration that never comes; take what was measured.",
+                "missing": "That is what is missing, as a part; the question is all of it.",
+                "inverse": "The other way round: believed for true.",
+                "kilograms": "That is a mass in kg; as a multiple of what is believed, please.",
+                "newtons": "Those are newtons; as a multiple of the weight that is believed, please.",
+                "one_foot": "That is one foot's part on average: four feet carry.",
+                "sinking": "That is from how far it sank, with kp = 100. Who says that kp was 100? Forces do not need it.",
             },
             tolerance=5e-3,
         ),

@@ -64,16 +64,12 @@ def _momentum() -> Array:
 
 def _kicks() -> dict[str, Callable[[], Any]]:
     return {
-        "There is nothing there yet: the first three columns of what (7) misses, summed up over time.": lambda: np.zeros(3),
-        "Those are the base's axes, which turn: take each row into the world's by R before you sum up.": lambda: (
-            0.002 * _residual()[0].sum(axis=0)
-        ),
-        "A sum of forces is no impulse yet: each row lasts 2 ms.": lambda: _residual()[1].sum(axis=0),
-        "The blows of the fall are in it, too: take the time of the kick alone.": lambda: (
-            0.002 * np.sum([_turned(i, row) for i, row in enumerate(needed(kicked_box())[:, :3])], axis=0)
-        ),
-        "That is the force, N. How long did it last?": lambda: _impulse() / innocent_cases(VISITED)[1].pushes[0].duration,
-        "That is what the robot's momentum gained. The ground has its part in that.": _momentum,
+        "zero": lambda: np.zeros(3),
+        "base_axes": lambda: 0.002 * _residual()[0].sum(axis=0),
+        "no_duration": lambda: _residual()[1].sum(axis=0),
+        "fall": lambda: 0.002 * np.sum([_turned(i, row) for i, row in enumerate(needed(kicked_box())[:, :3])], axis=0),
+        "force": lambda: _impulse() / innocent_cases(VISITED)[1].pushes[0].duration,
+        "momentum": _momentum,
     }
 
 
@@ -83,12 +79,12 @@ def _kicks() -> dict[str, Callable[[], Any]]:
 def _judge_report(answer: Any) -> Verdict:
     """A seed, and a line for each of its boxes."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: the report is a list of lines.")
+        return Verdict(False, "There is no answer yet: the report is a list of lines.", "no_answer")
     if not isinstance(answer, list | tuple) or not answer or not all(isinstance(line, str) for line in answer):
-        return Verdict(False, 'The report is a list of lines of text, such as "A: mass 0.93".')
+        return Verdict(False, 'The report is a list of lines of text, such as "A: mass 0.93".', "no_lines")
     seed = re.fullmatch(r"seed (\d{1,10})", answer[0].strip())
     if not seed or int(seed[1]) > LARGEST_SEED:
-        return Verdict(False, 'The first line says which boxes these are, as in "seed 7".')
+        return Verdict(False, 'The first line says which boxes these are, as in "seed 7".', "no_seed")
     lines = {line.strip()[:1].upper(): line.split(":", 1)[1] for line in answer[1:] if ":" in line}
     told = {name: line for name, line in lines.items() if line.strip(" ?.")}
     return _report_of(int(seed[1]), told)
@@ -98,9 +94,11 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
     """told: name of a box -> what is said of it."""
     cases = {case.name: case for case in drawn_cases(seed)}
     if unknown := sorted(set(told) - set(cases)):
-        return Verdict(False, f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.")
+        return Verdict(False, f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.", "no_such_box")
     if not told:
-        return Verdict(False, 'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".')
+        return Verdict(
+            False, 'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".', "nothing_said"
+        )
     boxes = {box.name: box for box in black_boxes(seed)}
     said = {name: judged(cases[name], boxes[name], line) for name, line in sorted(told.items())}
     wrong = [f"{name}: {hint}" for name, hint in said.items() if hint]
@@ -108,7 +106,7 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
     if not wrong and not left:
         return Verdict(True, "Six faults, each with evidence that holds. The insurance pays.")
     parts = [f"Solved: {', '.join(solved)}." if solved else "", *wrong, f"Open: {', '.join(left)}." if left else ""]
-    return Verdict(False, "\n".join(part for part in parts if part))
+    return Verdict(False, "\n".join(part for part in parts if part), "wrong" if wrong else "open")
 
 
 # X.3 ----------------------------------------------------------------------------------------------------------------------
@@ -127,9 +125,9 @@ def _unseen(i: int) -> tuple[Case, BlackBox]:
 def _judge_program(answer: Any) -> Verdict:
     """A function of a box, tried on boxes of each kind that nobody has seen."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: give your function, without brackets.")
+        return Verdict(False, "There is no answer yet: give your function, without brackets.", "no_answer")
     if not callable(answer):
-        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.")
+        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.", "no_function")
     for i in range(len(FAULTS) + 2):
         if said := _tried(answer, *_unseen(i)):
             return Verdict(False, said)
@@ -165,6 +163,15 @@ EXERCISES = (
                 right=_impulse,
                 praise="Nobody recorded the kick, and you know how hard it was and where it came from.",
                 mistakes=_kicks(),
+                hints={
+                    "zero": "There is nothing there yet: the first three columns of what (7) misses, summed up over time.",
+                    "base_axes": "Those are the base's axes, which turn: take each row into the world's by R before you sum "
+                    "up.",
+                    "no_duration": "A sum of forces is no impulse yet: each row lasts 2 ms.",
+                    "fall": "The blows of the fall are in it, too: take the time of the kick alone.",
+                    "force": "That is the force, N. How long did it last?",
+                    "momentum": "That is what the robot's momentum gained. The ground has its part in that.",
+                },
                 tolerance=0.02,
             ),
             {(): "Three numbers: an impulse has a direction.", (6,): "The force alone, three numbers, without its moment."},
