@@ -209,7 +209,7 @@ class Shaped:
             shape = np.shape(answer)
         except ValueError:  # rows of different lengths
             return self.judge(answer)
-        if answer is None or shape not in self.shapes:
+        if answer is None or answer is Ellipsis or shape not in self.shapes:
             return self.judge(answer)
         return Verdict(False, self.shapes[shape], self._name(shape))
 

@@ -65,6 +65,7 @@ EXERCISES = (
                 "reaction": "That is what the robot does to the ground; the answer is what the ground does to the robot.",
             },
         ),
+        examples=lambda: [(_go2().mass * (9.8 + UP), "")],
         explanation="Newton: the vertical forces of the ground minus the weight give mass times acceleration, so together they "
         "are m g + m a.",
     ),

@@ -10,7 +10,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import fixed_frame
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers, vector_text
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers, vector_text
 from floatbase.lessons.lesson01.pictures import PRESSING
 from floatbase.objectives import momentum_rate
 from floatbase.robots import PLATE, unbolted
@@ -113,6 +113,16 @@ def _judge_thrust(answer: Any) -> Verdict:
     return Verdict(True, "Straight up without turning. Six conditions on twelve numbers: there are many other answers.")
 
 
+def _thrusts() -> list[Example]:
+    """Front and rear share the force as the centre of mass has it."""
+    state = fb.load("go2").standing()
+    feet = fb.Contacts.points(state.robot).positions(state) - state.com
+    front, rear = abs(feet[0, 0]), abs(feet[2, 0])
+    f = 100.0 / (front + rear) * np.outer([rear, rear, front, front], [0.0, 0.0, 1.0])
+    right = [(f, ""), (f.ravel(), "")]
+    return [*right, (-f, "sign"), (2 * f, "force"), (f[:, [2, 1, 0]], "force"), (f[::-1], "moment")]
+
+
 EXERCISES = (
     Exercise(
         name="01.1",
@@ -210,6 +220,7 @@ EXERCISES = (
                 "mu_twice": "Friction answers along the floor only as far as the normal force goes: multiply by μ, once.",
             },
         ),
+        examples=lambda: [(0.7 * fb.load("go2").mass * 9.8, "")],
         explanation="Each foot gives at most μ times its normal force, and the normal forces add up to the weight.",
     ),
     Exercise(
@@ -222,6 +233,7 @@ EXERCISES = (
         "G = np.vstack([np.tile(np.eye(3), 4), np.hstack(moments)])\n"
         "thrust = np.linalg.lstsq(G, [0, 0, 200, 0, 0, 0], rcond=None)[0].reshape(4, 3)",
         judge=Shaped(_judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}),
+        examples=_thrusts,
         explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; least squares gives the "
         "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, (20) and (21).",
     ),

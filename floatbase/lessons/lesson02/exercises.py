@@ -126,6 +126,25 @@ def _judge_holding(answer: Any) -> Verdict:
     return Verdict(False, f"The base is balanced; the joints' rows are not: up to {worst:.1f} N·m are left over.", "joint_rows")
 
 
+def _holdings() -> list[Example]:
+    """By the lever rule, and one leg at a time."""
+    state = fb.load("go2").standing()
+    contacts = fb.Contacts.points(state.robot)
+    feet = abs(contacts.positions(state) - state.com)
+    share = np.outer([feet[2, 0], feet[0, 0]], [feet[1, 1], feet[0, 1]]).ravel()
+    forces = state.robot.weight / share.sum() * np.outer(share, [0.0, 0.0, 1.0])
+    gravity = state.h[6:]
+    tau = gravity - contacts.jacobian(state).T[6:] @ forces.ravel()
+    squeeze = np.outer([1, -1, -1, 1], [0.0, 0.0, 100.0])
+    return [
+        ((tau, forces), ""), ((tau, forces.ravel()), ""), ((tau, -forces), "sign"), ((tau, 0.5 * forces), "force_rows"),
+        ((tau, forces[::-1]), "moment_rows"), ((tau, forces + squeeze), "pulls"), ((gravity, forces), "gravity_alone"),
+        ((2 * gravity - tau, forces), "sign_of_forces"), ((-tau, forces), "torque_sign"), ((tau + 1.0, forces), "joint_rows"),
+        ((None, None), "no_answer"), (np.zeros(12), "not_two"), ((np.zeros(18), np.zeros(12)), "shapes"),
+        ((np.full(12, np.nan), np.zeros(12)), "not_finite"), (("a", "b"), "not_numbers"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="02.1",
@@ -260,6 +279,7 @@ EXERCISES = (
         "hold_tau, hold_forces = both[:12], both[12:]",
         judge=_judge_holding,
         names=lambda: {"go2": fb.load("go2"), "eom": _standing_go2()},
+        examples=_holdings,
         explanation="Six more unknowns than equations: lstsq takes the smallest, by the sum of all squares. That adds N² and "
         "(N·m)², so another unit would give other forces. The answers differ by forces that squeeze the robot from within; "
         "lesson 03 is about them.",

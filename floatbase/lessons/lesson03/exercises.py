@@ -8,8 +8,8 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._arrays import Array
-from floatbase.dynamics import EquationsOfMotion, torque_force_matrix, torque_force_space
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
+from floatbase.dynamics import EquationsOfMotion, internal_forces, torque_force_matrix, torque_force_space
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson03.helpers import rising_solo8, standing_go2, tilted_squeeze
 from floatbase.linear_algebra import RANK_TOLERANCE, rank
 
@@ -175,6 +175,37 @@ def _judge_all_pairs(answer: Any) -> Verdict:
     return _fault_of_pair(given[:, 0]) or _fault_of_directions(given[:, 1:]) or right
 
 
+def _unloadings() -> list[Example]:
+    wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])  # forces without a sum and without a moment
+    forces, squeezes = _standing_forces(), internal_forces(standing_go2())
+    less = 20.0 - forces[2]
+    short, moved = np.eye(12)[[2, 11]] * less
+    return [
+        (forces + less * wobble, ""), (forces + less * wobble + 5.0 * squeezes @ squeezes[1], ""), (forces, "unchanged"),
+        (forces + short, "weight"), (forces + short - moved, "moments"), (forces - less * wobble, "not_20"),
+        (forces + (less + 10.0) * wobble, "not_20"),
+    ]  # fmt: skip
+
+
+def _pairs() -> list[Example]:
+    C, right_side = torque_force_matrix(rising_solo8())
+    (U, s, Vt), r = np.linalg.svd(C), rank(C)
+    v, V = Vt[:r].T @ (U[:, :r].T @ right_side / s[:r]), Vt[r:].T
+    turned = V @ np.linalg.qr(np.random.default_rng(0).standard_normal((10, 10)))[0]
+
+    def first(pair: Array, directions: Array = V) -> Array:
+        return np.column_stack([pair, directions])
+
+    return [
+        *((first(wrong), hint) for (hint, _), wrong in _wrong_pairs().items()),
+        (first(v), ""), (first(v, turned), ""), (first(v + 0.1 * V[:, 0]), "longer"), (first(v, Vt[12:].T), "full_rank"),
+        (first(v, Vt[:, 10:]), "not_null_space"), (first(v, Vt[:10].T), "not_null_space"),
+        (first(v, np.column_stack([V, V[:, 0] + Vt[0]])), "not_to_zero"), (first(v, 2.0 * V), "not_orthonormal"),
+        (first(v, V[:, :-1]), "too_few"), (first(v)[:, ::-1], "no_solution"), (np.zeros((20, 9)), "zero"),
+        (first(v).T, "transpose"), (np.zeros((34, 11)), "with_qdd"), (v, "no_matrix"), (3.0, "no_matrix"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="03.1",
@@ -247,6 +278,7 @@ EXERCISES = (
         "new_forces = forces + squeezes @ row * (20 - forces[2]) / (row @ row)",
         judge=_judge_unloading,
         names=lambda: {"forces": _standing_forces()},
+        examples=_unloadings,
         explanation="Every λ = λ₀ + N x keeps the robot still; x is the shortest vector with row x = 20 - λ₀[2].",
     ),
     Exercise(
@@ -260,6 +292,7 @@ EXERCISES = (
         "v = Vt[:r].T @ (U[:, :r].T @ (rising.b + J_Minv @ rising.h) / s[:r])\n"
         "all_pairs = np.column_stack([v, Vt[r:].T])",
         judge=_judge_all_pairs,
+        examples=_pairs,
         explanation="C has 12 rows and rank 10: two of its singular values are zero but for rounding. They belong to no "
         "direction of V∥, must not be divided by, and leave 20 - 10 directions to V⊥.",
     ),

@@ -10,10 +10,11 @@ import numpy as np
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, least_point
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, least_point
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson04.helpers import DESIRED, tilted
 from floatbase.linear_algebra import rank
+from floatbase.objectives import tangential_bias
 
 
 def _gradient_by_newton() -> Array:
@@ -129,6 +130,20 @@ def _rounded(a: Array) -> list[float]:
     return [round(float(x), 3) + 0.0 for x in a]
 
 
+def _designs() -> list[Example]:
+    eom = standing_go2()
+    eta, com, turn, effort = _first_costs().values()
+    zeta, wish = fb.forces_from_torques(eom), (com + turn).pullback(eta)
+    friction = tangential_bias(eom.contacts).pullback(zeta)
+    even = fb.Quadratic.from_residual(np.eye(12), np.tile([0.0, 2.0, eom.robot.weight / 4], 4), 1e-6).pullback(zeta)
+    to_the_right = fb.Quadratic.from_residual(eom.state.com_jacobian, -DESIRED - eom.state.com_drift)
+    return [
+        (wish + 1e-4 * effort + 3e-5 * friction, ""), (wish + 1e-4 * effort + 1e-4 * friction, ""), (wish + even, ""),
+        (wish + 1e-4 * effort, "friction"), (com.pullback(eta) + 1e-4 * effort, "turning"), (wish + effort, "com"),
+        ((to_the_right + turn).pullback(eta) + 1e-4 * effort, "sign"), (com, "other_block"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="04.1",
@@ -205,6 +220,7 @@ EXERCISES = (
         "design = wishes + 1e-4 * friction.pullback(zeta)",
         judge=_judge_design,
         names=_first_costs,
+        examples=_designs,
         explanation="Friction is easy to say in λ, so say it there and bring it to the torques through ζ. Its weight is small "
         "enough not to spoil the acceleration.",
     ),

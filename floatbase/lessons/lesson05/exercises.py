@@ -10,11 +10,11 @@ import numpy as np
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, least_point
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, least_point
 from floatbase.lessons.lesson03 import standing_go2, standing_still
-from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, three_feet
+from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, squeezes, three_feet
 from floatbase.lessons.rounding import about
-from floatbase.objectives import force_bias, momentum_rate, tangential_bias, wrench_objective
+from floatbase.objectives import com_wrench, force_bias, momentum_rate, tangential_bias, wrench_objective
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
 FORWARDS = 60.0  # N, of exercise 05.4
@@ -191,6 +191,31 @@ def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
     return Verdict(True, f"On MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
 
 
+def _leaning(direction: Any, weight: float = 1e-3) -> fb.Quadratic:
+    """The wish, and friction counted from another direction than the ground's normal."""
+    eom = standing_go2()
+    normals = np.asarray(direction) / np.linalg.norm(direction)
+    return _cost_60(eom) + weight * tangential_bias(fb.Contacts.points(eom.robot, normals=normals))
+
+
+def _designs() -> list[Example]:
+    eom = standing_go2()
+    cost, share, force = _cost_60(eom), eom.robot.weight / 4, np.array([FORWARDS, 0.0, eom.robot.weight])
+    right, smallest = _leaning(force), cost.minimiser()
+    by_hand = np.linalg.pinv(com_wrench(eom.state, eom.contacts).A) @ [*force, 0, 0, 0]
+    by_hand[0::3] += [-7.8, -7.8, 7.8, 7.8]
+    diagonal = squeezes(eom.contacts)["diagonal"]
+    return [
+        (right, ""), (fb.Quadratic.from_residual(np.eye(12), by_hand), ""),
+        (cost + 1e-3 * force_bias(eom.contacts, 0.1, share), "leans"), (_leaning([30.0, 0.0, eom.robot.weight]), "leans"),
+        (cost + force_bias(eom.contacts, 0.1, share), "force"), (force_bias(eom.contacts, 0.1, share), "force"),
+        (cost + 1e-3 * force_bias(eom.contacts, 10.0, share), "moment"),
+        (fb.Quadratic.from_residual(np.eye(12), smallest + 25.0 * diagonal), "pulls"),
+        (cost.pullback(fb.forces_from_torques(eom)), "on_torques"), (right.pullback(fb.forces_from_torques(eom)), "on_torques"),
+        (cost.pullback(fb.forces_from_torques(arm_robot())), "other_block"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="05.1",
@@ -291,6 +316,7 @@ EXERCISES = (
         "design = cost60 + 1e-3 * tangential_bias(leaning)",
         judge=_judge_design,
         names=_first_design,
+        examples=_designs,
         explanation="(23) calls a force without friction the best, and shares the friction equally. Where friction is the "
         "wish, a better preference is the direction of the whole: then each foot leans as the sum does, by 60 / 158.",
     ),

@@ -11,8 +11,9 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson06.pictures import uphill
+from floatbase.objectives import com_wrench
 
 BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5  # of exercise 06.1: normal, not unit; μ; facets
 FACETS, MU = 8, 0.7  # of exercise 06.2
@@ -118,6 +119,30 @@ def _judge_margins(f: Array) -> Verdict:
             False, f"In balance, with room enough in cones about the vertical; in the slope's own, {least}.", "vertical_cones"
         )
     return Verdict(False, f"In balance, but outside of a cone: {least}.", "outside")
+
+
+def _in_balance(facets: int, room: float) -> Array:
+    """The smallest forces on the hill, (12,) N, that carry go2, with room to polyhedra of so many facets."""
+    state, contacts = on_hill()
+    carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
+    rows = np.kron(np.eye(4), FrictionPolyhedron(uphill(HILL), MU, facets).rows)
+    balance = (com_wrench(state, contacts).A, carry)
+    return fb.solve(fb.QP(np.eye(12), np.zeros(12), *balance, rows, np.full(len(rows), -room))).x
+
+
+def _forces() -> list[Example]:
+    state, contacts = on_hill()
+    weight, n = state.robot.weight, uphill(HILL)
+    smallest = np.linalg.pinv(com_wrench(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
+    squeeze = np.zeros(12)  # the left feet against the right ones: it changes neither sum nor moment
+    squeeze[[7, 10]] = 1.0, -1.0
+    return [
+        *((_in_balance(facets, room), "") for facets, room in ((8, 3.0), (16, 3.0), (16, 4.0))),
+        (np.zeros(12), "nobody"), (-smallest, "sign"), (np.tile(weight * n[2] * n / 4, 4), "slides"),
+        (np.tile(weight * n / 4, 4), "along_normal"), (0.9 * smallest, "sum"),
+        (np.tile([0.0, 0.0, weight / 4], 4), "moment"), (smallest, "alike"), (smallest + squeeze, "vertical_cones"),
+        (_in_balance(16, 0.1), "in_cones"), (smallest + 40 * squeeze, "outside"),
+    ]  # fmt: skip
 
 
 EXERCISES = (
@@ -243,6 +268,7 @@ EXERCISES = (
         "forces_on_hill = fb.solve(fb.QP(*least, G_hill, carry, rows_on_hill, room)).x",
         judge=_judge_forces,
         names=lambda: {"robot": fb.load("go2"), "on_hill": on_hill},
+        examples=_forces,
         explanation="The rows of all feet with -3 on their right side, the balance as equalities, and least forces to choose.",
     ),
 )

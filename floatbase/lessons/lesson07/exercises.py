@@ -11,7 +11,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.errors import InputError
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson07.helpers import LENGTH, MU, START, leaning, pushed, tuned
 from floatbase.lessons.rounding import about
@@ -180,6 +180,35 @@ def _judge_design(answer: Any) -> Verdict:
     )
 
 
+def _sides(slope: float = INNER, first: int = 36) -> Array:
+    """Four sides of a pyramid on three columns of x."""
+    G = np.zeros((4, 42))
+    G[:, first : first + 3] = [[1, 0, -slope], [0, 1, -slope], [-1, 0, -slope], [0, -1, -slope]]
+    return G
+
+
+def _pyramids() -> list[Example]:
+    right = _sides()
+    leans_freely, up_forbidden = right[[2, 1, 2, 3]], right * np.where(np.arange(42) == 38, [[-1], [1], [1], [1]], 1)
+    return [
+        (right, ""), (8.0 * right, ""), (right[[3, 1, 0, 2]], ""), (_sides(0.495), ""), (_sides(0.5), ""),
+        (0.0 * right, "zero"), (_sides(first=39), "columns"), (_sides(first=18), "columns"), (_sides(first=30), "columns"),
+        (right * [[1], [1], [0], [1]], "zero_row"), (-right, "sign"), (_sides(MU), "around"),
+        (_sides(MU * np.cos(45)), "radians"), (_sides(1 / INNER), "inverse_mu"), (_sides(0.6), "other_forces"),
+        (leans_freely, "leans_freely"), (up_forbidden, "up_forbidden"),
+    ]  # fmt: skip
+
+
+def _designs() -> list[Example]:
+    return [
+        ((400, 80, 10, 1e-3), ""), ((400, 70, 10, 1e-3), ""), ((500, 90, 30, 1e-3), ""),
+        ((200, 40, 10, 1e-3), "too_far"), ((100, 20, 10, 1e-3), "too_far_and_strays"),
+        ((25, 10, 10, 1e-3), "stays_away"), ((0, 80, 10, 1e-3), "creeps"),
+        ((10, 1, 1, 1e-3), "falls"), ((1e5, 20, 10, 1e-3), "strays"), ((100, -20, 10, 1e-3), "negative"),
+        ((100, 20, 0, 1e-3), "negative"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="07.1",
@@ -232,6 +261,7 @@ EXERCISES = (
                 (42, 4): "This is the transpose: a row of G belongs to one limit.",
             },
         ),
+        examples=_pyramids,
         explanation="Each row says d·f - μ' n·f ≤ 0 for one direction d, with zeros for whatever is not this foot's force.",
     ),
     Exercise(
@@ -262,6 +292,7 @@ EXERCISES = (
             },
             tolerance=0.01,
         ),
+        examples=lambda: [(round(_change_of_psi(), 3), "")],
         explanation="For small changes ψ falls by the sum of price times room. Torque limits that are not active cost nothing.",
     ),
     Exercise(
@@ -271,6 +302,7 @@ EXERCISES = (
         stub="design = np.array([100, 20, 10, 1e-3])  # kp, kd, weight; weight of the posture",
         solution="design = np.array([400, 80, 10, 1e-3])",
         judge=_judge_design,
+        examples=_designs,
         explanation="Twice the critical damping of a stiff spring: the damper answers the speed, which is there before any "
         "error is, and a stiff spring brings it home although the damper is slow.",
     ),

@@ -14,7 +14,7 @@ import floatbase as fb
 from floatbase._arrays import Array
 from floatbase.errors import InputError
 from floatbase.friction import wrench_set
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson08.helpers import CRAWL, crawled, least_margin, shortest_shift, uneven_stance
 from floatbase.lessons.rounding import about
 
@@ -205,6 +205,15 @@ def _judge_crawl(answer: Any) -> Verdict:
     return Verdict(True, f"On the physics: {told}. Pauses buy margin, slow swings quiet feet; the price is longer steps.")
 
 
+def _crawls() -> list[Example]:
+    return [
+        ((0.3, 0.25, 0.12), ""), ((0.3, 0.1, 0.08), "slow_and_near"), ((0.3, 0.25, 0.08), "slow"), ((0.3, 0.1, 0.13), "near"),
+        ((0.15, 0.1, 0.15), "near_and_stamps"), ((0.15, 0.3, 0.13), "stamps"), ((2.0, 0.1, 0.4), "falls"),
+        ((300.0, 250.0, -0.1), "backwards"),
+        ((0.01, 0.2, 0.1), "too_short"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="08.1",
@@ -313,6 +322,7 @@ EXERCISES = (
         stub="design = np.array([0.3, 0.1, 0.08])  # swing, pause, s; speed, m/s",
         solution="design = np.array([0.3, 0.25, 0.12])",
         judge=_judge_crawl,
+        examples=_crawls,
         explanation="Margin comes from pauses, in which x_c shifts; quiet feet come from slow swings. Speed costs little: "
         "the steps become longer.",
     ),

@@ -13,7 +13,7 @@ from floatbase._arrays import Array
 from floatbase.dynamics import FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, numbers
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson09.helpers import AFTER, BEGIN, MU, SLOW_PERIOD, leaning, pressure, talos
 from floatbase.lessons.rounding import about
 from floatbase.linear_algebra import rank
@@ -147,6 +147,13 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     return Verdict(True, f"On the physics: {told}.")
 
 
+def _leans() -> list[Example]:
+    return [
+        ((1.5, 0.01), ""), ((1.45, 0.02), ""), ((1.0, 0.1), "toes_and_short"), ((0.6, 0.01), "tips"), ((1.1, 0.01), "toes"),
+        ((1.3, 0.1), "short"), ((3.0, 0.01), "slow"), ((-1.0, 0.1), "range"), ((1.0, -0.1), "range"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="09.1",
@@ -183,6 +190,7 @@ EXERCISES = (
                 "whole_force": "The normal force is f_z alone, not the length of f.",
             },
         ),
+        examples=lambda: [(np.round(_pushed(), 5), "")],
         explanation="Moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x - h f_y and τ_y + h f_x.",
     ),
     Exercise(
@@ -267,6 +275,7 @@ EXERCISES = (
         stub="design = np.array([1.0, 0.1])  # seconds, weight of the posture",
         solution="design = np.array([1.5, 0.01])",
         judge=_judge_lean,
+        examples=_leans,
         explanation="Braking takes the centre of pressure ahead of x_c by the deceleration over ω², which falls with the "
         "square of the time. The posture is a wish, too: with a tenth of its weight the lean ends where it should.",
     ),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from floatbase._arrays import Array
-from floatbase.lessons.exercises import Exercise, Numeric, Verdict, numbers
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict, numbers
 from floatbase.lessons.lessonB.helpers import comes_back
 from floatbase.lessons.rounding import about
 
@@ -69,6 +69,13 @@ def _judge_gains(answer: Any) -> Verdict:
         f"{far}, but nearly at rest there. What leaks pushes it aside, and kp is the spring that holds against it.",
         "leaks",
     )
+
+
+def _gains() -> list[Example]:
+    return [
+        ((490.0, 20.0), ""), ([420, 20], ""), ((100.0, 20.0), "leaks"), ((700.0, 20.0), "swings"), ((2000.0, 20.0), "hard"),
+        ((2.0, 2.0), "soft"), ((490.0, 44.0), "damping"), ((20.0, 490.0), "swapped"), ((-490.0, 20.0), "not_above_zero"),
+    ]  # fmt: skip
 
 
 EXERCISES = (
@@ -153,6 +160,7 @@ EXERCISES = (
         stub="gains = (100.0, 20.0)  # kp in 1/s², kd in 1/s; kd at most 20; replace",
         solution="gains = (490.0, 20.0)",
         judge=_judge_gains,
+        examples=_gains,
         explanation="What leaks is a force, so go2 stays aside by an amount ∝ 1/kp; but kp/kd must stay below 2π · 5 Hz.",
     ),
 )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import Exercise, Numeric, Verdict
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict
 from floatbase.lessons.lessonC.helpers import braking
 from floatbase.qp import QP, active_set
 
@@ -40,9 +40,10 @@ def _price() -> float:
 
 @dataclass(frozen=True)
 class _Way:
-    """A step in the plane, whose answer is known from how it was made, and the hint for a function that misses it."""
+    """A step in the plane, whose answer is known from how it was made, and what is said of a function that misses it."""
 
-    hint: str
+    hint: str  # its name
+    text: str
     p: tuple[float, float]
     G: Sequence[Sequence[float]]
     h: Sequence[float]
@@ -51,44 +52,51 @@ class _Way:
 
 
 _WAYS = (
-    _Way("Nothing is in the way here: 1, to arrive, and None.", (1, 0), [[1, 0], [0, 1]], [2, 2], [], (1.0, None)),
     _Way(
-        "A row is in the way halfway: where it holds with equality, slack = length · speed.",
+        "free", "Nothing is in the way here: 1, to arrive, and None.",
+        (1, 0), [[1, 0], [0, 1]], [2, 2], [], (1.0, None),
+    ),
+    _Way(
+        "halfway", "A row is in the way halfway: where it holds with equality, slack = length · speed.",
         (2, 0), [[0, 1], [1, 0]], [5, 1], [], (0.5, 1),
     ),
     _Way(
-        "A row that the step moves away from (speed < 0) is never in the way.",
+        "away", "A row that the step moves away from (speed < 0) is never in the way.",
         (1, 1), [[-1, 0], [0, -1]], [0.5, 0.25], [], (1.0, None),
     ),
     _Way(
-        "A row along which the step runs (speed 0) is never in the way, and nothing can be divided by its speed.",
+        "along", "A row along which the step runs (speed 0) is never in the way, and nothing can be divided by its speed.",
         (1, 0), [[0, 1], [0, -1]], [0, 0], [], (1.0, None),
     ),
     _Way(
-        "Two rows are in the way: the step must end at the first that it meets.",
+        "nearest", "Two rows are in the way: the step must end at the first that it meets.",
         (4, 0), [[1, 0], [2, 0], [1, 0]], [3, 2, 2.5], [], (0.25, 1),
     ),
     _Way(
+        "soonest",
         "Here two rows are in the way at different speeds: it is not the slack alone that counts, but how soon it is used up.",
         (2, 2), [[1, 0], [3, 3]], [1, 3], [], (0.25, 1),
     ),
     _Way(
-        "A row of W is held already, and rounding must not let it block.",
+        "held", "A row of W is held already, and rounding must not let it block.",
         (1, 0), [[1, 1e-8], [1, 0]], [0, 0.5], [0], (0.5, 1),
     ),
     _Way(
+        "touches",
         "The point touches a row that is not in W and would cross it: then the step has length 0, and that row blocks.",
         (1, 0), [[0, 1], [1, 0]], [1, 0], [], (0.0, 1),
     ),
     _Way(
-        "The row lies beyond the end of the step: length 1, and nothing blocks.",
+        "beyond", "The row lies beyond the end of the step: length 1, and nothing blocks.",
         (1, 0), [[1, 0]], [1.5], [], (1.0, None),
     ),
     _Way(
+        "slack_rounding",
         "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of equal rows the first.",
         (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
     ),
     _Way(
+        "speed_rounding",
         "A speed of 1e-7 is zero and rounding: such a row is not in the way. Let 1e-6 be the limit.",
         (1, 0), [[1e-7, 1]], [0], [], (1.0, None),
     ),
@@ -96,32 +104,34 @@ _WAYS = (
 
 
 def _judge_step(answer: Any) -> Verdict:
-    def one(way: _Way) -> str:
+    def one(way: _Way) -> Verdict | None:
         for origin in (np.zeros(2), np.array([0.3, -0.2])):  # the same step elsewhere: the slack is h - G x
             G = np.array(way.G, dtype=np.float64)
             h = np.array(way.h, dtype=np.float64) + G @ origin
             given = answer(origin, np.array(way.p, dtype=np.float64), G, h, list(way.W))
             if not isinstance(given, tuple) or len(given) != 2:
-                return "Return two things: the length, and the number of the row or None."
+                return Verdict(False, "Return two things: the length, and the number of the row or None.", "not_two")
             length, row = given
             if not isinstance(length, int | float | np.number) or not np.isfinite(length):
-                return f"The length is {length!r}; it should be a number from 0 to 1. Was it divided by a speed of zero?"
+                told = f"The length is {length!r}; it should be a number from 0 to 1. Was it divided by a speed of zero?"
+                return Verdict(False, told, "no_length")
             if length < 0:
-                return f"A length is negative ({length:.2g}). {way.hint}"
+                return Verdict(False, f"A length is negative ({length:.2g}). {way.text}", "negative")
             if row is not None and not isinstance(row, int | np.integer):
-                return f"The row is {row!r}; it should be its number in G, or None."
+                return Verdict(False, f"The row is {row!r}; it should be its number in G, or None.", "no_row")
             right, blocks = way.answer
             if abs(length - right) > _CLOSE or row != blocks:
                 if row is not None and row in way.W:
-                    return f"Row {row} is in W and must not block. {way.hint}"
-                elsewhere = "Is the slack h - G x, or h alone? " if np.any(origin) else ""
-                return f"{elsewhere}{way.hint}"
-        return ""
+                    return Verdict(False, f"Row {row} is in W and must not block. {way.text}", "held")
+                if np.any(origin):
+                    return Verdict(False, f"Is the slack h - G x, or h alone? {way.text}", "elsewhere")
+                return Verdict(False, way.text, way.hint)
+        return None
 
     return _tried(answer, [partial(one, way) for way in _WAYS], "As far as all rows hold, and no further.")
 
 
-def _tried(answer: Any, cases: Sequence[Callable[[], str]], praise: str) -> Verdict:
+def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: str) -> Verdict:
     """Run cases of a learner's function; the first that has something to say decides."""
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet: give your function, without brackets.", "no_answer")
@@ -132,34 +142,46 @@ def _tried(answer: Any, cases: Sequence[Callable[[], str]], praise: str) -> Verd
             with np.errstate(all="ignore"):
                 said = case()
         except Exception as error:  # whatever a learner's function raises
-            said = f"Your function stops with {type(error).__name__}: {error}"
+            said = Verdict(False, f"Your function stops with {type(error).__name__}: {error}", "stops")
         if said:
-            return Verdict(False, said)
+            return said
     return Verdict(True, praise)
 
 
 # C.3 ----------------------------------------------------------------------------------------------------------------------
 
-_DROPS: tuple[tuple[list[int], list[float], int | None, str], ...] = (
-    ([5, 3, 8], [2.0, -0.5, 1.0], 3, "One row pulls (its price is negative): that one has to go."),
-    ([4, 2], [1.0, 0.5], None, "No price is negative here: every row pushes, and none leaves."),
-    ([], [], None, "W may be empty: then there is nothing to drop."),
-    ([5, 3, 8], [-0.5, 1.0, -2.0], 8, "Two rows pull: drop the one with the most negative price."),
-    ([1, 6], [9.0, -0.1], 6, "Only a negative price counts, however large another one is."),
-    ([1, 6], [3.0, -1e-14], None, "-1e-14 is zero and rounding: such a row is not dropped. Say, below -1e-9."),
+
+@dataclass(frozen=True)
+class _Drop:
+    """Rows that are on and their prices, and what is said of a function that does not drop the right one."""
+
+    hint: str  # its name
+    text: str
+    W: list[int]
+    prices: list[float]
+    answer: int | None
+
+
+_DROPS = (
+    _Drop("pulls", "One row pulls (its price is negative): that one has to go.", [5, 3, 8], [2.0, -0.5, 1.0], 3),
+    _Drop("pushes", "No price is negative here: every row pushes, and none leaves.", [4, 2], [1.0, 0.5], None),
+    _Drop("empty", "W may be empty: then there is nothing to drop.", [], [], None),
+    _Drop("most_negative", "Two rows pull: drop the one with the most negative price.", [5, 3, 8], [-0.5, 1.0, -2.0], 8),
+    _Drop("negative_alone", "Only a negative price counts, however large another one is.", [1, 6], [9.0, -0.1], 6),
+    _Drop("rounding", "-1e-14 is zero and rounding: such a row is not dropped. Say, below -1e-9.", [1, 6], [3.0, -1e-14], None),
 )
 
 
 def _judge_drop(answer: Any) -> Verdict:
-    def one(W: list[int], prices: list[float], right: int | None, hint: str) -> str:
-        given = answer(list(W), np.array(prices))
+    def one(drop: _Drop) -> Verdict | None:
+        given = answer(list(drop.W), np.array(drop.prices))
         if given is not None and not isinstance(given, int | np.integer):
-            return f"The answer is {given!r}; it should be a row's number in G, or None."
-        if given is not None and given not in W:
-            return "Give the row's number in G, which stands in W, not its place in W."
-        return "" if given == right else hint
+            return Verdict(False, f"The answer is {given!r}; it should be a row's number in G, or None.", "no_number")
+        if given is not None and given not in drop.W:
+            return Verdict(False, "Give the row's number in G, which stands in W, not its place in W.", "place")
+        return None if given == drop.answer else Verdict(False, drop.text, drop.hint)
 
-    cases = [partial(one, *case) for case in _DROPS]
+    cases = [partial(one, drop) for drop in _DROPS]
     return _tried(answer, cases, "A row may push, never pull: that is the whole test of an optimum.")
 
 
@@ -237,6 +259,76 @@ DROP = '''def row_to_drop(W, prices):
         return None
     return W[int(np.argmin(prices))]'''
 
+
+def _steps() -> list[Example]:
+    def step(
+        slack: Callable[..., Any] = lambda x, G, h: np.round(h - G @ x, 9),
+        counts: Callable[..., Any] = lambda room, speed: speed > 1e-6,
+        length: Callable[..., Any] = lambda room, speed: room / speed,
+        best: Callable[..., Any] = min,
+        most: float = 1.0,
+        beyond: float = 1.0,
+        held: bool = True,
+    ) -> Callable[..., Any]:
+        """A `longest_step` that does one thing in another way."""
+
+        def made(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
+            rows = [(room, speed, i) for i, (room, speed) in enumerate(zip(slack(x, G, h), G @ p, strict=True))]
+            near = [(length(*row[:2]), row[2]) for row in rows if not (held and row[2] in W) and counts(*row[:2])]
+            found, row = best(near, default=(most, None))
+            return (found, row) if found < beyond else (most, None)
+
+        return made
+
+    right = step()
+
+    def by_room(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
+        near = [(h[i] - G[i] @ x, i) for i in range(len(h)) if i not in W and G[i] @ p > 1e-9]
+        room, row = min(near, default=(1.0, None))
+        found = room / (G[row] @ p) if row is not None else 1.0
+        return (found, row) if found < 1.0 else (1.0, None)
+
+    return [
+        (right, ""), (step(most=np.inf), "no_length"), (step(most=2.0), "free"), (lambda x, p, G, h, W: (1.0, None), "halfway"),
+        (step(counts=lambda room, speed: speed != 0), "negative"), (step(slack=lambda x, G, h: G @ x - h), "negative"),
+        (step(slack=lambda x, G, h: h), "elsewhere"), (step(counts=lambda room, speed: speed > 1e-9), "speed_rounding"),
+        (step(counts=lambda room, speed: abs(speed) > 1e-6, length=lambda room, speed: room / abs(speed)), "away"),
+        (step(counts=lambda room, speed: speed >= 0, length=lambda room, speed: room / max(speed, 1e-3)), "along"),
+        (step(best=max), "nearest"), (by_room, "soonest"), (step(counts=lambda room, speed: speed > 1e-9, held=False), "held"),
+        (step(counts=lambda room, speed: speed > 1e-6 and room > 0), "touches"), (step(beyond=1.6), "beyond"),
+        (step(slack=lambda x, G, h: h - G @ x), "slack_rounding"), (lambda x, p, G, h, W: right(x, p, G, h, W)[0], "not_two"),
+        (lambda x, p, G, h, W: (right(x, p, G, h, W)[0], "row"), "no_row"), (lambda x, p: 1.0, "stops"), (0.5, "no_function"),
+    ]  # fmt: skip
+
+
+def _drops() -> list[Example]:
+    def drop(take: Callable[..., Any], limit: float = -1e-9) -> Callable[..., Any]:
+        return lambda W, prices: take(W, prices) if len(W) and min(prices) < limit else None
+
+    def hardest(W: Any, prices: Any) -> Any:
+        return W[int(np.argmin(prices))]
+
+    return [
+        (drop(hardest), ""), (lambda W, prices: None, "pulls"), (drop(lambda W, prices: int(np.argmin(prices))), "place"),
+        (drop(lambda W, prices: W[int(np.argmax(np.abs(prices)))]), "pulls"), (drop(hardest, 0.0), "rounding"),
+        (drop(lambda W, prices: next(r for r, p in zip(W, prices, strict=True) if p < 0)), "most_negative"),
+        (lambda W, prices: hardest(W, prices) if len(W) else None, "pushes"),
+        (drop(hardest, -0.2), "negative_alone"), (lambda W, prices: drop(hardest)(W, prices) if len(W) else 3, "place"),
+        (lambda W, prices: hardest(W, prices) if min(prices) < -1e-9 else None, "stops"),
+        (drop(lambda W, prices: float(hardest(W, prices))), "no_number"), ([3], "no_function"),
+    ]  # fmt: skip
+
+
+def _guesses() -> list[Example]:
+    active = list(fb.solve(braking()).active)
+    motor = next(name for name in braking().inequality_names if "upper" in name)
+    return [
+        (active, ""), (tuple(reversed(active)), ""), ([], "no_row"), (active[:-1], "corrections"),
+        (["RR facet 2"], "no_such_row"), ([*active, "FL_foot facet 0"], "corrections"), ([motor], "motors"),
+        ("RR_foot facet 2", "no_names"), ([f"RR_foot facet {i}" for i in range(4)], "dependent"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="C.1",
@@ -279,6 +371,7 @@ EXERCISES = (
         stub=STEP_STUB,
         solution=STEP,
         judge=_judge_step,
+        examples=_steps,
         explanation="A row i leaves slack / speed of room along the step, if the step comes closer to it at all. The least of "
         "these lengths decides, and 1 if none is less.",
     ),
@@ -288,6 +381,7 @@ EXERCISES = (
         stub=DROP_STUB,
         solution=DROP,
         judge=_judge_drop,
+        examples=_drops,
         explanation="A negative price says: ψ would fall if this row were left. The most negative one promises the most.",
     ),
     Exercise(
@@ -299,6 +393,7 @@ EXERCISES = (
         '    "RR_foot facet 2", "RR_foot facet 3", "RR_foot normal force",\n'
         "]",
         judge=_judge_guess,
+        examples=_guesses,
         explanation="To brake, the feet must push backwards and to the right: facets 2 and 3. The rear right foot, which the "
         "push relieves, carries nothing: all its three numbers are held. FL, on which go2 leans, is free.",
     ),

@@ -9,7 +9,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._arrays import Array
-from floatbase.lessons.exercises import Exercise, Numeric, Verdict, numbers
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict, numbers
 from floatbase.lessons.lessonP.helpers import BAG, HIDDEN, box_in_the_dark, on_two_feet, sinks
 
 G = 9.81  # m/s²
@@ -26,25 +26,29 @@ def _load() -> float:
     return BAG / fb.load("go2").mass
 
 
-def _stiffness_slips() -> dict[tuple[str, str], float]:
-    """Name of a hint, hint -> the kp that this kind of mistake leads to."""
-    right, ratio = _load() * G / (MOST / 1e3), _load()
+def _stiffness_slips() -> dict[str, float]:
+    """Name of a hint -> the kp that this kind of mistake leads to."""
+    right, ratio, mass = _load() * G / (MOST / 1e3), _load(), fb.load("go2").mass
     return {
-        (
-            "robot_too",
-            "That carries the robot and the bag; it knows its own weight. Only what it does not know makes it sink.",
-        ): right * (1.0 + ratio) / ratio,
-        ("robot_alone", "That would be for the robot's own weight. Only the bag is not known."): right / ratio,
-        ("metres", "Metres: 10 mm are 0.01 m, and kp is for metres."): right / 1e3,
-        (
-            "newtons",
-            "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the controller believes.",
-        ): right * fb.load("go2").mass,
-        ("true_mass", "The controller plans forces for the mass that it believes, the smaller one: divide by that."): right
-        / (1.0 + ratio),
-        ("damping", "That looks like kd = 2 √kp, which acts on velocities; at rest there are none."): 2.0 * right**0.5,
-        ("no_g", "Without g that is no acceleration."): right / G,
+        "robot_too": right * (1.0 + ratio) / ratio,
+        "robot_alone": right / ratio,
+        "metres": right / 1e3,
+        "newtons": right * mass,
+        "true_mass": right / (1.0 + ratio),
+        "damping": 2.0 * right**0.5,
+        "no_g": right / G,
     }
+
+
+_STIFFNESS = {
+    "robot_too": "That carries the robot and the bag; it knows its own weight. Only what it does not know makes it sink.",
+    "robot_alone": "That would be for the robot's own weight. Only the bag is not known.",
+    "metres": "Metres: 10 mm are 0.01 m, and kp is for metres.",
+    "newtons": "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the controller believes.",
+    "true_mass": "The controller plans forces for the mass that it believes, the smaller one: divide by that.",
+    "damping": "That looks like kd = 2 √kp, which acts on velocities; at rest there are none.",
+    "no_g": "Without g that is no acceleration.",
+}
 
 
 def _judge_stiffness(answer: Any) -> Verdict:
@@ -55,9 +59,9 @@ def _judge_stiffness(answer: Any) -> Verdict:
     kp = float(given)
     if kp <= 0.0:
         return Verdict(False, "A spring that pulls back needs kp > 0.", "not_above_zero")
-    for (hint, text), slip in _stiffness_slips().items():
+    for hint, slip in _stiffness_slips().items():
         if abs(kp - slip) <= NEAR * slip:
-            return Verdict(False, text, hint)
+            return Verdict(False, _STIFFNESS[hint], hint)
     if kp > STIFFEST:
         return Verdict(False, "No motor follows that: the controller looks at the robot only every 4 ms.", "too_stiff")
     below = 1e3 * sinks(kp)
@@ -156,6 +160,18 @@ def _by_sinking(kp: float) -> float:
     return 1.0 + kp * float(record.state(0).com[2] - record.final.com[2]) / G
 
 
+def _stiffnesses() -> list[Example]:
+    right = _load() * G / (MOST / 1e3)
+    return [
+        *((kp, hint) for hint, kp in _stiffness_slips().items()), (right, ""), (0.97 * right, ""), (-right, "not_above_zero"),
+        (0.8 * right, "soft"), (1.5 * right, "hard"), (1e6, "too_stiff"), (3.0, "ground"),
+    ]  # fmt: skip
+
+
+def _shifts() -> list[Example]:
+    return [*_SHIFT.examples(), (_nearest() + [0.0, 0.0, 0.1], "height")]
+
+
 EXERCISES = (
     Exercise(
         name="P.1",
@@ -163,6 +179,7 @@ EXERCISES = (
         stub="kp = 0.0  # 1/s²; replace by your expression",
         solution="kp = bag / go2.mass * 9.81 / 0.010",
         judge=_judge_stiffness,
+        examples=_stiffnesses,
         explanation="At rest m (kp s + g) = (m + bag) g. On physics it is 3 to 6 % less, since legs have masses of their own.",
     ),
     Exercise(
@@ -173,6 +190,7 @@ EXERCISES = (
         "across = np.array([-line[1], line[0], 0]) / np.linalg.norm(line[:2])\n"
         "shift = across * (across @ (feet['FL_foot'] - com))",
         judge=_judge_shift,
+        examples=_shifts,
         explanation="The part of (foot - com) across the line; what is along the line does not matter.",
     ),
     Exercise(
@@ -207,6 +225,7 @@ EXERCISES = (
             },
             tolerance=5e-3,
         ),
+        examples=lambda: [(_measured(), "")],
         explanation="At rest the ground carries the true weight, and nothing else.",
     ),
 )

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from floatbase._arrays import Array
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict
+from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict
 from floatbase.lessons.lessonX import program
 from floatbase.lessons.lessonX.box import BlackBox
 from floatbase.lessons.lessonX.cases import FAULTS, LARGEST_SEED, Case, black_boxes, drawn_cases, innocent_boxes, innocent_cases
 from floatbase.lessons.lessonX.tools import needed
-from floatbase.lessons.lessonX.verdicts import judged
+from floatbase.lessons.lessonX.verdicts import AGAINST, judged, mistaken
 
 VISITED = 5  # seed of the box of exercise X.1
 _UNSEEN = (20611, 20612, 20613, 102, 20615, 20616)  # seeds from which the last exercise takes one fault each
@@ -100,13 +100,15 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
             False, 'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".', "nothing_said"
         )
     boxes = {box.name: box for box in black_boxes(seed)}
-    said = {name: judged(cases[name], boxes[name], line) for name, line in sorted(told.items())}
-    wrong = [f"{name}: {hint}" for name, hint in said.items() if hint]
-    solved, left = [name for name in said if not said[name]], [name for name in cases if name not in said]
+    verdicts = {name: judged(cases[name], boxes[name], line) for name, line in sorted(told.items())}
+    wrong = [f"{name}: {verdict.text}" for name, verdict in verdicts.items() if not verdict.right]
+    solved = [name for name, verdict in verdicts.items() if verdict.right]
+    left = [name for name in cases if name not in verdicts]
     if not wrong and not left:
         return Verdict(True, "Six faults, each with evidence that holds. The insurance pays.")
     parts = [f"Solved: {', '.join(solved)}." if solved else "", *wrong, f"Open: {', '.join(left)}." if left else ""]
-    return Verdict(False, "\n".join(part for part in parts if part), "wrong" if wrong else "open")
+    hint = next((verdict.hint for verdict in verdicts.values() if not verdict.right), "open")
+    return Verdict(False, "\n".join(part for part in parts if part), hint)
 
 
 # X.3 ----------------------------------------------------------------------------------------------------------------------
@@ -129,23 +131,64 @@ def _judge_program(answer: Any) -> Verdict:
     if not callable(answer):
         return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.", "no_function")
     for i in range(len(FAULTS) + 2):
-        if said := _tried(answer, *_unseen(i)):
-            return Verdict(False, said)
+        if wrong := _tried(answer, *_unseen(i)):
+            return wrong
     return Verdict(True, "Six faults found in boxes it had never seen, each with its evidence, and no innocent accused.")
 
 
-def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> str:
-    """What is wrong with a program's word about a box; "" where it is right."""
+def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Verdict | None:
+    """What is wrong with a program's word about a box; None where it is right."""
     what = f"a robot with {case.mistake.fault}" if case.mistake.fault else "a sound robot"
     what += " that was kicked over" if case.pushes else ""
     try:
         line = program(box)
     except Exception as error:  # whatever a learner's function raises
-        return f"Of {what}: your function stops with {type(error).__name__}: {error}"
+        return Verdict(False, f"Of {what}: your function stops with {type(error).__name__}: {error}", "stops")
     if not isinstance(line, str):
-        return f'Return a line of text, such as "mass 0.93" or "nothing"; this is {type(line).__name__}.'
-    hint = judged(case, box, line)
-    return hint and f'Of {what} your program says "{line}": {hint}'
+        said = f'Return a line of text, such as "mass 0.93" or "nothing"; this is {type(line).__name__}.'
+        return Verdict(False, said, "no_text")
+    verdict = judged(case, box, line)
+    return None if verdict.right else Verdict(False, f'Of {what} your program says "{line}": {verdict.text}', verdict.hint)
+
+
+def _reports() -> list[Example]:
+    """On the boxes of seed 1."""
+    boxes, found = black_boxes(1), {box.name: program.investigate(box) for box in black_boxes(1)}
+    cases = {case.mistake.fault: case for case in drawn_cases(1)}
+    report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
+
+    def but(fault: str, line: str) -> list[str]:
+        """The report, which says something else of the box with a fault."""
+        name = cases[fault].name
+        return [f"{name}: {line}" if said.startswith(name) else said for said in report]
+
+    right, wrong = cases["swapped motors"].mistake.joints, set(boxes[0].robot.joint_names)
+    other, another = sorted(wrong - set(right))[:2]
+    made: list[Example] = [
+        (report, ""), ([f" {line} " for line in report], ""), (but("mass", found[cases["mass"].name].upper()), ""),
+        (but("swapped motors", f"swapped motors {right[1]} and {right[0]}"), ""),
+        (report[1:], "no_seed"), (["seed 1"], "nothing_said"), (["seed 1", "G: mass 0.9"], "no_such_box"), ("seed 1", "no_lines"),
+        (report[:-1], "open"), (but("mass", "the cat"), "no_fault"), (but("friction", "friction"), "no_evidence"),
+        (but("swapped motors", f"swapped motors {right[0]} {other}"), "one_joint"),
+        (but("swapped motors", f"swapped motors {another} {other}"), "no_joint"),
+        (but("swapped motors", f"swapped motors {right[0]}"), "not_two_joints"),
+        (but("swapped motors", "swapped motors tail_joint"), "no_such_joint"),
+    ]  # fmt: skip
+    for fault, case in cases.items():
+        made += [(but(fault, f"{said} 0.9"), f"not {said}") for said in AGAINST if said != fault]
+        made += [(but(fault, line), hint) for hint, line in mistaken(case, boxes["ABCDEF".index(case.name)]).items()]
+        made += [(but(fault, f"{fault} 987"), "not_two_joints" if fault == "swapped motors" else "evidence")]
+    return made
+
+
+def _programs() -> list[Example]:
+    found = program.investigate
+    return [
+        (found, ""), (lambda box: "nothing", "not nothing"), (lambda box: "friction 0.55", "evidence"),
+        (lambda box: found(box).replace("nothing", "friction 0.9"), "innocent"),
+        (lambda box: found(box).split()[0], "no_evidence"), (lambda box: ("mass", 0.9), "no_text"),
+        (lambda box: box.fault, "stops"), (lambda: "nothing", "stops"), ("nothing", "no_function"),
+    ]  # fmt: skip
 
 
 EXERCISES = (
@@ -176,6 +219,7 @@ EXERCISES = (
             ),
             {(): "Three numbers: an impulse has a direction.", (6,): "The force alone, three numbers, without its moment."},
         ),
+        examples=lambda: [(0.002 * _residual()[1].sum(axis=0), "")],
         explanation="Who touches the robot is missing in (7). The first rows have no motor that could have done it.",
         names=lambda: {"kicked": kicked_box(), "needed": needed},
     ),
@@ -191,6 +235,7 @@ EXERCISES = (
         'report = [f"seed {seed}"]\n'
         'report += [f"{box.name}: {detective(box)}" for box in black_boxes(seed)]',
         judge=_judge_report,
+        examples=_reports,
         explanation="The detective is the solution of X.3, which reveal shows there.",
         names=lambda: {"seed": 1, "black_boxes": black_boxes},
     ),
@@ -200,6 +245,7 @@ EXERCISES = (
         stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as in your report',
         solution=inspect.getsource(program),
         judge=_judge_program,
+        examples=_programs,
         explanation="The plan first, then the motors, then the ground: each question has an answer of its own.",
     ),
 )

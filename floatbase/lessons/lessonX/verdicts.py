@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from floatbase.lessons.exercises import Verdict
 from floatbase.lessons.lessonX.box import BlackBox
 from floatbase.lessons.lessonX.cases import EARLY, FAULTS, MU, Case
 from floatbase.lessons.lessonX.tools import ground_normal
@@ -35,6 +37,20 @@ _JOINT = re.compile(r"\w+_joint")
 _WORKS = {"friction": 0.04, "normal": 1.5, "mass": 0.02}  # how far evidence may be off
 _SHARE = 0.1  # of it, for the others
 _LEAST = 3.0  # ms that a time constant may be off
+_RIGHT = Verdict(True, "")
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """A number that is evidence. off: how far it may be. known: hint -> the number of this mistake, and what is said of it.
+
+    otherwise: what is said of other numbers.
+    """
+
+    right: float
+    off: float
+    known: dict[str, tuple[float, str]]
+    otherwise: str
 
 
 def fault_in(line: str) -> str:
@@ -44,97 +60,112 @@ def fault_in(line: str) -> str:
     return min(found)[1] if found else ""
 
 
-def judged(case: Case, box: BlackBox, line: str) -> str:
-    """What is wrong with a line about a case, a fault and its evidence; "" where both are right."""
+def judged(case: Case, box: BlackBox, line: str) -> Verdict:
+    """What is to be said of a line about a case, a fault and its evidence; of a right one nothing."""
     said, fault = fault_in(line), case.mistake.fault or NOTHING
     if not said:
-        return f"name one of {', '.join(FAULTS)}, and its evidence."
-    if said != fault:
+        return Verdict(False, f"name one of {', '.join(FAULTS)}, and its evidence.", "no_fault")
+    if said != fault and fault == NOTHING:
         known = "this robot had no fault: it " + ("was kicked." if case.falls else "did not even fall.")
-        return known if fault == NOTHING else f"not {said}: {AGAINST[said]}"
+        return Verdict(False, known, "innocent")
+    if said != fault:
+        return Verdict(False, f"not {said}: {AGAINST[said]}", f"not {said}")
     if said == NOTHING:
-        return ""
+        return _RIGHT
     if said == "swapped motors":
         return _joints(case, box, line)
     number = _NUMBER.search(line.casefold().split(said, 1)[1])
     if number is None:
-        return f"{said} it is. The evidence is missing: {EVIDENCE[said]}."
-    wrong = _NUMBERS[said](case, box, float(number[0]))
-    return wrong and f"{said} it is. The evidence does not hold: {wrong}"
+        return Verdict(False, f"{said} it is. The evidence is missing: {EVIDENCE[said]}.", "no_evidence")
+    return _close(said, float(number[0]), _NUMBERS[said](case, box))
 
 
-def _joints(case: Case, box: BlackBox, line: str) -> str:
+def mistaken(case: Case, box: BlackBox) -> dict[str, str]:
+    """Hint -> a line with the right fault and evidence that gets it."""
+    fault = str(case.mistake.fault)
+    if fault not in _NUMBERS:
+        return {}
+    evidence = _NUMBERS[fault](case, box)
+    numbers = {hint: number for hint, (number, _) in evidence.known.items() if abs(number - evidence.right) > evidence.off}
+    return {hint: f"{fault} {number!r}" for hint, number in numbers.items()}
+
+
+def _joints(case: Case, box: BlackBox, line: str) -> Verdict:
     given, right = set(_JOINT.findall(line)), set(case.mistake.joints)
     unknown = sorted(given - set(box.robot.joint_names))
     if unknown:
-        return f"there is no {unknown[0]}; box.robot.joint_names lists them."
+        return Verdict(False, f"there is no {unknown[0]}; box.robot.joint_names lists them.", "no_such_joint")
     if len(given) != 2:
-        return f"swapped motors it is. The evidence is {EVIDENCE['swapped motors']}; there are {len(given)}."
-    common = len(given & right)
-    told = ("neither of these two is one of them", "one of these two is right")
-    return "" if given == right else f"swapped motors it is. The evidence does not hold: {told[common]}."
+        told = f"swapped motors it is. The evidence is {EVIDENCE['swapped motors']}; there are {len(given)}."
+        return Verdict(False, told, "not_two_joints")
+    if given & right:
+        return _RIGHT if given == right else _wrong("swapped motors", "one_joint", "one of these two is right.")
+    return _wrong("swapped motors", "no_joint", "neither of these two is one of them.")
 
 
-def _friction(case: Case, box: BlackBox, x: float) -> str:
+def _friction(case: Case, box: BlackBox) -> _Evidence:
     mu = case.mistake.size
-    hints = {
-        MU: "that is the friction that was told; which did the feet get?",
-        mu / MU: "that is a share of what was told; give the coefficient.",
-        MU - mu: "that is a difference; give the coefficient.",
-        np.rad2deg(np.arctan(mu)): "that is the angle of the cone; give its tangent.",
+    known = {
+        "believed": (MU, "that is the friction that was told; which did the feet get?"),
+        "share": (mu / MU, "that is a share of what was told; give the coefficient."),
+        "difference": (MU - mu, "that is a difference; give the coefficient."),
+        "angle": (float(np.rad2deg(np.arctan(mu))), "that is the angle of the cone; give its tangent."),
     }
-    return _close(x, mu, _WORKS["friction"], hints, "take feet that slide and bear, and forces along and across the ground.")
+    otherwise = "take feet that slide and bear, and forces along and across the ground."
+    return _Evidence(mu, _WORKS["friction"], known, otherwise)
 
 
-def _normal(case: Case, box: BlackBox, x: float) -> str:
+def _normal(case: Case, box: BlackBox) -> _Evidence:
     ground, told = ground_normal(box), box.contacts.normals[0]
     slope, believed = (float(np.rad2deg(np.arccos(n[2]))) for n in (ground, told))
-    hints = {
-        np.deg2rad(case.mistake.size): "in degrees, please.",
-        slope: "that is how steep the ground is; what counts is the angle to the normal that was told.",
-        believed: "that is how steep the ground was believed to be; what counts is the angle to its normal.",
+    known = {
+        "radians": (float(np.deg2rad(case.mistake.size)), "in degrees, please."),
+        "slope": (slope, "that is how steep the ground is; what counts is the angle to the normal that was told."),
+        "believed": (believed, "that is how steep the ground was believed to be; what counts is the angle to its normal."),
     }
-    return _close(x, case.mistake.size, _WORKS["normal"], hints, "four feet that bear span the plane, before they slide.")
+    return _Evidence(case.mistake.size, _WORKS["normal"], known, "four feet that bear span the plane, before they slide.")
 
 
-def _mass(case: Case, box: BlackBox, x: float) -> str:
+def _mass(case: Case, box: BlackBox) -> _Evidence:
     k, m = case.mistake.size, box.robot.mass
-    hints = {
-        1.0 / k: "that is the true mass over the believed one.",
-        k * m: "that is the believed mass in kg; divide it by the data sheet's.",
-        (k - 1.0) * m: "that is a difference in kg; give the factor.",
-        k - 1.0: "that is how much it is off; give the factor, near 1.",
-        100.0 * (k - 1.0): "that is how much it is off, in percent; give the factor, near 1.",
-        100.0 * k: "that is in percent; give the factor, near 1.",
+    known = {
+        "inverse": (1.0 / k, "that is the true mass over the believed one."),
+        "kilograms": (k * m, "that is the believed mass in kg; divide it by the data sheet's."),
+        "difference_kilograms": ((k - 1.0) * m, "that is a difference in kg; give the factor."),
+        "difference": (k - 1.0, "that is how much it is off; give the factor, near 1."),
+        "difference_percent": (100.0 * (k - 1.0), "that is how much it is off, in percent; give the factor, near 1."),
+        "percent": (100.0 * k, "that is in percent; give the factor, near 1."),
     }
-    return _close(x, k, _WORKS["mass"], hints, "compare M q̈ + h with S τ + Jᵀ λ, both of the plan.")
+    return _Evidence(k, _WORKS["mass"], known, "compare M q̈ + h with S τ + Jᵀ λ, both of the plan.")
 
 
-def _drift(case: Case, box: BlackBox, x: float) -> str:
+def _drift(case: Case, box: BlackBox) -> _Evidence:
     b = np.array([np.asarray(box.equations(i).b) for i in np.flatnonzero(box.time < EARLY)])
     late = max(float(np.abs(box.equations(i).b).max()) for i in range(0, len(box), 5))
-    right = float(np.abs(b).max())
-    hints = {
-        0.0: "that is what the plan asked of the feet; what should it have asked?",
-        float(np.linalg.norm(b.reshape(len(b), -1, 3), axis=2).max()): "that is the length of a foot's three; give one entry.",
-        float(np.linalg.norm(b, axis=1).max()): "that is the length of all of b; give its largest entry.",
-        late: "that is of the whole record; in the fall everything is large. Take the first half second.",
+    right, of_feet = float(np.abs(b).max()), np.linalg.norm(b.reshape(len(b), -1, 3), axis=2)
+    known = {
+        "planned": (0.0, "that is what the plan asked of the feet; what should it have asked?"),
+        "of_one_foot": (float(of_feet.max()), "that is the length of a foot's three; give one entry."),
+        "of_all_feet": (float(np.linalg.norm(b, axis=1).max()), "that is the length of all of b; give its largest entry."),
+        "late": (late, "that is of the whole record; in the fall everything is large. Take the first half second."),
     }
-    return _close(x, right, _SHARE * right, hints, "b of box.equations(i), the largest entry while t < 0.5 s, without sign.")
+    otherwise = "b of box.equations(i), the largest entry while t < 0.5 s, without sign."
+    return _Evidence(right, _SHARE * right, known, otherwise)
 
 
-def _slow(case: Case, box: BlackBox, x: float) -> str:
+def _slow(case: Case, box: BlackBox) -> _Evidence:
     ms = case.mistake.size
-    hints = {
-        ms / 1e3: "in ms, please.",
-        1e3 / (2.0 * np.pi * ms): "that is the bandwidth in Hz; give the time constant in ms.",
-        1e3 / ms: "that is 1/T; give T in ms.",
-        ms / (1e3 * (box.time[1] - box.time[0])): "that is in rows of the record; give ms.",
+    known = {
+        "seconds": (ms / 1e3, "in ms, please."),
+        "bandwidth": (1e3 / (2.0 * np.pi * ms), "that is the bandwidth in Hz; give the time constant in ms."),
+        "inverse": (1e3 / ms, "that is 1/T; give T in ms."),
+        "rows": (ms / (1e3 * float(box.time[1] - box.time[0])), "that is in rows of the record; give ms."),
     }
-    return _close(x, ms, max(_LEAST, _SHARE * ms), hints, "try time constants, and take the one whose lagged orders fit best.")
+    otherwise = "try time constants, and take the one whose lagged orders fit best."
+    return _Evidence(ms, max(_LEAST, _SHARE * ms), known, otherwise)
 
 
-_NUMBERS: dict[str, Callable[[Case, BlackBox, float], str]] = {
+_NUMBERS: dict[str, Callable[[Case, BlackBox], _Evidence]] = {
     "friction": _friction,
     "normal": _normal,
     "mass": _mass,
@@ -143,9 +174,17 @@ _NUMBERS: dict[str, Callable[[Case, BlackBox, float], str]] = {
 }
 
 
-def _close(x: float, right: float, off: float, hints: dict[float, str], otherwise: str) -> str:
-    """ "" for what is near enough, else the hint for the nearest of the numbers that a known mistake leads to."""
-    if abs(x - right) <= off:
-        return ""
-    near = [(abs(x - wrong), hint) for wrong, hint in hints.items() if abs(x - wrong) <= max(0.02 * abs(wrong), 1e-3)]
-    return min(near)[1] if near else otherwise
+def _close(fault: str, x: float, evidence: _Evidence) -> Verdict:
+    """Right for what is near enough, else the hint for the nearest of the numbers that a known mistake leads to."""
+    if abs(x - evidence.right) <= evidence.off:
+        return _RIGHT
+    apart = {hint: (abs(x - wrong), abs(wrong)) for hint, (wrong, _) in evidence.known.items()}
+    near = [(gap, hint) for hint, (gap, size) in apart.items() if gap <= max(0.02 * size, 1e-3)]
+    if not near:
+        return _wrong(fault, "evidence", evidence.otherwise)
+    hint = min(near)[1]
+    return _wrong(fault, hint, evidence.known[hint][1])
+
+
+def _wrong(fault: str, hint: str, text: str) -> Verdict:
+    return Verdict(False, f"{fault} it is. The evidence does not hold: {text}", hint)

@@ -1,0 +1,94 @@
+"""Exercises: right answers are right in each of their forms, and a wrong one gets the hint that its mistake is named by."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hints import ODD
+
+import floatbase
+from floatbase.lessons import Numeric, all_exercises
+from floatbase.lessons.exercises import Example
+
+EXERCISES = all_exercises()
+LESSONS = sorted({name.split(".")[0] for name in EXERCISES})
+NAMED = {"Verdict": 2, "_Way": 0, "_Drop": 0}  # what gives a hint its name -> which argument that is
+GENERAL = {"no_answer", "not_numbers", "not_finite", "no_cost", "no_least_point"}  # tried below, on all exercises
+# lesson -> hints that no answer is known to get, or not on every machine: what comes that far has passed other conditions
+GUARDS = {
+    "03": {"pulls"}, "05": {"slips"}, "07": {"input_error"}, "08": {"input_error"},
+    "09": {"input_error", "falls", "in_the_air", "beyond"}, "C": {"empty"}, "P": {"short"},
+}  # fmt: skip
+
+
+@cache
+def examples(name: str) -> list[Example]:
+    exercise = EXERCISES[name]
+    return [*getattr(exercise.judge, "examples", tuple)(), *exercise.examples()]
+
+
+def names_in(lesson: str) -> set[str]:
+    """Names of hints that are written in the modules of a lesson."""
+    folder = Path(floatbase.__file__).parent / "lessons" / f"lesson{lesson}"
+    calls = [
+        node
+        for path in folder.glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in NAMED
+    ]
+    given = [call.args[NAMED[ast.unparse(call.func)] :][:1] for call in calls]
+    return {constant.value for found in given for constant in found if isinstance(constant, ast.Constant)}
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_right_answers_are_right_and_each_mistake_gets_its_hint(name: str) -> None:
+    told = [(hint, EXERCISES[name].judge(answer)) for answer, hint in examples(name)]
+    assert [(hint, verdict) for hint, verdict in told if (verdict.right, verdict.hint) != (not hint, hint)] == []
+    assert all(verdict.text for _, verdict in told)
+    judge = getattr(EXERCISES[name].judge, "judge", EXERCISES[name].judge)
+    assert {"", *getattr(judge, "hints", ())} <= {hint for hint, _ in told}
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_every_hint_of_a_lesson_has_an_example(lesson: str) -> None:
+    tried = {hint for name in EXERCISES if name.startswith(f"{lesson}.") for _, hint in examples(name)}
+    assert names_in(lesson) - GENERAL - tried == GUARDS.get(lesson, set())
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_nothing_that_a_learner_may_give_makes_a_check_fail(name: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        told = {kind: EXERCISES[name].judge(odd) for kind, odd in ODD.items()}
+    assert [kind for kind, verdict in told.items() if verdict.right or not verdict.text or not verdict.hint] == []
+    assert told["nothing"].hint == told["Ellipsis"].hint == "no_answer"
+
+
+@pytest.mark.parametrize(
+    ("answer", "hint"),
+    [
+        ([[1.0, 2.0], [3.0, 4.0]], ""), ([[1.0, 2.0], [3.0, 4.05]], "nearly"), ([[-1, -2], [-3, -4]], "sign"),
+        ([[1, 3], [2, 4]], "transpose"), (np.ones((2, 2)), "unknown"), ([1.0, 2.0, 3.0, 4.0], "shape"), (1.0, "shape"),
+        (np.full((2, 2), np.nan), "not_finite"), ("heavy", "not_numbers"), (..., "no_answer"),
+    ],
+)  # fmt: skip
+def test_answers_are_told_in_any_exercise_what_is_wrong_with_any_answer(answer: Any, hint: str) -> None:
+    assert Numeric(right=lambda: [[1.0, 2.0], [3.0, 4.0]], praise="")(answer).hint == hint
+
+
+@pytest.mark.parametrize(("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))])
+def test_a_wrong_count_is_told_to_say_what_it_counts(name: str, count: Any) -> None:
+    assert EXERCISES[name].judge(count).hint == "unknown_count"
+
+
+@pytest.mark.parametrize("name", ["04.3", "05.4"])
+def test_a_cost_is_told_from_what_is_none(name: str) -> None:
+    cost = next(answer for answer, hint in examples(name) if not hint)
+    assert EXERCISES[name].judge(cost.minimiser()).hint == "no_cost"
+    assert EXERCISES[name].judge(-1.0 * cost).hint == "no_least_point"
