@@ -1,4 +1,4 @@
-"""Exercises: what counts as a try, when a solution is shown, and that no answer at all makes a check fail."""
+"""Exercises: what counts as a try, when a solution is shown, and where progress is kept."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ import multiprocessing
 import re
 import resource
 import threading
-import warnings
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hints import LIFTED, MASS, ODD, missed, right
+from hints import LIFTED
 
 import floatbase as fb
 from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
@@ -41,19 +40,12 @@ def changed(answer: Any) -> Any:
     return answer + 1
 
 
-def test_no_answer_at_all_makes_a_check_fail() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        said = {(name, kind): exercise.judge(odd) for name, exercise in all_exercises().items() for kind, odd in ODD.items()}
-    assert [where for where, verdict in said.items() if verdict.right or not verdict.text] == []
-
-
 def test_a_placeholder_gets_its_hint_and_counts_no_try() -> None:
     for name, exercise in all_exercises().items():
         placeholder = exercise.placeholder()
         said = check(name, placeholder)
         assert not said.right
-        assert said.text == exercise.judge(placeholder).text
+        assert said == exercise.judge(placeholder)
     assert progress.load() == {}
 
 
@@ -170,46 +162,3 @@ def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(tmp_path:
         one.join()
     counts = {name: {"tries": n * TIMES, "right": n * TIMES} for name, n in Counter(names).items()}
     assert progress.load() == older | counts
-
-
-def test_wrong_answers_to_00_1_get_the_hint_that_fits() -> None:
-    wrong = [
-        (9.81 * MASS, "the weight alone"),
-        (2.0 * MASS, "m a, the sum of all forces"),
-        ((9.81 - 2.0) * MASS, "accelerate downwards"),
-        (9.81 + 2.0, "an acceleration"),
-        (9.81 * MASS + 2.0, "must be multiplied by the mass"),
-        (2.0 * MASS + 9.81, "g without the mass"),
-        (-LIFTED, "what the robot does to the ground"),
-        (LIFTED / 4, "share of one foot"),
-        ([1.0, 2.0], "shape"),
-        (float("nan"), "not finite"),
-        ("heavy", "should be numbers"),
-        (..., "no answer yet"),
-        (16.0 * (9.81 + 2.0), "Nearly"),  # 16 kg
-        (1.0, "Neither right nor a mistake this check knows"),
-    ]
-    assert missed("00.1", wrong) == []
-
-
-def test_the_hints_of_every_exercise_are_tried() -> None:
-    texts = [path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("test_*.py")]
-    tried = {name for text in texts for name in re.findall(r'missed\("(\w+\.\d)"', text)}
-    assert tried == set(all_exercises())
-
-
-@pytest.mark.parametrize(("name", "share", "upwards"), [("00.1", 1.0, 2.0), ("01.3", 0.7, 0.0)])
-def test_a_rounded_g_is_not_taken_for_a_mistake_of_another_kind(name: str, share: float, upwards: float) -> None:
-    mass = fb.load("go2").mass
-    assert right(name, share * mass * (9.8 + upwards))
-    assert missed(name, [(share * mass * (10.0 + upwards), "g as 10")]) == []
-
-
-@pytest.mark.parametrize("name", ["01.3", "03.1", "04.2"])
-def test_many_numbers_where_one_is_needed_are_told_so(name: str) -> None:
-    assert missed(name, [(np.zeros(12), "The answer is one number")]) == []
-
-
-@pytest.mark.parametrize(("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))])
-def test_an_unknown_wrong_count_is_told_to_say_what_it_counts(name: str, count: Any) -> None:
-    assert missed(name, [(count, "What is counted")]) == []

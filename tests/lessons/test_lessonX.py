@@ -12,13 +12,11 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
-from hints import missed, right
 
 import floatbase as fb
 from floatbase.control import Belief
 from floatbase.lessons import all_exercises
 from floatbase.lessons.lessonX import (
-    AGAINST,
     FAULTS,
     BlackBox,
     Case,
@@ -28,13 +26,11 @@ from floatbase.lessons.lessonX import (
     crash_test,
     draw_orders,
     drawn_cases,
-    fault_in,
     film,
     ground_normal,
     innocent_boxes,
     innocent_cases,
     judged,
-    kicked_box,
     lagged,
     needed,
     plot_missed,
@@ -76,7 +72,7 @@ def test_six_boxes_hold_one_fall_of_each_fault(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_program_finds_every_fault_from_the_record_alone_and_accuses_no_innocent(seed: int) -> None:
     said = {box.name: (program()(box), judged(case, box, program()(box))) for case, box in cases(seed)}
-    assert {name: hint for name, (_, hint) in said.items() if hint} == {}
+    assert [name for name, (_, verdict) in said.items() if not verdict.right] == []
     assert said["N"][0] == said["K"][0] == "nothing"
 
 
@@ -202,111 +198,6 @@ def test_the_needed_torques_are_those_that_were_applied() -> None:
     assert np.abs(found[:, 6:] - record.tau[:-1]).max() < 0.2
     pushed = (record.time[:-1] > 0.06) & (record.time[:-1] < 0.14)
     assert np.abs(found[pushed, 0] - 30.0).max() < 1.0 and np.abs(found[~pushed][60:, 0]).max() < 1.0
-
-
-def test_x_1_is_the_impulse_of_the_kick() -> None:
-    box, (push,) = kicked_box(), innocent_cases(5)[1].pushes
-    impulse = push.force * push.duration
-    found = needed(box)[:, :3]
-    rows = [i for i in range(len(found)) if push.start - 0.004 < box.time[i] < push.start + push.duration + 0.004]
-    R = [box.state(i).frame_pose("base").rotation for i in range(len(found))]
-    kick = 0.002 * sum(R[i] @ found[i] for i in rows)
-    assert right("X.1", kick) and right("X.1", impulse)
-    wrong = {
-        "nothing there yet": np.zeros(3),
-        "base's axes": 0.002 * found[rows].sum(axis=0),
-        "no impulse yet": sum(R[i] @ found[i] for i in rows),
-        "That is the force, N": push.force,
-        "blows of the fall": 0.002 * sum(R[i] @ found[i] for i in range(len(found))),
-        "the sign is not": -impulse,
-        "an impulse has a direction": float(np.linalg.norm(impulse)),
-        "without its moment": np.zeros(6),
-        "no answer yet": None,
-    }
-    assert missed("X.1", [(answer, hint) for hint, answer in wrong.items()]) == []
-
-
-def test_x_2_says_of_each_line_what_speaks_against_it() -> None:
-    report = ["seed 1", *(f"{box.name}: {program()(box)}" for box in black_boxes(1))]
-    assert right("X.2", report)
-    assert right("X.2", [line.upper() if line[3:].startswith("mass") else f"  {line}" for line in report])
-    assert not right("X.2", ["seed 2", *report[1:]])
-    places = {str(case.mistake.fault): i for i, (case, _) in enumerate(cases(1)[:6], 1)}
-
-    def with_line(fault: str, line: str) -> list[str]:
-        changed = list(report)
-        changed[places[fault]] = f"{'ABCDEF'[places[fault] - 1]}: {line}"
-        return changed
-
-    wrong: list[tuple[object, str]] = [
-        (None, "no answer yet"),
-        (report[1:], "The first line says which boxes"),
-        (["seed 1"], "Nothing is said yet"),
-        (["seed 1", "G: mass 0.9"], "There is no box G"),
-        ("seed 1", "a list of lines"),
-        (report[:-1], "Open: F."),
-        (with_line("mass", "the cat"), "name one of friction"),
-        (with_line("friction", "friction"), "The evidence is missing"),
-    ]
-    for fault in FAULTS:
-        other = "drift" if fault == "mass" else "mass"
-        wrong += [(with_line(fault, f"{other} 0.9"), AGAINST[other]), (with_line(fault, "nothing"), AGAINST["nothing"])]
-        wrong += [(with_line(fault, f"{fault} 987"), "The evidence")]
-    assert missed("X.2", wrong) == []
-
-
-def test_evidence_that_does_not_hold_is_told_what_it_looks_like() -> None:
-    sizes = {fault: of_fault(fault)[0].mistake.size for fault in FAULTS}
-    k, T, mu = sizes["mass"], sizes["slow motors"], sizes["friction"]
-    drift = of_fault("drift")[1]
-    b = np.array([drift.equations(i).b for i in range(250)])
-    joints = of_fault("swapped motors")[0].mistake.joints
-    other = next(name for name in drift.robot.joint_names if name not in joints)
-    wrong = {
-        f"friction {1.2}": "that is the friction that was told",
-        f"friction {mu / 1.2}": "a share of what was told",
-        f"friction {1.2 - mu}": "a difference",
-        f"normal {np.deg2rad(sizes['normal'])}": "in degrees",
-        f"mass {1 / k}": "the true mass over the believed one",
-        f"mass {k * 16.085}": "in kg",
-        f"mass {k - 1}": "how much it is off",
-        f"mass {100 * k}": "in percent",
-        "drift 0.0": "what the plan asked",
-        f"drift {np.linalg.norm(b, axis=1).max()}": "the length of all of b",
-        f"slow motors {T / 1000}": "in ms",
-        f"slow motors {1000 / (2 * np.pi * T)}": "bandwidth in Hz",
-        f"slow motors {T / 2}": "in rows",
-        f"swapped motors {joints[0]} {other}": "one of these two is right",
-        f"swapped motors {joints[0]}": "there are 1",
-        f"swapped motors {joints[0]} tail_joint": "there is no tail_joint",
-    }
-    said = {line: judged(*of_fault(fault_in(line)), line) for line in wrong}
-    assert {line: said[line] for line, hint in wrong.items() if hint not in said[line]} == {}
-    assert judged(*of_fault("swapped motors"), f"swapped motors {joints[1]} and {joints[0]}") == ""
-    assert judged(*cases(1)[7], "mass 0.9").startswith("this robot had no fault: it was kicked")
-
-
-def test_x_3_runs_the_program_on_boxes_that_nobody_has_seen() -> None:
-    assert right("X.3", program())
-
-    def accuses(box: BlackBox) -> str:
-        return program()(box).replace("nothing", "friction 0.9")
-
-    def vague(box: BlackBox) -> str:
-        return program()(box).split()[0]
-
-    wrong = [
-        (lambda box: "nothing", "a sound robot twists like that"),
-        (lambda box: "friction 0.55", "your program says"),
-        (accuses, "Of a sound robot your program"),
-        (vague, "The evidence is missing"),
-        (lambda box: ("mass", 0.9), "Return a line of text"),
-        (lambda box: box.fault, "stops with AttributeError"),
-        (lambda: "nothing", "stops with TypeError"),
-        ("nothing", "The answer is a function"),
-        (None, "no answer yet"),
-    ]
-    assert missed("X.3", wrong) == []
 
 
 def test_pictures_of_a_box() -> None:

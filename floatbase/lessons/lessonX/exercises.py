@@ -166,8 +166,8 @@ def _reports() -> list[Example]:
     other, another = sorted(wrong - set(right))[:2]
     made: list[Example] = [
         (report, ""), ([f" {line} " for line in report], ""), (but("mass", found[cases["mass"].name].upper()), ""),
-        (but("swapped motors", f"swapped motors {right[1]} and {right[0]}"), ""),
-        (report[1:], "no_seed"), (["seed 1"], "nothing_said"), (["seed 1", "G: mass 0.9"], "no_such_box"), ("seed 1", "no_lines"),
+        (but("swapped motors", " and ".join(["swapped motors", *right[::-1]])), ""), (report[1:], "no_seed"),
+        (["seed 1"], "nothing_said"), (["seed 1", "G: mass 0.9"], "no_such_box"), ("seed 1", "no_lines"),
         (report[:-1], "open"), (but("mass", "the cat"), "no_fault"), (but("friction", "friction"), "no_evidence"),
         (but("swapped motors", f"swapped motors {right[0]} {other}"), "one_joint"),
         (but("swapped motors", f"swapped motors {another} {other}"), "no_joint"),
