@@ -74,11 +74,6 @@ def outcome(pressing: Robot, width: float, press: float) -> str:
     return fb.rollout(fb.Simulation(robot), servo, 2.0, [fb.Push(force, 0.0, 2.0, "tool0")]).outcome
 
 
-def test_the_smallest_robot_is_newtons_law() -> None:
-    box = fb.load_urdf(lesson01.LIFT, floating=False).standing()
-    assert (box.M.item(), box.h.item()) == pytest.approx((5.0, 5.0 * 9.81))
-
-
 def test_the_centre_of_mass_leaves_every_point_of_the_base(go2: Robot) -> None:
     view = fb.Viewer(go2)
     try:

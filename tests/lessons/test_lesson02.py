@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import judges
 import numpy as np
-import pinocchio as pin
 import pytest
 from hints import right
 
 import floatbase as fb
-from floatbase.lessons import Torques, lesson01, lesson02
+from floatbase.lessons import lesson02
 from floatbase.robots import Robot
 
 
@@ -37,19 +34,6 @@ def test_constant_torques_record_what_the_equation_says(go2: Robot) -> None:
     assert not record.tau.any()
 
 
-@pytest.mark.parametrize(("way", "turn"), [(0.5, -0.7), (1.0, 1.5), (0.3, 0.0)])
-def test_the_disc_parks_without_slip_where_geometry_says(way: float, turn: float) -> None:
-    disc, wheel = lesson02.disc(), lesson02.wheel()
-    states = lesson02.park(disc, way, turn)
-    assert max(np.abs(wheel.slip(state)).max() for state in states) < 1e-12
-    moved = states[-1].q[:2] - states[0].q[:2]
-    assert np.allclose(moved, way * np.array([1 - np.cos(turn), -np.sin(turn)]), atol=1e-12)
-    assert np.allclose(states[-1].frame_pose("disc").rotation, np.eye(3), atol=1e-12)
-    for before, after in pairwise(states):  # each velocity leads to the next state
-        step = pin.difference(disc.model, before.q, after.q) * 20
-        assert np.linalg.norm(step - before.v) < 0.2 * (np.linalg.norm(before.v) + 1e-9)
-
-
 def test_the_equation_is_drawn_and_the_collapse_is_played(go2: Robot) -> None:
     state, contacts = go2.standing(), fb.Contacts.points(go2)
     figure = lesson02.draw_equation(fb.equations_of_motion(state, contacts))
@@ -65,25 +49,6 @@ def test_the_equation_is_drawn_and_the_collapse_is_played(go2: Robot) -> None:
         view.close()
     axis = lesson02.plot_strayed({"a": lesson02.strayed(states, contacts)}, 0.02)
     assert axis.get_yscale() == "log"
-
-
-def test_the_arm_without_its_drift_leaves_and_both_are_played() -> None:
-    arm = fb.load("ur5", posture=lesson01.PRESSING)
-
-    def controller(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
-        return Torques(fb.State(arm, q, v).h)  # q̈ = 0: no b
-
-    sim = fb.Simulation(arm)
-    sim.reset(arm.standing().replace(v=np.ones(6)))
-    record = fb.rollout(sim, controller, 0.1)
-    assert lesson02.tool_path(record)[0] == 0.0 and lesson02.tool_path(record)[-1] > 1.0
-    view = fb.Viewer(arm)
-    try:
-        drawn = str(lesson02.play_tools(view, record, record).window.scene.file_commands())
-        assert "with b" in drawn
-        assert "way" in drawn
-    finally:
-        view.close()
 
 
 def test_the_smallest_holding_depends_on_the_unit_of_torque(go2: Robot) -> None:

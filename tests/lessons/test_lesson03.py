@@ -45,14 +45,6 @@ def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forc
     np.testing.assert_allclose((space.forces.A @ free).T @ (space.forces.A @ step), 0.0, atol=1e-7)
 
 
-def test_standing_still_is_in_the_space_and_still() -> None:
-    space = space_of(GO2)
-    qdd, tau, forces = space(standing_still(space))
-    assert abs(qdd).max() < 1e-9
-    motion, feet = space.eom.residual(qdd, tau, forces)
-    assert max(abs(motion).max(), abs(feet).max()) < 1e-9
-
-
 @pytest.mark.parametrize("bend", [0.0, 0.5, 1.5])
 def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend: float) -> None:
     solo12 = fb.load("solo12")

@@ -9,21 +9,16 @@ import pytest
 from hints import right
 
 import floatbase as fb
-from floatbase.dynamics import internal_forces
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson05 import (
     GivenForces,
     com_in_base,
     leans,
-    planned_pull,
     reaching,
-    rose_controller,
     show_forces,
     show_moved_com,
-    squeezes,
 )
 from floatbase.objectives import (
-    com_wrench,
     normal_bias,
     tangential_bias,
     wrench_objective,
@@ -52,14 +47,6 @@ def test_05_4_is_out_of_reach_of_weights() -> None:
                 assert not right("05.4", COST + weight * (tangential + alpha * normal))
 
 
-def test_squeezes_leave_the_wrench_and_the_base_alone() -> None:
-    found = np.column_stack(list(squeezes(EOM.contacts).values()))
-    assert abs(com_wrench(EOM.state, EOM.contacts).A @ found).max() < ROUNDING
-    inside = internal_forces(EOM)
-    assert abs(found - inside @ (inside.T @ found)).max() < ROUNDING
-    assert np.linalg.matrix_rank(found) == 4
-
-
 @pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
 def test_a_lean_is_friction_over_normal_force(normal: list[float]) -> None:
     contacts = fb.Contacts.points(GO2, normals=normal)
@@ -84,18 +71,6 @@ def test_given_forces_are_measured_on_the_physics() -> None:
     np.testing.assert_allclose(record.measured[-1], forces, atol=1.0)  # N: the robot has moved by 2 cm
     np.testing.assert_allclose(record.planned[-1], forces, atol=ROUNDING)
     assert record.final.com_velocity[0] == pytest.approx(0.1 * 60.0 / GO2.mass, rel=0.03)
-
-
-def test_a_light_push_is_survived_and_a_plan_that_pulls_comes_before_the_fall() -> None:
-    light, hard = (
-        fb.rollout(fb.Simulation(GO2), rose_controller(), 0.5, [fb.Push(np.array([0.0, size, 0.0]), start=0.05)])
-        for size in (30.0, 80.0)
-    )
-    assert light.outcome == "completed" and light.planned[:, 2::3].min() > 0
-    assert hard.outcome == "fell"
-    assert np.argmax((hard.planned[:, 2::3] < 0).any(axis=1)) in range(50, len(hard) - 1)
-    axis = planned_pull(hard, 0.25).axes[0]
-    assert axis.get_ylim()[0] < 0 and axis.get_xlim() == (0.0, 0.25)
 
 
 def test_the_pictures_are_drawn() -> None:

@@ -13,7 +13,6 @@ from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron, wrench_set
 from floatbase.lessons.lesson06 import (
     ConeController,
-    beside_its_feet,
     compass_row,
     lean,
     least_inside,
@@ -90,14 +89,6 @@ def test_legs_reach_given_places_or_say_that_they_do_not() -> None:
         assert np.allclose(reached.frame_pose(name).translation, place, atol=LENGTHS)
     with pytest.raises(InputError, match="cannot put its feet"):
         with_feet(robot, home.q[:3] + [0.0, 0.0, 1.0], places)
-
-
-def test_in_the_valley_the_centre_of_mass_is_beside_the_feet_and_the_feet_touch() -> None:
-    state, contacts, ground = beside_its_feet(judges.load("go2"))
-    points = contacts.positions(state)
-    assert np.allclose(ground.clearances(points).min(axis=1), 0.0, atol=LENGTHS)
-    assert state.com[1] > points[:, 1].max() + 0.015
-    assert wrench_set(state, contacts, facets=8).support_region()[:, 1].max() > state.com[1]
 
 
 def test_lean_is_the_tangent_of_the_angle_to_the_normal() -> None:

@@ -11,11 +11,8 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.control import AnalyticController
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson07 import (
-    WithoutRows,
-    WithRows,
     leaning,
     milliseconds,
     named,
@@ -34,19 +31,6 @@ GO2 = STATE.robot
 def test_standing_gains_are_those_of_the_standing_tasks() -> None:
     qp, same = tuned(100, 20, 10, 1e-3).qp(STATE), rose_controller().qp(STATE)
     assert np.array_equal(qp.H, same.H) and np.array_equal(qp.g, same.g)
-
-
-def test_rows_are_taken_away_and_added() -> None:
-    stands = rose_controller()
-    full, same = stands(STATE.q, STATE.v), WithoutRows(stands, "normal force")(STATE.q, STATE.v, 0.0)
-    np.testing.assert_allclose(same.tau, full.tau, atol=1e-6)
-    costs = AnalyticController(GO2, standing_go2().contacts, STATE)
-    alone, within = costs(STATE.q, STATE.v), WithRows(costs, stands)(STATE.q, STATE.v, 0.0)
-    np.testing.assert_allclose(within.tau, alone.tau, atol=1e-6)  # where it stands no row is active
-    hurried = STATE.replace(v=np.eye(18)[1] * 1.5)  # to the left, 1.5 m/s
-    pulls = costs(hurried.q, hurried.v).forces[2::3].min()
-    planned = WithRows(costs, stands)(hurried.q, hurried.v, 0.0).forces
-    assert planned is not None and pulls < -1 < -1e-6 < planned[2::3].min()
 
 
 def test_a_push_goes_to_the_left_for_a_tenth_of_a_second() -> None:

@@ -154,13 +154,6 @@ def test_what_is_said_against_a_wrong_diagnosis_is_true(seed: int) -> None:
             assert late[0] < 0.5
 
 
-def test_the_mass_that_is_believed_wrong_leaves_no_trace_in_planned_against_measured_forces() -> None:
-    light, sound = crash_test("mass", 0.8, seconds=0.2), crash_test(seconds=0.2)
-    apart = np.linalg.norm(light.planned - light.measured, axis=1)[1:]
-    assert np.median(apart) < 2.0 < 0.1 * 0.2 * light.robot.weight
-    assert light.q[-1, 2] < sound.q[-1, 2] - 0.02
-
-
 def test_forgotten_drift_alone_fells_the_robot() -> None:
     assert crash_test("drift").fell
 
