@@ -14,7 +14,6 @@ from hints import ODD
 
 import floatbase
 from floatbase.lessons import Numeric, all_exercises
-from floatbase.lessons.exercises import Example
 
 EXERCISES = all_exercises()
 LESSONS = sorted({name.split(".")[0] for name in EXERCISES})
@@ -28,7 +27,7 @@ GUARDS = {
 
 
 @cache
-def examples(name: str) -> list[Example]:
+def examples(name: str) -> list[tuple[Any, str]]:
     exercise = EXERCISES[name]
     return [*getattr(exercise.judge, "examples", tuple)(), *exercise.examples()]
 
@@ -43,7 +42,7 @@ def names_in(lesson: str) -> set[str]:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in NAMED
     ]
     given = [call.args[NAMED[ast.unparse(call.func)] :][:1] for call in calls]
-    return {constant.value for found in given for constant in found if isinstance(constant, ast.Constant)}
+    return {str(constant.value) for found in given for constant in found if isinstance(constant, ast.Constant)}
 
 
 @pytest.mark.parametrize("name", EXERCISES)

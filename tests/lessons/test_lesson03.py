@@ -9,14 +9,11 @@ import pytest
 
 import floatbase as fb
 from floatbase.dynamics import dimensions
-from floatbase.lessons import ConstantTorques
 from floatbase.lessons.lesson03 import (
     bars,
     direction,
-    matrix_picture,
     rising_solo8,
     show_beta,
-    show_knee,
     space_of,
     standing_still,
     upright,
@@ -52,24 +49,6 @@ def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend: float) -> Non
     assert [round(foot, 9) for foot in fb.Contacts.points(solo12).positions(state)[:, 2]] == [0.0] * 4
     straight = dimensions(fb.equations_of_motion(state, fb.Contacts.points(solo12)))
     assert straight.rank_J == (11 if bend == 0 else 12)
-
-
-def test_the_pictures_are_drawn() -> None:
-    space = space_of(GO2)
-    view = fb.Viewer(GO2)
-    try:
-        assert "svg" in show_beta(view, space, standing_still(space))
-    finally:
-        view.close()
-    solo12 = fb.load("solo12")
-    view = fb.Viewer(solo12)
-    try:
-        text = show_knee(view, solo12, 0.0, np.zeros(12))
-    finally:
-        view.close()
-    assert "rank J = <b>11</b>" in text
-    assert len(matrix_picture(np.eye(4), {"a": 1, "b": 3}, {"c": 2, "d": 2}).axes) == 3  # with the colour bar
-    assert ConstantTorques([1.0])(np.zeros(1), np.zeros(1), 0.0).tau == [1.0]
 
 
 def test_every_bar_says_its_name_its_number_and_its_unit() -> None:

@@ -154,7 +154,7 @@ def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Ver
 def _reports() -> list[Example]:
     """On the boxes of seed 1."""
     boxes, found = black_boxes(1), {box.name: program.investigate(box) for box in black_boxes(1)}
-    cases = {case.mistake.fault: case for case in drawn_cases(1)}
+    cases = {str(case.mistake.fault): case for case in drawn_cases(1)}
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 
     def but(fault: str, line: str) -> list[str]:
