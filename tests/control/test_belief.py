@@ -6,6 +6,7 @@ import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from messages import raises
 
 import floatbase as fb
 from floatbase.control import Belief, build_qp
@@ -108,5 +109,5 @@ def test_a_belief_survives_a_change_of_stance_and_a_walk() -> None:
 
 def test_an_unknown_contact_is_an_error() -> None:
     robot = judges.load("go2")
-    with pytest.raises(UnknownNameError, match="FL_foot"):
+    with raises(UnknownNameError, "FL_fot", "FL_foot"):
         fb.WholeBodyController(robot, judges.stance(robot), [], belief=Belief(unfelt=["FL_fot"]))
