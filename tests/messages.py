@@ -20,6 +20,15 @@ def raises(kind: type[BaseException], *wanted: str | float) -> Iterator[pytest.E
     assert missing(str(caught.value), *wanted) == [], caught.value
 
 
+@contextmanager
+def warns(kind: type[Warning], *wanted: str | float) -> Iterator[None]:
+    """Check that a warning of this type is given with these names and numbers in its message."""
+    with pytest.warns(kind) as caught:
+        yield
+    said = [str(warning.message) for warning in caught if warning.category is kind]
+    assert any(missing(message, *wanted) == [] for message in said), said
+
+
 def refused(call: Callable[[], object], kind: type[BaseException], *wanted: str | float) -> None:
     """Check that a call raises an error of exactly this type, with these names and numbers in its message."""
     with raises(kind, *wanted):

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import judges
 import mujoco
 import numpy as np
-import pytest
 import scipy.integrate
-from messages import refused
 
 import floatbase as fb
 from floatbase.dynamics import (
@@ -20,7 +16,6 @@ from floatbase.dynamics import (
     power_identity,
     seen_from_turning_frame,
 )
-from floatbase.errors import InputError, UnknownNameError
 
 N = 5
 
@@ -225,22 +220,3 @@ def test_a_link_that_turns_evenly_pulls_its_points_inward_by_omega_squared_times
     from_axis = r - (r @ axis) * axis
     assert np.linalg.norm(from_axis) > 0.1
     assert np.allclose(inward, -(2.0**2) * from_axis, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "case",
-    [
-        (lambda: seen_from_turning_frame([0.0, 1.0], wandering, (1.0, 0.0, 0.0)), InputError, "omega", "omega_rate"),
-        (lambda: seen_from_turning_frame([0.0, 0.0], (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)), InputError, "time"),
-        (lambda: seen_from_turning_frame([], (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)), InputError, "time"),
-        (lambda: seen_from_turning_frame([0.0], (0.0, 0.0, 1.0), (1.0, 0.0)), InputError, "position", 2, 3),
-        (
-            lambda: seen_from_turning_frame([0.0, 1.0], lambda t: (1.0, t), (1.0, 0.0, 0.0), omega_rate=lambda t: (0.0, 1.0)),
-            InputError, "omega", 0, 2, 3,
-        ),
-        (lambda: bias_forces(judges.load("go2").standing(), axes="body"), UnknownNameError, "axes", "body", "base", "world"),
-        (lambda: inward_acceleration((0.0, 0.0, 1.0), (1.0, np.nan, 0.0)), InputError, "r", np.nan),
-    ],
-)  # fmt: skip
-def test_bad_input_is_named(case: tuple[Any, ...]) -> None:
-    refused(*case)
