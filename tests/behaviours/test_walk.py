@@ -464,7 +464,7 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         (lambda: Walk(robot, contacts, trot, yaw_rate=30.0), "yaw_rate", 30, 10),
         (lambda: Walk(robot, contacts, trot, clearance=5.0), "clearance", 5, 1),
         (lambda: Walk(robot, contacts, trot, reach=20.0), "reach", 20, 1),
-        (lambda: Walk(robot, contacts, trot, ramp=300.0), "ramp", 300, 100),
+        (lambda: Walk(robot, contacts, trot, ramp=300.0), "ramp", 300, 1),
         (lambda: Gait.trot(robot, swing=250.0), "swing", 250),
         (lambda: Stand(robot, contacts, velocity=(0.3, 0.0)), "velocity", "yaw_rate", "gait"),
         (lambda: Walk(robot, contacts, "trot"), "gait", "Gait", "trot"),
