@@ -399,4 +399,4 @@ def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(path: str) -
     with raises(UnknownNameError, "left_sole_lnk", "left_sole_link"):
         command.force("left_sole_lnk")
     assert repr(command).startswith("Command(|tau|=") and "\n" not in repr(command)
-    assert repr(command).endswith(f"0 rows active, {path})")
+    assert path in repr(command)

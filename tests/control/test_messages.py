@@ -13,7 +13,7 @@ import pytest
 from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.control import AnalyticController, Limits, Rows
+from floatbase.control import AnalyticController, Belief, Limits, Rows
 from floatbase.errors import InputError, UnknownNameError
 
 GO2, SOLO = judges.load("go2"), judges.load("solo12")
@@ -109,6 +109,8 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})), InputError, "tasks", "SimpleNamespace"),
         (lambda: controller("stand"), InputError, "tasks", "stand"),
         (lambda: controller().replace(tasks=3), InputError, "tasks", 3),
+        (lambda: controller().replace(tasks=[Fixed()]), InputError, "residual", "mine", "qdd", 3, 18),
+        (lambda: controller(belief=Belief(unfelt=["FL_fot"])), UnknownNameError, "FL_fot", "FL_foot"),
         (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), InputError, "tasks", "CoMTask"),
         (lambda: fb.WholeBodyController(GO2, CONTACTS, None), InputError, "tasks", "None"),
         (lambda: fb.WholeBodyController(GO2, [1], []), InputError, "contacts", "Contacts", 1),

@@ -400,9 +400,3 @@ def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones()
     for contacts in (feet + fb.Contacts(own), fb.Contacts(own[::-1]) + feet):
         both = judges.pair(robot, contacts, tasks, min_normal_force=3.0)
         assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 5)) < judges.agreement(robot)
-
-
-def test_a_replaced_controller_is_checked() -> None:
-    controller = judges.controller_of("go2", path="compiled")
-    with raises(InputError, "residual", "odd", 12, 18):
-        controller.replace(tasks=[_Wrong(lambda: None, at_first=fb.Affine.identity(12))])

@@ -17,7 +17,7 @@ import pinocchio as pin
 import pytest
 import scipy.linalg
 from judges import Array
-from messages import raises, refused
+from messages import raises
 
 import floatbase as fb
 from floatbase import dynamics, linear_algebra
@@ -578,11 +578,3 @@ def test_where_contacts_cannot_do_what_is_required_the_dynamics_still_hold_and_t
     assert np.allclose(eom.A @ qdd, nearest, atol=1e-8)
     tau = np.ones(8)
     assert np.allclose(eom.A @ dynamics.accelerations_from_torques(eom)(tau), nearest, atol=1e-7)
-
-
-def test_coordinates_that_do_not_fit_are_refused() -> None:
-    state = judges.load("go2").standing()
-    space = dynamics.feasible_space(fb.equations_of_motion(state, fb.Contacts.points(state.robot)))
-    refused(lambda: space(np.zeros(11)), InputError, "beta", 11, 12)
-    refused(lambda: space(np.full(12, np.nan)), InputError, "beta", np.nan)
-    refused(lambda: space.coordinates(np.zeros(17), np.zeros(12), np.zeros(12)), InputError, "qdd", 17, 18)

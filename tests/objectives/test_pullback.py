@@ -240,15 +240,3 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
         beta = objectives.best_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)
         assert np.allclose(N.T @ (space.forces(beta) - desired), 0.0, atol=1e-3), weight
-
-
-def test_a_block_that_does_not_exist_is_named() -> None:
-    space = dynamics.feasible_space(judges.at_rest("go2"))
-    with raises(InputError, "lambda", "qdd", "tau", "forces"):
-        objectives.seen_from_best(Quadratic.zero(12), space, "lambda")
-
-
-def test_a_cost_of_another_size_is_refused() -> None:
-    eom = judges.at_rest("go2")
-    with raises(InputError, 18, 12):
-        objectives.cost_on_torques(Quadratic.zero(12), eom)

@@ -11,11 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
-from messages import refused
 from scipy.optimize import linprog
 
 import floatbase as fb
-from floatbase.errors import InfeasibleError, InputError, SolverError, UnknownNameError
+from floatbase.errors import InfeasibleError, SolverError
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ActiveSetRun, active_set, solve, table_top
 
 Array = np.ndarray
@@ -146,11 +145,6 @@ def test_a_stopped_run_can_be_taken_up_again_where_it_ended() -> None:
             run = active_set(qp, x, working, most=1)
         assert run.finished
         assert np.allclose(run.solution.x, solve(qp).x, atol=1e-7)
-
-
-@pytest.mark.parametrize("most", [0, -1, 1.5, "3", True])
-def test_fewer_than_one_iteration_is_none(most: object) -> None:
-    refused(lambda: active_set(table_top(), most=most), InputError, "most", str(most))  # type: ignore[arg-type]
 
 
 # the controller's problems -------------------------------------------------------------------------------------------
@@ -357,14 +351,6 @@ def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed: int, othe
     check_optimum(run)
     check_record(run)
     assert run.solution.objective == pytest.approx(active_set(qp).solution.objective, rel=1e-8, abs=1e-8)
-
-
-# arguments -----------------------------------------------------------------------------------------------------------
-
-
-def test_arguments_that_do_not_fit_are_refused() -> None:
-    refused(lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), InputError, "start", 3, 2)
-    refused(lambda: active_set(table_top(), working=["tabel"]), UnknownNameError, "tabel", "table")
 
 
 def test_a_run_is_a_value() -> None:

@@ -10,8 +10,8 @@ import pytest
 from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.errors import InfeasibleError, InputError, SolverError, UnknownNameError
-from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, check_solver, solve, solvers
+from floatbase.errors import InfeasibleError, SolverError
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, solve, solvers
 
 NONE = np.zeros((0, 2)), np.zeros(0)
 LAST_DIGITS = 1e-7  # N·m: a rounding of 1e-16 divided by a part of 1e-12 in curvature is 1e-4; polished answers leave some 1e-9
@@ -214,15 +214,6 @@ def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> Non
     for row in kept:
         rest = [i for i in kept if i != row]
         assert QP(np.eye(2), np.zeros(2), A[rest], qp.b[rest], *NONE).equality_space.n_in >= 0
-
-
-def test_row_names_that_stand_twice_are_refused() -> None:
-    with raises(InputError, "wall"):
-        QP(np.eye(2), np.zeros(2), *NONE, np.eye(2), np.ones(2), inequality_names=("wall", "wall"))
-
-
-def test_a_solver_that_does_not_exist_is_refused_with_the_near_names() -> None:
-    refused(lambda: check_solver("activeset"), UnknownNameError, "solver", "activeset", "active_set")
 
 
 def residual_torque(solution: Solution) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 import pickle
 import warnings
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import judges
@@ -20,6 +22,10 @@ from floatbase.simulation import Ground
 GO2, SOLO = judges.load("go2"), judges.load("solo12")
 SIM, ARM = fb.Simulation(GO2), fb.Simulation(judges.load("ur5"))
 UP = [0.0, 0.0, 1.0]
+
+
+def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
+    return lambda q, v, t: SimpleNamespace(**parts)
 
 
 @pytest.mark.parametrize(
@@ -55,6 +61,8 @@ UP = [0.0, 0.0, 1.0]
         (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), UnknownNameError, "bse", "base"),
         (lambda: fb.rollout(SIM, 3, 1.0), InputError, "controller", 3),
         (lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0), InputError, "controller", "tau", 12, "None"),
+        (lambda: fb.rollout(SIM, answering(tau=np.full(3, np.nan)), 0.1), InputError, "controller", 3, 12),
+        (lambda: fb.rollout(SIM, answering(tau=np.zeros(12), forces=np.zeros(9)), 0.01), InputError, "forces", 9, 12),
         (lambda: fb.rollout(SIM, lambda q, v: None, 1.0), InputError, "controller", "q", "v", "t"),
         (lambda: fb.rollout(SIM, lambda q, v, t, gain: None, 1.0), InputError, "controller", "gain"),
         # go2 and solo12 have equally many joints: nothing but the robot itself tells them apart

@@ -142,11 +142,6 @@ def test_actuators_cannot_write_into_the_torques_of_the_controller(sim: fb.Simul
         fb.rollout(sim, limp, 0.01, actuators=Careless())
 
 
-def test_torques_of_a_wrong_length_are_a_mistake_and_raised(sim: fb.Simulation) -> None:
-    with raises(InputError, "controller", 3, 12):
-        fb.rollout(sim, lambda q, v, t: Torques(np.full(3, np.nan)), 0.1)
-
-
 def test_mistakes_in_a_controller_are_not_swallowed(sim: fb.Simulation) -> None:
     def broken(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
         raise ZeroDivisionError
@@ -310,15 +305,6 @@ def test_contacts_and_constraints_that_the_physics_lacks_are_not_measured_as_zer
     assert record.foot_positions.shape == (5, 3, 3)
     assert np.all(np.isnan(record.foot_positions[:, 2]))
     assert np.all(np.isfinite(record.planned))
-
-
-def test_forces_that_do_not_fit_the_contacts_are_refused_with_both_numbers() -> None:
-    class Wrong:
-        tau, forces = np.zeros(12), np.zeros(9)
-
-    sim = fb.Simulation(judges.load("go2"))
-    with raises(InputError, "forces", 9, 12):
-        fb.rollout(sim, lambda q, v, t: Wrong(), 0.01)
 
 
 @pytest.mark.parametrize("normal", [(0.2, 0.0, 1.0), (-0.1, 0.15, 1.0)])
