@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from messages import refused
 
 import floatbase as fb
 from floatbase.errors import InputError
@@ -165,30 +167,29 @@ def test_constants_and_numbers_may_stand_on_either_side_of_a_map(seed: int, m: i
 
 
 @pytest.mark.parametrize(
-    ("make", "text"),
+    ("make", "named"),
     [
-        (lambda f: f * np.ones(2), r"a map can be multiplied by a finite number, not by an array of shape \(2,\); .* f @ g"),
-        (lambda f: np.ones(2) * f, "a map can be multiplied by a finite number"),
-        (lambda f: f * f, "a map can be multiplied by a finite number, not by an Affine"),
-        (lambda f: np.nan * f, "a map can be multiplied by a finite number, not by nan"),
-        (lambda f: np.ones(3) + f, r"the constant has shape \(3,\); it must have shape \(2,\)"),
-        (lambda f: f @ np.ones(2), r"the value of f at x is f\(x\)"),
-        (lambda f: np.ones((2, 3)) @ f, r"the matrix has shape \(2, 3\); it must have shape \(any, 2\)"),
-        (lambda f: "2" * fb.Quadratic.zero(2), "a cost can be multiplied by a finite number, not by '2'"),
+        (lambda f: f * np.ones(2), (2,)),
+        (lambda f: np.ones(2) * f, (2,)),
+        (lambda f: f * f, ("Affine",)),
+        (lambda f: np.nan * f, (np.nan,)),
+        (lambda f: np.ones(3) + f, (3, 2)),
+        (lambda f: f @ np.ones(2), ()),
+        (lambda f: np.ones((2, 3)) @ f, (2, 3)),
+        (lambda f: "2" * fb.Quadratic.zero(2), (2,)),
     ],
 )
-def test_sums_and_products_that_mean_nothing_are_answered_with_advice(make: Callable[[fb.Affine], object], text: str) -> None:
-    with pytest.raises(InputError, match=text):
-        make(fb.Affine.identity(2))
+def test_sums_and_products_that_mean_nothing_are_refused(
+    make: Callable[[fb.Affine], object], named: tuple[str | float, ...]
+) -> None:
+    refused(lambda: make(fb.Affine.identity(2)), InputError, *named)
 
 
 def test_a_cost_that_falls_for_ever_has_no_minimum() -> None:
     flat = fb.Quadratic(np.diag([1.0, 0.0]), np.array([1.0, 0.5]))
-    with pytest.raises(InputError, match="no minimum: it falls for ever along a direction without curvature"):
-        flat.minimiser()
+    refused(flat.minimiser, InputError)
     saddle = fb.Quadratic(np.diag([1.0, -1.0]), np.zeros(2))
-    with pytest.raises(InputError, match="no minimum: its smallest curvature is -1"):
-        saddle.minimiser()
+    refused(saddle.minimiser, InputError, -1)
     assert np.array_equal(fb.Quadratic.zero(2).minimiser(), [0.0, 0.0])
 
 
@@ -213,25 +214,24 @@ def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks
 
 
 @pytest.mark.parametrize(
-    ("make", "text"),
+    "case",
     [
-        (lambda: fb.Affine(np.eye(2), np.zeros(3)), r"b has shape \(3,\); it must have shape \(2,\)"),
-        (lambda: fb.Affine(np.zeros(2), np.zeros(2)), r"A has shape \(2,\); it must have shape \(any, any\)"),
-        (lambda: fb.Affine([[np.nan]], [0.0]), r"A holds nan at index \[0, 0\]; every entry must be a finite number"),
-        (lambda: fb.Affine("A", [0.0]), r"A must be numbers of shape \(any, any\), not 'A'"),
-        (lambda: fb.Affine.identity(2)([1.0]), r"x has shape \(1,\); this map takes shape \(2,\) or \(2, N\)"),
-        (lambda: fb.Affine.identity(2) @ fb.Affine.identity(3), "the inner map gives 3 numbers, the outer takes 2"),
-        (lambda: fb.Affine.identity(2) + fb.Affine.identity(3), r"cannot add maps of shapes \(2, 2\) and \(3, 3\)"),
-        (lambda: fb.Affine.identity(2) + np.ones(1), r"the constant has shape \(1,\); it must have shape \(2,\)"),
-        (lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)), r"same space; input sizes: .*'b': 3"),
-        (lambda: fb.Affine.stack(), "stack needs at least one map"),
-        (lambda: fb.Affine.stack(tau=fb.Affine.identity(1))["toe"], r"no block 'toe'; its blocks are \['tau'\]"),
-        (lambda: fb.Quadratic(np.eye(2), np.zeros(3)), r"H has shape \(2, 2\); it must have shape \(3, 3\)"),
-        (lambda: fb.Quadratic.zero(2) + fb.Quadratic.zero(3), "cannot add costs over 2 and 3 numbers"),
-        (lambda: fb.Quadratic.zero(2).pullback(fb.Affine.identity(3)), "the map gives 3 numbers, the cost takes 2"),
-        (lambda: fb.Quadratic.of(fb.Affine.identity(1), -1.0), "weight is -1; it must be ≥ 0"),
+        (lambda: fb.Affine(np.eye(2), np.zeros(3)), InputError, "b", 3, 2),
+        (lambda: fb.Affine(np.zeros(2), np.zeros(2)), InputError, "A", 2),
+        (lambda: fb.Affine([[np.nan]], [0.0]), InputError, "A", np.nan),
+        (lambda: fb.Affine("A", [0.0]), InputError, "A"),
+        (lambda: fb.Affine.identity(2)([1.0]), InputError, "x", 1, 2),
+        (lambda: fb.Affine.identity(2) @ fb.Affine.identity(3), InputError, 3, 2),
+        (lambda: fb.Affine.identity(2) + fb.Affine.identity(3), InputError, 2, 3),
+        (lambda: fb.Affine.identity(2) + np.ones(1), InputError, 1, 2),
+        (lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)), InputError, "a", 2, "b", 3),
+        (lambda: fb.Affine.stack(), InputError),
+        (lambda: fb.Affine.stack(tau=fb.Affine.identity(1))["toe"], InputError, "toe", "tau"),
+        (lambda: fb.Quadratic(np.eye(2), np.zeros(3)), InputError, "H", 2, 3),
+        (lambda: fb.Quadratic.zero(2) + fb.Quadratic.zero(3), InputError, 2, 3),
+        (lambda: fb.Quadratic.zero(2).pullback(fb.Affine.identity(3)), InputError, 3, 2),
+        (lambda: fb.Quadratic.of(fb.Affine.identity(1), -1.0), InputError, "weight", -1),
     ],
 )
-def test_shapes_that_do_not_fit_are_named(make, text: str) -> None:
-    with pytest.raises(InputError, match=text):
-        make()
+def test_shapes_that_do_not_fit_are_named(case: tuple[Any, ...]) -> None:
+    refused(*case)

@@ -232,4 +232,4 @@ def test_every_formula_of_the_course_becomes_mathml() -> None:
 def test_a_lesson_that_is_not_there_is_told(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "floatbase.lessons.publish", "site", str(tmp_path / "no.ipynb"), "--to", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 2 and "there is no lesson" in done.stderr
+    assert done.returncode == 2 and "no.ipynb" in done.stderr

@@ -77,7 +77,7 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
         arrays = arrays_of(value)
         assert bool(arrays) != (kind in WITHOUT_ARRAYS), kind
         for name, array in arrays.items():
-            with pytest.raises(ValueError, match="read-only"):
+            with pytest.raises(ValueError):
                 array[...] = 0.0
                 pytest.fail(f"{kind}.{name} was written to")
             with pytest.raises((AttributeError, fb.FloatbaseError)):

@@ -281,50 +281,6 @@ def test_the_quadratic_program_keeps_every_force_pushing_and_stands_through_the_
     assert np.linalg.norm(run.com[-1] - run.com[0]) < 1e-3
 
 
-# what does not fit -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        ({"com": [0.0, 0.0]}, r"com has shape \(2,\); it must have shape \(3,\)"),
-        ({"kp": -1.0}, "kp is -1; it must be > 0"),
-        ({"kd": 0.0}, "kd is 0; it must be > 0"),
-        ({"alpha": -0.1}, "alpha is -0.1; it must be ≥ 0"),
-        ({"bias_weight": 0.0}, "bias_weight is 0; it must be > 0"),
-        ({"posture": 0.0}, "posture is 0; it must be > 0"),
-        ({"torque": np.nan}, "torque is nan; it must be > 0"),
-        ({"a": np.nan}, "nominal normal force a holds nan"),
-    ],
-)
-def test_arguments_that_do_not_fit_are_named(arguments: dict[str, object], text: str) -> None:
-    robot = judges.load("go2")
-    with pytest.raises(fb.FloatbaseError, match=text):
-        AnalyticController(robot, fb.Contacts.points(robot), robot.standing(), **arguments)
-
-
-def test_a_state_of_another_robot_is_refused() -> None:
-    go2, solo = judges.load("go2"), judges.load("solo12")
-    with pytest.raises(fb.FloatbaseError, match="the state to hold belongs to another robot than go2"):
-        AnalyticController(go2, fb.Contacts.points(go2), solo.standing())
-
-
-@pytest.mark.parametrize(
-    ("swap", "text"),
-    [
-        ({"robot": "go2"}, r"robot must be a Robot, as fb.load\(.go2.\), not 'go2'"),
-        ({"contacts": ["FL_foot"]}, r"contacts must be Contacts, as fb\.Contacts\.points\(robot\), not \[.FL_foot.\]"),
-        ({"state": np.zeros(19)}, r"the state to hold must be a State, as robot\.standing\(\), not an array"),
-        ({"contacts": fb.Contacts.points(judges.load("solo12"))}, "unknown frame of go2 'FL_FOOT'"),
-    ],
-)
-def test_values_of_another_kind_are_refused_when_it_is_made(swap: dict[str, object], text: str) -> None:
-    robot = judges.load("go2")
-    fitting = {"robot": robot, "contacts": fb.Contacts.points(robot), "state": robot.standing()}
-    with pytest.raises(fb.FloatbaseError, match=text):
-        AnalyticController(**(fitting | swap))
-
-
 def test_its_answer_prints_in_a_line() -> None:
     state = judges.load("go2").standing()
     command = controller_of("go2")(state.q, state.v)

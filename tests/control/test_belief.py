@@ -9,7 +9,6 @@ import pytest
 
 import floatbase as fb
 from floatbase.control import Belief, build_qp
-from floatbase.errors import UnknownNameError
 from floatbase.qp import solve
 
 ROUNDING = 1e-9  # relative, of sums of forces of some 100 N
@@ -104,9 +103,3 @@ def test_a_belief_survives_a_change_of_stance_and_a_walk() -> None:
     tau, forces = solve(qp)["tau"], solve(qp)["forces"]
     carried = forces.reshape(-1, 3)[:, 2].sum()
     assert np.all(np.isfinite(tau)) and carried == pytest.approx(1.1 * robot.weight, rel=0.05)
-
-
-def test_an_unknown_contact_is_an_error() -> None:
-    robot = judges.load("go2")
-    with pytest.raises(UnknownNameError, match="FL_foot"):
-        fb.WholeBodyController(robot, judges.stance(robot), [], belief=Belief(unfelt=["FL_fot"]))

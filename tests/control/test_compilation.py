@@ -23,6 +23,7 @@ import judges
 import numba
 import numpy as np
 import pytest
+from messages import missing, raises
 from numba.core import event
 from numba.core.runtime import _nrt_python as counts
 from numba.core.runtime import rtsys
@@ -30,6 +31,7 @@ from numba.core.runtime import rtsys
 import floatbase as fb
 from floatbase.__main__ import main
 from floatbase.control.tick import Compiled, announce_if_slow, jit, tick
+from floatbase.errors import InputError
 from floatbase.robots import Robot
 
 TICK = Path(tick.__file__).parent
@@ -81,7 +83,7 @@ def test_another_layout_of_pinocchios_results_leaves_the_readable_path(monkeypat
     monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "fits", False)
     controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
     assert controller.path == "readable"
-    assert controller.path_reason == "this Pinocchio lays its results out in another way in memory"
+    assert "Pinocchio" in controller.path_reason
 
 
 def test_threads_may_share_a_controller() -> None:
@@ -144,7 +146,7 @@ def test_a_replaced_controller_compiles_nothing() -> None:
 
 def test_the_tick_can_be_compiled_before_it_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compile"]) == 0
-    assert "compiled path" in capsys.readouterr().out
+    assert "compiled" in capsys.readouterr().out
 
 
 def test_a_long_compilation_is_announced_and_a_short_one_is_not(capsys: pytest.CaptureFixture[str]) -> None:
@@ -315,7 +317,7 @@ def test_a_full_disk_leaves_a_compiled_tick_and_the_words(small: Callable[[], bo
     assert "File too large" in jit.cache_trouble
     robot = judges.load("go2")
     reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
-    assert "cannot be kept (OSError: " in reason and "File too large): set NUMBA_CACHE_DIR" in reason
+    assert not missing(reason, "OSError", "File too large", "NUMBA_CACHE_DIR")
     assert not small() and small()  # there is room again
 
 
@@ -327,7 +329,7 @@ def test_the_tick_compiles_where_no_folder_can_be_written(small: Callable[[], bo
     assert not small() and not small()
     robot = judges.load("go2")
     reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
-    assert "cannot be kept (no folder can be written to): set NUMBA_CACHE_DIR" in reason
+    assert "NUMBA_CACHE_DIR" in reason
     monkeypatch.setattr(jit, "cache_trouble", "")
     assert "NUMBA_CACHE_DIR" not in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
 
@@ -339,8 +341,8 @@ def test_where_numba_fails_the_readable_path_is_the_last_resort(monkeypatch: pyt
     monkeypatch.setattr(tick, "tick", fails)
     controller = judges.controller_of("go2")
     assert controller.path == controller(judges.load("go2").posture, np.zeros(18)).path == "readable"
-    assert controller.path_reason == "numba could not compile the tick (NotImplementedError: no such target)"
-    with pytest.raises(fb.FloatbaseError, match="no such target"):
+    assert not missing(controller.path_reason, "numba", "NotImplementedError: no such target")
+    with raises(InputError, "path", "NotImplementedError: no such target"):
         judges.controller_of("go2", path="compiled")
 
 
@@ -377,7 +379,7 @@ def test_a_tick_allocates_nothing_and_says_when_its_workspace_is_too_small() -> 
     assert rtsys.get_allocation_stats() == before
     counts.memsys_disable_stats()
     compiled.workspace[0].resize(2000, refcheck=False)
-    with pytest.raises(MemoryError, match="workspace of the controller"):
+    with raises(MemoryError, "workspace"):
         compiled(q, v, 0.0)
 
 

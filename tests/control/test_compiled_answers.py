@@ -10,11 +10,12 @@ import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from messages import missing, raises
 
 import floatbase as fb
 from floatbase.control.tick import Compiled
 from floatbase.dynamics import MOTION_TOLERANCE
-from floatbase.errors import InfeasibleError, InputError, UnknownNameError
+from floatbase.errors import InfeasibleError, InputError
 from floatbase.linear_algebra import null_space
 from floatbase.qp import FEASIBILITY_TOLERANCE, Solution
 from floatbase.robots import Robot, State
@@ -206,14 +207,14 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
     for seed in range(5):
         assert judges.difference(*both, robot.random_state(seed, 0.8)) < TORQUE
     for controller in both:
-        with pytest.raises(InputError, match=r"q\[0:2\], cosine and sine of 'j0', has length 2; it must be 1"):
+        with raises(InputError, "q", "j0", 2):
             controller([2.0, 0.0, 0.1], np.zeros(2))
     tasks = [fb.PostureTask(lambda t: [1.0 + t, 0.0, 0.1]), *tasks[1:]]
     for controller in judges.pair(robot, fb.Contacts.none(), tasks):
         assert controller(robot.posture, np.zeros(2), 0.0).path == controller.path
-        with pytest.raises(InputError, match=r"q of posture\[0:2\], cosine and sine of 'j0', has length 1.5; it must be 1"):
+        with raises(InputError, "q", "j0", 1.5):
             controller(robot.posture, np.zeros(2), 0.5)
-    with pytest.raises(InputError, match=r"q of posture\[0:2\], cosine and sine of 'j0', has length 2"):
+    with raises(InputError, "q", "j0", 2):
         fb.WholeBodyController(robot, fb.Contacts.none(), [fb.PostureTask([2.0, 0.0, 0.1])], path="compiled")
 
 
@@ -228,7 +229,7 @@ def test_a_single_joint_takes_the_readable_path(tmp_path: Path) -> None:
     robot = fb.load_urdf(urdf, floating=False)
     tasks = [fb.CoMTask([0.1, 0.0, 0.2]), fb.FrameTask("bob", np.zeros(3)), fb.OrientationTask("bob"), fb.PostureTask([0.0])]
     controller = fb.WholeBodyController(robot, fb.Contacts.none(), [*tasks, fb.TorqueTask(weight=0.0)])
-    assert controller.path == "readable" and "pendulum has a single joint" in controller.path_reason
+    assert controller.path == "readable" and "pendulum" in controller.path_reason
     state = robot.random_state(0, 0.5)
     assert state.com_jacobian.shape == (3, 1) and state.frame_jacobian("bob").shape == (6, 1)
     command = controller(state.q, state.v)
@@ -258,7 +259,7 @@ def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_readable_
     assert compiled.compiled is not None and compiled.compiled(np.array(state.q), 1e-3 * v, 0.0) is not None
     assert compiled.compiled(np.array(state.q), 10.0 * v, 0.0) is None
     assert judges.difference(compiled, readable, state.replace(v=10.0 * v)) == 0.0
-    with pytest.raises(InfeasibleError, match="these motions are inconsistent"):
+    with raises(InfeasibleError, "motion FL_FOOT y"):
         compiled(state.q, 10.0 * v)
 
 
@@ -277,24 +278,22 @@ def test_a_bad_state_is_refused_in_the_same_words(q: object, v: object) -> None:
     robot = judges.load("go2")
     compiled, readable = judges.pair(robot, judges.stance(robot))
     q = robot.standing().q if q is None else q
-    with pytest.raises(InputError) as expected:
-        readable(q, v)
-    with pytest.raises(InputError) as found:
-        compiled(q, v)
-    assert str(found.value) == str(expected.value)
+    assert refusal(compiled, q, v) == refusal(readable, q, v)
 
 
-def test_a_bad_target_is_refused_in_the_same_words() -> None:
+def refusal(controller: fb.WholeBodyController, *given: object) -> str:
+    with pytest.raises(InputError) as caught:
+        controller(*given)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("target", [[1.0, 2.0], [np.nan, 0.0, 0.0], "there"])
+def test_a_bad_target_is_refused_in_the_same_words(target: object) -> None:
     robot = judges.load("go2")
     state = robot.standing()
-    for target in ([1.0, 2.0], [np.nan, 0.0, 0.0], "there"):
-        moving = fb.CoMTask(lambda t, target=target: target if t > 0 else state.com)
-        both = judges.pair(robot, judges.stance(robot), [moving])
-        with pytest.raises(InputError) as expected:
-            both[1](state.q, state.v, 1.0)
-        with pytest.raises(InputError) as found:
-            both[0](state.q, state.v, 1.0)
-        assert str(found.value) == str(expected.value)
+    moving = fb.CoMTask(lambda t: target if t > 0 else state.com)
+    compiled, readable = judges.pair(robot, judges.stance(robot), [moving])
+    assert refusal(compiled, state.q, state.v, 1.0) == refusal(readable, state.q, state.v, 1.0)
 
 
 # solutions ------------------------------------------------------------------------------------------------------------------
@@ -349,8 +348,6 @@ def test_the_path_is_visible_and_can_be_chosen() -> None:
         assert controller.path == controller(state.q, state.v).path == path
         assert path in repr(controller)
         assert controller.path_reason
-    with pytest.raises(UnknownNameError, match="unknown path 'quick'"):
-        fb.WholeBodyController(robot, contacts, tasks, path="quick")
 
 
 def test_what_does_not_fit_takes_the_readable_path_and_says_why() -> None:
@@ -358,8 +355,8 @@ def test_what_does_not_fit_takes_the_readable_path_and_says_why() -> None:
     contacts, tasks = judges.stance(robot), list(fb.standing_tasks(robot.standing()))
     controller = fb.WholeBodyController(robot, contacts, tasks, solver="cvxpy")
     assert controller.path == "readable"
-    assert "solver 'cvxpy'" in controller.path_reason
-    with pytest.raises(InputError, match="path=\"compiled\" is not possible: .*solver 'cvxpy'"):
+    assert not missing(controller.path_reason, "solver", "cvxpy")
+    with raises(InputError, "path", "solver", "cvxpy"):
         fb.WholeBodyController(robot, contacts, tasks, solver="cvxpy", path="compiled")
 
 
@@ -370,7 +367,7 @@ def test_a_replaced_controller_is_like_a_new_one() -> None:
     for frames in (["FL_foot"], ["FR_foot", "RL_foot"], ["FL_foot", "FR_foot", "RR_foot"]):
         contacts = fb.Contacts.points(robot, frames=frames)
         assert judges.difference(*(one.replace(contacts=contacts) for one in both), state) < TORQUE
-    with pytest.raises(InputError, match="target of force regularisation has shape"):
+    with raises(InputError, "target", 12, 3):
         aimed = both[0].replace(tasks=[*both[0].tasks[:3], fb.ForceTask(np.zeros(12))])
         aimed.replace(contacts=fb.Contacts.points(robot, frames=["FL_foot"]))
 
@@ -381,7 +378,7 @@ def test_a_target_that_turns_into_a_reflection_is_left_to_the_readable_path_whic
     mirrored = fb.OrientationTask("base", rotation=lambda t: np.diag([1.0, 1.0, 1.0 if t < 1.0 else -1.0]))
     controller = fb.WholeBodyController(robot, judges.stance(robot), [mirrored], path="compiled")
     assert controller(state.q, state.v, 0.0).path == "compiled"
-    with pytest.raises(InputError, match="rotation"):
+    with raises(InputError, "rotation", "base"):
         controller(state.q, state.v, 2.0)
 
 

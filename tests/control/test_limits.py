@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import judges
 import numpy as np
 import pytest
+from messages import raises
 
 import floatbase as fb
 from floatbase.control import Rows
@@ -72,7 +72,7 @@ def test_rows_in_conflict_are_told_by_their_names() -> None:
     robot = judges.load("go2")
     light = Rows("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
     for controller in judges.pair(robot, judges.stance(robot), [], rows=[light], min_normal_force=10.0):
-        with pytest.raises(InfeasibleError, match="light feet") as caught:
+        with raises(InfeasibleError, "light feet") as caught:
             controller(robot.standing().q, np.zeros(18))
         row = next(row for row in caught.value.rows if row == "light feet")
         assert (row.kind, row.owner, row.number) == ("rows", "light feet", 0)
@@ -140,7 +140,7 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(path: str) -
         assert np.array_equal(back.tau, standing(state.q, state.v, 0.1).tau)
         assert "FL_foot largest normal force" in back.active
     assert np.array_equal(lifted(state.q, state.v, 0.1).tau, torques(swing, **bounds | {"min_normal_force": {"RR_foot": 12.0}}))
-    with pytest.raises(UnknownNameError, match="unknown contact in min_normal_force 'heel'"):
+    with raises(UnknownNameError, "min_normal_force", "heel"):
         torques(swing, **bounds)  # a new controller knows the robot's feet, and no other contact that is not there
 
 
@@ -159,86 +159,21 @@ def test_a_bound_that_is_a_function_is_asked_once_at_a_time(path: str) -> None:
     assert asked == [0.0, 0.5, 0.0]
 
 
-# words ---------------------------------------------------------------------------------------------------------------------
-
-
-def make(**options: object) -> Callable[[], object]:
-    robot = judges.load("go2")
-    return lambda: fb.WholeBodyController(robot, judges.stance(robot), [], **options)
-
-
-@pytest.mark.parametrize(
-    ("call", "kind", "text"),
-    [
-        (make(max_normal_force=-1.0), InputError, "max_normal_force is -1; it must be ≥ 0 N"),
-        (make(max_normal_force={"FL_foot": -1.0}), InputError, "max_normal_force of FL_foot is -1; it must be ≥ 0 N"),
-        (make(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "unknown contact in min_normal_force 'FL_fot'; .*FL_foot"),
-        (make(min_normal_force={"FL_foot": lambda t: -1.0}), InputError, "min_normal_force of FL_foot is -1; it must be ≥ 0 N"),
-        (make(rows=Rows("r", "tau", (np.eye(12), np.ones(12)))), InputError, "rows must be a list of Rows, not a Rows"),
-        (make(rows=[np.eye(12)]), InputError, "each of rows must be a Rows, as floatbase.control.Rows"),
-        (lambda: Rows("r", "lambda", (np.eye(12), np.ones(12))), InputError, "rows 'r' have block 'lambda'; it must be"),
-        (lambda: Rows("r", "tau", np.eye(12)), InputError, r"rows 'r' must be G and h, as in \(G, h\), not an array"),
-        (
-            lambda: Rows("r", "tau", (np.eye(12), np.ones(3))),
-            InputError,
-            r"h of r has shape \(3,\); it must have shape \(12,\)",
-        ),
-        (
-            make(max_normal_force=lambda t: 1.0),
-            InputError,
-            "max_normal_force must be one number .* or a mapping .*, not a func",
-        ),
-        (
-            make(max_normal_force=[1.0, 2.0]),
-            InputError,
-            r"max_normal_force must be one number .* or a mapping .*, not \[1.0, 2",
-        ),
-        (
-            make(max_normal_force={"FL_foot": lambda: 1.0}),
-            InputError,
-            r"max_normal_force of FL_foot must be .* called as force\(t\); <lambda> takes \(\): too many positional arguments",
-        ),
-        (
-            make(rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]),
-            InputError,
-            "rows 'r' take 3 numbers; their block 'tau' has 12.",
-        ),
-        (
-            make(rows=[Rows("r", "forces", (np.eye(9), np.ones(9)))]),
-            InputError,
-            r"rows 'r' take 9 numbers; their block 'forces' has 12; a function of \(eom, t\) can follow the contacts",
-        ),
-        (
-            lambda: Rows("r", "tau", (np.ones(12), [1.0])),
-            InputError,
-            r"G of r has shape \(12,\); it must have shape \(any, any\): one row alone is rows\[:1\], not rows\[0\]",
-        ),
-        (lambda: Rows("r", "tau", lambda eom: 3.0), InputError, r"called as rows\(eom, t\); <lambda> takes \(eom\): too many"),
-        (make(rows=[Rows("r", "tau", lambda eom, t: 3.0)]), InputError, "rows 'r' must be G and h"),
-        (make(rows=[Rows("r", "tau", (np.eye(12), np.ones(12)), ["a"])]), InputError, "rows 'r' have 1 owners and 12 rows"),
-        (make(rows=2 * [Rows("r", "tau", (np.eye(12), np.ones(12)))]), InputError, "inequality name 'r 0' stands twice"),
-    ],
-)
-def test_bad_rows_and_bounds_are_told_what_would_be_right(call: Callable[[], object], kind: type[Exception], text: str) -> None:
-    with pytest.raises(kind, match=text):
-        call()
-
-
-def test_a_bound_that_goes_wrong_is_told_in_the_words_of_the_readable_path() -> None:
+def test_a_bound_that_goes_wrong_is_told_on_both_paths() -> None:
     robot = judges.load("go2")
     bound = {"FL_foot": lambda t: 50.0 if t < 1.0 else np.nan}
     for controller in judges.pair(robot, judges.stance(robot), [], max_normal_force=bound):
         assert controller(robot.standing().q, np.zeros(18)).path == controller.path
-        with pytest.raises(InputError, match="max_normal_force of FL_foot is nan; it must be ≥ 0 N"):
+        with raises(InputError, "max_normal_force", "FL_foot", np.nan):
             controller(robot.standing().q, np.zeros(18), 1.0)
 
 
 @pytest.mark.parametrize("path", ["compiled", "readable"])
 def test_a_replaced_controller_is_checked(path: str) -> None:
     controller = judges.controller_of("go2", path=path)
-    with pytest.raises(InputError, match="rows 'r' take 3 numbers; their block 'tau' has 12"):
+    with raises(InputError, "r", "tau", 3, 12):
         controller.replace(limits=replace(controller.limits, rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]))
-    with pytest.raises(UnknownNameError, match="unknown contact in max_normal_force 'FL_fot'; near names: FL_foot"):
+    with raises(UnknownNameError, "max_normal_force", "FL_fot", "FL_foot"):
         controller.replace(limits=replace(controller.limits, max_normal_force={"FL_fot": 1.0}))
-    with pytest.raises(InputError, match=r"q of arm has shape \(5,\)"):
+    with raises(InputError, "q", "arm", 5):
         controller.replace(tasks=[fb.PostureTask(np.zeros(5), name="arm")])

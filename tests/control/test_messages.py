@@ -1,20 +1,22 @@
-"""What tasks, friction and controllers answer to what they cannot use."""
+"""What tasks, limits and controllers refuse: the type of each error, and the names and numbers in it."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any
 
 import judges
 import numpy as np
 import pytest
+from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.errors import FloatbaseError, InputError, UnknownNameError
-from floatbase.friction import FrictionPolyhedron
+from floatbase.control import AnalyticController, Belief, Limits, Rows
+from floatbase.errors import InputError, UnknownNameError
 
-GO2 = judges.load("go2")
+GO2, SOLO = judges.load("go2"), judges.load("solo12")
 CONTACTS = fb.Contacts.points(GO2)
 STATE = GO2.standing()
 UP = [0.0, 0.0, 1.0]
@@ -42,97 +44,131 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
     return fb.WholeBodyController(GO2, CONTACTS, tasks, **options)
 
 
+class Fixed(Own):
+    """A task of one's own with a residual of fixed size."""
+
+    def __init__(self, **wrong: object):
+        super().__init__()
+        vars(self).update({"residual": lambda eom, t=0.0: fb.Affine.identity(3)} | wrong)
+
+
+def rows(block: str, n: int, m: int | None = None, owners: tuple[str, ...] = ()) -> Rows:
+    return Rows("r", block, (np.eye(n), np.ones(m or n)), owners)
+
+
+def analytic(**swap: object) -> AnalyticController:
+    return AnalyticController(**{"robot": GO2, "contacts": CONTACTS, "state": STATE} | swap)
+
+
 @pytest.mark.parametrize(
-    ("make", "kind", "text"),
+    "case",
     [
-        (lambda: FrictionPolyhedron(UP, 0.7, 2), InputError, "facets is 2; .* whole number ≥ 3"),
-        (lambda: FrictionPolyhedron(UP, 0.7, 4.5), InputError, "facets is 4.5; .* whole number ≥ 3"),
-        (lambda: FrictionPolyhedron(UP, 0.0), InputError, "friction coefficient mu is 0; it must be > 0"),
-        (lambda: FrictionPolyhedron([0.0, 0.0, 0.0], 0.7), InputError, "normal is the zero vector; it must have a direction"),
-        (lambda: FrictionPolyhedron(UP, 0.7).margin([1.0]), InputError, r"force has shape \(1,\); .*\(3,\) \(N\)"),
-        (lambda: controller(facets=2), InputError, "facets is 2"),
-        (lambda: controller(turn=np.nan), InputError, "turn of the facets is nan"),
-        (lambda: controller().qp(STATE).without("frictions"), UnknownNameError, "near names: friction"),
-        (lambda: controller(min_normal_force=-1.0), InputError, "min_normal_force is -1; it must be ≥ 0 N"),
-        (lambda: controller(torque_limits=[1.0, 2.0]), InputError, r"torque_limits must be one number > 0 or 12 of them"),
-        (lambda: controller(torque_limits=0.0), InputError, r"torque_limits must be one number > 0 or 12 of them \(N·m\)"),
-        (lambda: controller(torque_limits=np.nan), InputError, "torque_limits must be one number > 0"),
-        (lambda: controller(solver="dapq"), UnknownNameError, "unknown solver 'dapq'; .*daqp"),
-        (lambda: controller(Own(without="block")), InputError, "Own is no task yet, for it has no block; a task"),
-        (lambda: controller(Own(residual=np.ones(3))), InputError, r"residual of 'mine' .*fb\.Affine\(A, b\), not ndarray"),
-        (lambda: controller(Own()), InputError, "residual of 'mine' must be .*, not NoneType"),
-        (
-            lambda: controller(own(lambda eom: None)),
-            InputError,
-            r"residual of 'mine' must be .* called as residual\(eom, t\); <lambda> takes \(eom\): too many",
-        ),
-        (lambda: controller(own(lambda eom, t: 1 + "")), TypeError, "unsupported operand"),
-        (
-            lambda: controller(own(lambda eom, t: fb.Affine(np.ones(18), [0.0]))),
-            InputError,
-            r"task 'mine': A has shape \(18,\); .*: one row alone is rows\[:1\], not rows\[0\]",
-        ),
-        (lambda: controller(own_with_nan()), InputError, r"task 'mine': b holds nan at index \[0\]"),
-        (
-            lambda: controller().qp(judges.load("solo12").standing()),
-            InputError,
-            r"another robot, Robot\('solo12', .*\), than the problem, Robot\('go2', .* 4 feet",
-        ),
-        (lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})), InputError, "a SimpleNamespace is none"),
-        (lambda: controller("stand"), InputError, r"tasks must hold tasks, such as fb\.CoMTask\(state\.com\); 'stand' is none"),
-        (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "frame of go2 'FL_fot'; near names: FL_foot"),
-        (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "unknown frame of go2 'torso'"),
-        (lambda: controller(fb.PostureTask(np.zeros(5))), InputError, r"q of posture has shape \(5,\); .*\(19,\)"),
-        (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, r"target of force regularisation .* \(3,\); .*\(12,\)"),
-        (lambda: controller(fb.TorqueTask(np.zeros(3))), InputError, r"target of torque regularisation .* \(3,\); .*\(12,\)"),
-        (lambda: controller(fb.CoMTask(lambda t: [0.0])), InputError, r"position of centre of mass has shape \(1,\)"),
-        (lambda: controller(fb.CoMTask(lambda t: (UP, UP, [0.0]))), InputError, r"acceleration of centre .* shape \(1,\)"),
-        (
-            lambda: controller(fb.CoMTask(lambda t: (UP, UP))),
-            InputError,
-            r"function of centre of mass gave 2 targets; it must give one, or all three .* lambda t: \(position, velocity, acc",
-        ),
-        (lambda: controller(fb.CoMTask(lambda t: None)), InputError, "position of centre of mass must be numbers .* not None"),
-        (lambda: controller(fb.CoMTask(lambda t: (UP, None, UP))), InputError, "velocity of centre of mass .* not None"),
-        (lambda: controller(fb.TorqueTask(lambda t: None)), InputError, "target of torque regularisation .* not None"),
-        (lambda: controller(fb.CoMTask(lambda t: np.array(1.0))), InputError, r"position of .* has shape \(\); .*\(3,\)"),
-        (lambda: controller(fb.CoMTask(lambda t: ([0, [0]], UP, UP))), InputError, "position of .* must be numbers of shape"),
-        (
-            lambda: fb.CoMTask(lambda: UP),
-            InputError,
-            r"called as position\(t\); <lambda> takes \(\): too many positional argum",
-        ),
-        (lambda: fb.OrientationTask("base", lambda t, f: UP), InputError, r"called as rotation\(t\); .* 'f'"),
-        (lambda: fb.CoMTask(UP, kp=UP), InputError, r"kp of centre of mass has shape \(3,\); it must be one number \(1/s²\)"),
-        (lambda: fb.CoMTask(UP, lambda t: UP), InputError, r"velocity of .* cannot be a function: let position be one"),
-        (lambda: fb.CoMTask(lambda t: UP, UP), InputError, r"velocity of .* must be left out, for position is a function"),
-        (lambda: controller(fb.PostureTask(STATE.q, UP)), InputError, r"velocity of posture has shape \(3,\); .*\(12,\)"),
-        (lambda: fb.PostureTask(STATE.q[None]), InputError, r"q of posture has shape \(1, 19\)"),
-        (lambda: fb.CoMTask([0.0, 0.0]), InputError, r"position of centre of mass has shape \(2,\); .*\(3,\)"),
-        (lambda: fb.CoMTask([0.0, 0.0, np.nan]), InputError, r"position of centre of mass holds nan at index \[2\]"),
-        (lambda: fb.CoMTask(UP, velocity=[1.0]), InputError, r"velocity of centre of mass has shape \(1,\)"),
-        (lambda: fb.CoMTask(UP, kp=-1.0), InputError, "kp of centre of mass is -1; it must be ≥ 0 1/s²"),
-        (lambda: fb.FrameTask("base", UP, kd=-1.0), InputError, "kd of position of base is -1; it must be ≥ 0 1/s"),
-        (lambda: fb.PostureTask(STATE.q, weight=-1.0), InputError, "weight of posture is -1; it must be ≥ 0"),
-        (lambda: fb.ForceTask(weight=-1.0), InputError, "weight of force regularisation is -1"),
-        (lambda: fb.OrientationTask("base", np.eye(2)), InputError, r"rotation of .*base has shape \(2, 2\); .*\(3, 3\)"),
-        (lambda: fb.OrientationTask("base", 2 * np.eye(3)), InputError, "a rotation matrix: its columns must be orthonormal"),
-        (lambda: fb.OrientationTask("base", np.diag([1, 1, -1])), InputError, r"orthonormal, determinant \+1"),
-        (lambda: controller(fb.OrientationTask("base", lambda t: np.zeros((3, 3)))), InputError, "not a rotation matrix"),
-        (lambda: fb.WholeBodyController(GO2, [1], []), InputError, r"Contacts, as fb\.Contacts\.points\(robot\), not \[1\]"),
-        (
-            lambda: fb.WholeBodyController(judges.load("solo12"), CONTACTS, []),
-            UnknownNameError,
-            "unknown frame of solo12 'FL_foot'; near names: FL_FOOT",
-        ),
-        (lambda: controller()(np.zeros(3), STATE.v), InputError, r"q has shape \(3,\); it must have shape \(19,\)"),
-        (lambda: controller()(STATE.q, np.full(18, np.nan)), InputError, r"v holds nan at index \[0\]"),
-        (lambda: controller()(1.1 * STATE.q, STATE.v), InputError, r"has length 1.1; it must be 1\. Divide it by its length"),
+        (lambda: controller(facets=2), InputError, "facets", 2, 3),
+        (lambda: controller(turn=np.nan), InputError, "turn", np.nan),
+        (lambda: controller().qp(STATE).without("frictions"), UnknownNameError, "frictions", "friction"),
+        (lambda: controller(min_normal_force=-1.0), InputError, "min_normal_force", -1),
+        (lambda: controller(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "min_normal_force", "FL_fot", "FL_foot"),
+        (lambda: controller(min_normal_force={"FL_foot": lambda t: -1.0}), InputError, "min_normal_force", "FL_foot", -1),
+        (lambda: controller(max_normal_force=-1.0), InputError, "max_normal_force", -1),
+        (lambda: controller(max_normal_force={"FL_foot": -1.0}), InputError, "max_normal_force", "FL_foot", -1),
+        (lambda: controller(max_normal_force=lambda t: 1.0), InputError, "max_normal_force"),
+        (lambda: controller(max_normal_force=[1.0, 2.0]), InputError, "max_normal_force", 1, 2),
+        (lambda: controller(max_normal_force={"FL_foot": lambda: 1.0}), InputError, "max_normal_force", "FL_foot"),
+        (lambda: Limits(np.ones(12), min_normal_force=-50.0), InputError, "min_normal_force", -50),
+        (lambda: Limits(np.ones(12), facets=2), InputError, "facets", 2),
+        (lambda: controller(torque_limits=[1.0, 2.0]), InputError, "torque_limits", 12, 2),
+        (lambda: controller(torque_limits=0.0), InputError, "torque_limits", 12, 0),
+        (lambda: controller(torque_limits=np.nan), InputError, "torque_limits", np.nan),
+        (lambda: controller(torque_limits="strong"), InputError, "torque_limits", "strong"),
+        (lambda: controller(torque_limits=["strong"] * 12), InputError, "torque_limits", "strong"),
+        (lambda: controller(solver="dapq"), UnknownNameError, "solver", "dapq", "daqp"),
+        (lambda: controller(path="quick"), UnknownNameError, "path", "quick", "compiled", "readable"),
+        (lambda: controller(rows=rows("tau", 12)), InputError, "rows", "Rows"),
+        (lambda: controller(rows=[np.eye(12)]), InputError, "rows", "Rows", 12),
+        (lambda: controller(rows=[rows("tau", 3)]), InputError, "r", "tau", 3, 12),
+        (lambda: controller(rows=[rows("forces", 9)]), InputError, "r", "forces", 9, 12),
+        (lambda: controller(rows=[Rows("r", "tau", lambda eom, t: 3.0)]), InputError, "r", "G", "h", 3),
+        (lambda: controller(rows=[rows("tau", 12, owners=("a",))]), InputError, "r", 1, 12),
+        (lambda: controller(rows=2 * [rows("tau", 12)]), InputError, "r 0"),
+        (lambda: rows("lambda", 12), InputError, "r", "lambda", "qdd", "tau", "forces"),
+        (lambda: rows("tau", 12, 3), InputError, "h", "r", 3, 12),
+        (lambda: Rows("r", "tau", np.eye(12)), InputError, "r", "G", "h"),
+        (lambda: Rows("r", "tau", (np.ones(12), [1.0])), InputError, "G", "r", 12),
+        (lambda: Rows("r", "tau", lambda eom: 3.0), InputError, "r", "eom", "t"),
+        (lambda: controller(Own(without="block")), InputError, "Own", "block"),
+        (lambda: controller(Own(residual=np.ones(3))), InputError, "residual", "mine", "ndarray"),
+        (lambda: controller(Own()), InputError, "residual", "mine", "NoneType"),
+        (lambda: controller(own(lambda eom: None)), InputError, "residual", "mine", "eom", "t"),
+        (lambda: controller(own(lambda eom, t: 1 + "")), TypeError),  # the user's error itself
+        (lambda: controller(own(lambda eom, t: fb.Affine(np.ones(18), [0.0]))), InputError, "mine", "A", 18),
+        (lambda: controller(own_with_nan()), InputError, "mine", "b", np.nan),
+        (lambda: controller(Fixed(block="foo")), InputError, "mine", "block", "foo", "qdd", "tau", "forces"),
+        (lambda: controller(Fixed(weight=-1.0)), InputError, "weight", "mine", -1),
+        (lambda: controller(Fixed()), InputError, "residual", "mine", "qdd", 3, 18),
+        (lambda: controller(fb.CoMTask), InputError, "tasks", "CoMTask"),
+        (lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})), InputError, "tasks", "SimpleNamespace"),
+        (lambda: controller("stand"), InputError, "tasks", "stand"),
+        (lambda: controller().replace(tasks=3), InputError, "tasks", 3),
+        (lambda: controller().replace(tasks=[Fixed()]), InputError, "residual", "mine", "qdd", 3, 18),
+        (lambda: controller(belief=Belief(unfelt=["FL_fot"])), UnknownNameError, "FL_fot", "FL_foot"),
+        (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), InputError, "tasks", "CoMTask"),
+        (lambda: fb.WholeBodyController(GO2, CONTACTS, None), InputError, "tasks", "None"),
+        (lambda: fb.WholeBodyController(GO2, [1], []), InputError, "contacts", "Contacts", 1),
+        (lambda: fb.WholeBodyController("go2", CONTACTS, []), InputError, "robot", "Robot", "go2"),
+        (lambda: fb.WholeBodyController(SOLO, CONTACTS, []), UnknownNameError, "solo12", "FL_foot", "FL_FOOT"),
+        (lambda: fb.standing_tasks(GO2), InputError, "state", "State"),
+        (lambda: controller().qp(SOLO.standing()), InputError, "solo12", "go2"),
+        (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "go2", "FL_fot", "FL_foot"),
+        (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "go2", "torso"),
+        (lambda: controller(fb.PostureTask(np.zeros(5))), InputError, "q", 5, 19),
+        (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, "target", 3, 12),
+        (lambda: controller(fb.TorqueTask(np.zeros(3))), InputError, "target", 3, 12),
+        (lambda: controller(fb.TorqueTask(lambda t: None)), InputError, "target", 12, "None"),
+        (lambda: controller(fb.CoMTask(lambda t: [0.0])), InputError, "position", 1, 3),
+        (lambda: controller(fb.CoMTask(lambda t: (UP, UP, [0.0]))), InputError, "acceleration", 1, 3),
+        (lambda: controller(fb.CoMTask(lambda t: (UP, UP))), InputError, 2, "position", "velocity", "acceleration"),
+        (lambda: controller(fb.CoMTask(lambda t: None)), InputError, "position", 3, "None"),
+        (lambda: controller(fb.CoMTask(lambda t: (UP, None, UP))), InputError, "velocity", 3, "None"),
+        (lambda: controller(fb.CoMTask(lambda t: np.array(1.0))), InputError, "position", 3),
+        (lambda: controller(fb.CoMTask(lambda t: ([0, [0]], UP, UP))), InputError, "position", 3),
+        (lambda: controller(fb.OrientationTask("base", lambda t: np.zeros((3, 3)))), InputError, "rotation", "base"),
+        (lambda: controller(fb.PostureTask(STATE.q, UP)), InputError, "velocity", 3, 12),
+        (lambda: fb.CoMTask(lambda: UP), InputError, "position", "t"),
+        (lambda: fb.CoMTask(UP, kp=UP), InputError, "kp", 3),
+        (lambda: fb.CoMTask(UP, kp=-1.0), InputError, "kp", -1),
+        (lambda: fb.CoMTask(UP, lambda t: UP), InputError, "velocity", "position"),
+        (lambda: fb.CoMTask(lambda t: UP, UP), InputError, "velocity", "position"),
+        (lambda: fb.CoMTask(UP, velocity=[1.0]), InputError, "velocity", 1, 3),
+        (lambda: fb.CoMTask([0.0, 0.0]), InputError, "position", 2, 3),
+        (lambda: fb.CoMTask([0.0, 0.0, np.nan]), InputError, "position", np.nan),
+        (lambda: fb.FrameTask("base", UP, kd=-1.0), InputError, "kd", "base", -1),
+        (lambda: fb.PostureTask(STATE.q[None]), InputError, "q", 1, 19),
+        (lambda: fb.PostureTask(STATE.q, weight=-1.0), InputError, "weight", -1),
+        (lambda: fb.ForceTask(weight=-1.0), InputError, "weight", -1),
+        (lambda: fb.OrientationTask("base", lambda t, f: UP), InputError, "rotation", "base", "f"),
+        (lambda: fb.OrientationTask("base", np.eye(2)), InputError, "rotation", "base", 2, 3),
+        (lambda: fb.OrientationTask("base", 2 * np.eye(3)), InputError, "rotation", "base"),
+        (lambda: fb.OrientationTask("base", np.diag([1, 1, -1])), InputError, "rotation", "base"),
+        (lambda: controller()(np.zeros(3), STATE.v), InputError, "q", 3, 19),
+        (lambda: controller()(STATE.q, np.full(18, np.nan)), InputError, "v", np.nan),
+        (lambda: controller()(1.1 * STATE.q, STATE.v), InputError, "q", 1.1),
+        (lambda: analytic(com=[0.0, 0.0]), InputError, "com", 2, 3),
+        (lambda: analytic(kp=-1.0), InputError, "kp", -1),
+        (lambda: analytic(kd=0.0), InputError, "kd", 0),
+        (lambda: analytic(alpha=-0.1), InputError, "alpha", -0.1),
+        (lambda: analytic(bias_weight=0.0), InputError, "bias_weight", 0),
+        (lambda: analytic(posture=0.0), InputError, "posture", 0),
+        (lambda: analytic(torque=np.nan), InputError, "torque", np.nan),
+        (lambda: analytic(a=np.nan), InputError, "a", np.nan),
+        (lambda: analytic(state=SOLO.standing()), InputError, "state", "go2"),
+        (lambda: analytic(robot="go2"), InputError, "robot", "Robot", "go2"),
+        (lambda: analytic(contacts=["FL_foot"]), InputError, "contacts", "Contacts", "FL_foot"),
+        (lambda: analytic(state=np.zeros(19)), InputError, "state", "State", 19),
+        (lambda: analytic(contacts=fb.Contacts.points(SOLO)), UnknownNameError, "go2", "FL_FOOT", "FL_foot"),
     ],
 )
-def test_bad_input_is_told_what_would_be_right(make: Callable[[], object], kind: type[FloatbaseError], text: str) -> None:
-    with pytest.raises(kind, match=text):
-        make()
+def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+    refused(*case)
 
 
 def test_a_trajectory_that_does_not_begin_at_zero_is_told_why_it_was_asked_for_that() -> None:
@@ -143,26 +179,9 @@ def test_a_trajectory_that_does_not_begin_at_zero_is_told_why_it_was_asked_for_t
 
     made = (lambda: controller(fb.CoMTask(later)), lambda: controller().replace(tasks=[fb.CoMTask(later)]))
     for make in made:
-        with pytest.raises(ArithmeticError, match=r"nothing at 0\.0") as raised:
+        with raises(ArithmeticError, 0) as raised:
             make()
-        assert any("while a controller was made" in note and "at t = 0" in note for note in raised.value.__notes__)
-
-
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), "tasks"),
-        (lambda: fb.WholeBodyController(GO2, CONTACTS, None), "tasks"),
-        (lambda: controller().replace(tasks=3), "tasks"),
-        (lambda: fb.WholeBodyController("go2", CONTACTS, []), "Robot"),
-        (lambda: controller(torque_limits="strong"), "torque_limits"),
-        (lambda: controller(torque_limits=["strong"] * 12), "torque_limits"),
-        (lambda: fb.standing_tasks(GO2), "State"),
-    ],
-)
-def test_values_of_another_kind_are_refused_by_an_error_of_the_package(make: Callable[[], object], text: str) -> None:
-    with pytest.raises(InputError, match=text):
-        make()
+        assert any(not missing(note, "t", 0) for note in raised.value.__notes__)
 
 
 @pytest.mark.parametrize("number", ["10", np.array(10.0), np.float32(10.0), 10])
@@ -177,19 +196,11 @@ def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> 
     assert np.allclose(command.tau, expected.tau)
 
 
-@pytest.mark.parametrize(
-    ("name", "advice"),
-    [
-        ("torque_limits", "make another, .*torque_limits=…"),
-        ("path", "make another"),
-        ("tasks", r"controller\.replace\(tasks=…\)"),
-        ("task", "no 'task' to set; tasks.*replace"),
-    ],
-)
-def test_what_a_controller_was_made_with_is_not_set_afterwards(name: str, advice: str) -> None:
+@pytest.mark.parametrize("name", ["torque_limits", "path", "tasks", "task"])
+def test_what_a_controller_was_made_with_is_not_set_afterwards(name: str) -> None:
     made = controller(fb.ForceTask(), path="readable")
     for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
-        with pytest.raises(InputError, match=advice):
+        with raises(InputError, name, "WholeBodyController", *(["tasks"] if name == "task" else [])):
             setattr(one, name, 2.0)
 
 
@@ -199,5 +210,5 @@ def test_a_class_of_ones_own_sets_its_own_attributes() -> None:
 
     made = Counting(GO2, CONTACTS, [fb.ForceTask()], path="readable")
     made.calls += 1
-    with pytest.raises(InputError, match="make another"):
+    with raises(InputError, "path"):
         made.path = "compiled"

@@ -12,6 +12,7 @@ from typing import ClassVar
 import judges
 import numpy as np
 import pytest
+from messages import raises
 
 import floatbase as fb
 from floatbase.control import Rows
@@ -145,7 +146,7 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
                 assert np.allclose(getattr(other.state, ask)(frame), getattr(state, ask)(frame), rtol=1e-10, atol=1e-10), ask
             assert (other.nv, other.d, other.k) == (expected.nv, expected.d, expected.k)
             assert other.state.frame_pose(frame).isApprox(state.frame_pose(frame))
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+    with raises(AttributeError, "nothing"):
         _ = seen[0].nothing
     with pytest.raises(AttributeError):
         seen[0].M = np.eye(robot.nv)
@@ -245,19 +246,21 @@ def _fail() -> object:
 
 
 @pytest.mark.parametrize(
-    ("later", "text"),
+    ("later", "kind", "named"),
     [
-        (lambda: np.eye(18), r"the residual of 'odd' must be A x \+ b of its block x as fb.Affine\(A, b\), not ndarray"),
-        (lambda: fb.Affine.identity(12), "the residual of 'odd' takes 12 numbers; its block 'qdd' has 18"),
-        (lambda: fb.Affine(np.full((1, 18), np.nan), [0.0]), r"task 'odd': A holds nan at index \[0, 0\]"),
-        (_fail, "the sensor is gone"),
+        (lambda: np.eye(18), InputError, ("residual", "odd", "ndarray")),
+        (lambda: fb.Affine.identity(12), InputError, ("residual", "odd", "qdd", 12, 18)),
+        (lambda: fb.Affine(np.full((1, 18), np.nan), [0.0]), InputError, ("odd", "A", np.nan)),
+        (_fail, RuntimeError, ("the sensor is gone",)),
     ],
 )
-def test_a_task_that_goes_wrong_is_told_in_the_words_of_the_readable_path(later: Callable[[], object], text: str) -> None:
+def test_a_task_that_goes_wrong_is_told_on_both_paths(
+    later: Callable[[], object], kind: type[Exception], named: tuple[str | float, ...]
+) -> None:
     robot = judges.load("go2")
     for controller in judges.pair(robot, judges.stance(robot), [_Wrong(later)]):
         assert controller(robot.standing().q, np.zeros(18)).path == controller.path
-        with pytest.raises((InputError, RuntimeError), match=text):
+        with raises(kind, *named):
             controller(robot.standing().q, np.zeros(18), 1.0)
 
 
@@ -382,7 +385,7 @@ def test_a_contact_of_ones_own_whose_shapes_do_not_fit_together_is_told_so(path:
             return A[:2], b
 
     robot = judges.load("go2")
-    with pytest.raises(InputError, match=r"A, b and J of 'FL_foot' have shapes \(2, 18\), .* they must have \(3, 18\), \(3,\)"):
+    with raises(InputError, "A", "b", "J", "FL_foot", 2, 3, 18):
         fb.WholeBodyController(robot, fb.Contacts([Short("FL_foot")]), [], path=path)
 
 
@@ -397,9 +400,3 @@ def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones()
     for contacts in (feet + fb.Contacts(own), fb.Contacts(own[::-1]) + feet):
         both = judges.pair(robot, contacts, tasks, min_normal_force=3.0)
         assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 5)) < judges.agreement(robot)
-
-
-def test_a_replaced_controller_is_checked() -> None:
-    controller = judges.controller_of("go2", path="compiled")
-    with pytest.raises(InputError, match="the residual of 'odd' takes 12 numbers"):
-        controller.replace(tasks=[_Wrong(lambda: None, at_first=fb.Affine.identity(12))])

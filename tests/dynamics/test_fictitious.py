@@ -5,7 +5,6 @@ from __future__ import annotations
 import judges
 import mujoco
 import numpy as np
-import pytest
 import scipy.integrate
 
 import floatbase as fb
@@ -221,20 +220,3 @@ def test_a_link_that_turns_evenly_pulls_its_points_inward_by_omega_squared_times
     from_axis = r - (r @ axis) * axis
     assert np.linalg.norm(from_axis) > 0.1
     assert np.allclose(inward, -(2.0**2) * from_axis, atol=1e-12)
-
-
-def test_bad_input_is_told_what_would_be_right() -> None:
-    with pytest.raises(fb.FloatbaseError, match="give its derivative too, omega_rate="):
-        seen_from_turning_frame([0.0, 1.0], wandering, (1.0, 0.0, 0.0))
-    with pytest.raises(fb.FloatbaseError, match="each must come after the one before"):
-        seen_from_turning_frame([0.0, 0.0], (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-    with pytest.raises(fb.FloatbaseError, match="at least one instant"):
-        seen_from_turning_frame([], (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-    with pytest.raises(fb.FloatbaseError, match=r"position has shape \(2,\); it must have shape \(3,\) \(m\)"):
-        seen_from_turning_frame([0.0], (0.0, 0.0, 1.0), (1.0, 0.0))
-    with pytest.raises(fb.FloatbaseError, match=r"omega at 0\S* s has shape \(2,\)"):
-        seen_from_turning_frame([0.0, 1.0], lambda t: (1.0, t), (1.0, 0.0, 0.0), omega_rate=lambda t: (0.0, 1.0))
-    with pytest.raises(fb.FloatbaseError, match=r"unknown axes 'body'; .*base, world"):
-        bias_forces(judges.load("go2").standing(), axes="body")  # type: ignore[arg-type]
-    with pytest.raises(fb.FloatbaseError, match=r"r holds nan at index \[1\]"):
-        inward_acceleration((0.0, 0.0, 1.0), (1.0, np.nan, 0.0))

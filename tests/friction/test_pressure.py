@@ -5,6 +5,7 @@ from __future__ import annotations
 import judges
 import numpy as np
 import pytest
+from messages import raises, refused
 from scipy.spatial import ConvexHull
 
 import floatbase as fb
@@ -54,8 +55,7 @@ def test_the_ground_pushes_where_the_controller_planned() -> None:
 
 def test_without_pressure_there_is_no_centre() -> None:
     state = TALOS.standing()
-    with pytest.raises(InputError, match="no centre of pressure"):
-        centre_of_pressure(state, SOLES, np.zeros(24))
-    with pytest.raises(InputError, match=r"contacts\.only"):
+    refused(lambda: centre_of_pressure(state, SOLES, np.zeros(24)), InputError, 0)
+    with raises(InputError, "held"):
         held = SOLES + fb.Contacts([LinearConstraint("held", 1, lambda state, t: (np.eye(1, TALOS.nv), np.zeros(1)))])
         centre_of_pressure(state, held, np.zeros(25))

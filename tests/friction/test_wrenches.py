@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judges import Array
+from messages import raises, refused
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
@@ -217,7 +218,7 @@ def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight()
     assert wrenches.reach([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], carrying) == np.inf
     assert wrenches.reach([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(100.0)
     assert wrenches.reach([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0]) == np.inf
-    with pytest.raises(InfeasibleError, match="no wrench start"):
+    with raises(InfeasibleError, "start", "direction"):
         wrenches.reach([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
@@ -383,10 +384,8 @@ def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
         [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]], [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], 0.5
     )
     assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
-    with pytest.raises(InputError, match="has no end: .* Give max_normal_force"):
-        chimney.torques()
-    with pytest.raises(InputError, match="has no end"):
-        chimney.support_region()
+    refused(chimney.torques, InputError, "max_normal_force")
+    refused(chimney.support_region, InputError, "max_normal_force")
     limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
     assert limited.contains([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])
     assert len(limited.support_region()) >= 3
@@ -436,23 +435,21 @@ def test_turning_everything_turns_the_wrenches(seed: int) -> None:
 def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
     state, contacts = stance("go2", 4)
     rope = LinearConstraint("rope", 1, lambda s, t: (np.eye(1, s.robot.nv), np.zeros(1)))
-    cases = [
-        (lambda: wrench_set(state, fb.Contacts.none()), "at least one contact point"),
-        (lambda: wrench_set(state, contacts + fb.Contacts([rope])), "rope has forces without a cone"),
-        (lambda: wrench_set(contacts, contacts), "must be a State, .* not Contacts"),  # type: ignore[arg-type]
-        (lambda: wrench_set(state, state), "must be Contacts, .* not a State"),  # type: ignore[arg-type]
-        (lambda: wrench_set(state, contacts, facets=2), "facets is 2"),
-        (lambda: wrench_set(state, contacts, max_normal_force=0.0), "one number > 0 or 4 of them"),
-        (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "one number > 0 or 4 of them"),
-        (lambda: wrench_set(state, contacts, max_normal_force="much"), "one number > 0 or 4 of them"),
-        (lambda: wrench_set(state, contacts, max_normal_force=9.0).rows, "without limits on the normal force"),
-        (lambda: wrench_set(state, contacts).margin(np.zeros(3)), r"wrench has shape \(3,\)"),
-        (lambda: wrench_set(state, contacts).reach([np.nan] * 6), "direction holds nan"),
-        (lambda: wrench_set(state, contacts).reach(np.zeros(6)), "direction is the zero wrench"),
-        (lambda: wrench_set(state, contacts).horizontal_reach(0), "number of directions n is 0"),
-        (lambda: wrench_set(state, contacts).torques([1.0]), r"force has shape \(1,\)"),
-        (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "one FrictionPolyhedron for each of the 2"),
-    ]
-    for call, message in cases:
-        with pytest.raises(InputError, match=message):
-            call()
+    for call, *named in (
+        (lambda: wrench_set(state, fb.Contacts.none()),),
+        (lambda: wrench_set(state, contacts + fb.Contacts([rope])), "rope"),
+        (lambda: wrench_set(contacts, contacts), "state", "State", "Contacts"),  # type: ignore[arg-type]
+        (lambda: wrench_set(state, state), "contacts", "Contacts", "State"),  # type: ignore[arg-type]
+        (lambda: wrench_set(state, contacts, facets=2), "facets", 2),
+        (lambda: wrench_set(state, contacts, max_normal_force=0.0), "max_normal_force", 4),
+        (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "max_normal_force", 4),
+        (lambda: wrench_set(state, contacts, max_normal_force="much"), "max_normal_force", 4),
+        (lambda: wrench_set(state, contacts, max_normal_force=9.0).rows, "rows", "max_normal_force"),
+        (lambda: wrench_set(state, contacts).margin(np.zeros(3)), "wrench", 3, 6),
+        (lambda: wrench_set(state, contacts).reach([np.nan] * 6), "direction", np.nan),
+        (lambda: wrench_set(state, contacts).reach(np.zeros(6)), "direction"),
+        (lambda: wrench_set(state, contacts).horizontal_reach(0), "n", 0),
+        (lambda: wrench_set(state, contacts).torques([1.0]), "force", 1, 3),
+        (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "cones", "FrictionPolyhedron", 2),
+    ):
+        refused(call, InputError, *named)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cvxpy as cp
 import judges
 import mujoco
@@ -9,10 +11,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from judges import Array
+from messages import refused
 
 import floatbase as fb
 from floatbase import dynamics, linear_algebra, objectives
+from floatbase.affine import Quadratic
 from floatbase.dynamics import fixed_frame
+from floatbase.errors import InputError
 
 TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
 LEAN = judges.random_normals(4, 5)
@@ -340,35 +345,35 @@ def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration
 # what does not fit -------------------------------------------------------------------------------------------------------
 
 
-def test_forces_without_a_point_are_refused_by_name() -> None:
-    state = judges.load("go2").standing()
-    mixed = fb.Contacts.points(state.robot) + fb.Contacts([fixed_frame("base")])
-    for call in (
-        lambda: objectives.com_wrench(state, mixed),
-        lambda: objectives.wrench_objective(state, mixed, np.zeros(3), np.zeros(3)),
-        lambda: objectives.tangential_bias(mixed),
-        lambda: objectives.force_bias(mixed, 1.0, 0.0),
-    ):
-        with pytest.raises(fb.FloatbaseError, match="bolts of base has forces that do not act at points; leave it out"):
-            call()
+GO2 = judges.load("go2")
+STATE, FEET = GO2.standing(), fb.Contacts.points(GO2)
+MIXED = FEET + fb.Contacts([fixed_frame("base")])
+EOM = fb.equations_of_motion(STATE, FEET)
 
 
-@pytest.mark.parametrize("a", [[1.0, 2.0, 3.0], np.nan, [1.0, np.inf, 0.0, 0.0], "much"])
-def test_a_nominal_normal_force_that_does_not_fit_is_an_error_of_the_package(a: object) -> None:
-    with pytest.raises(fb.FloatbaseError):
-        objectives.normal_bias(fb.Contacts.points(judges.load("go2")), a)
-
-
-def test_other_values_that_do_not_fit_are_named() -> None:
-    state = judges.load("go2").standing()
-    contacts = fb.Contacts.points(state.robot)
-    with pytest.raises(fb.FloatbaseError, match="alpha is -1; it must be ≥ 0"):
-        objectives.force_bias(contacts, -1.0, 10.0)
-    with pytest.raises(fb.FloatbaseError, match=r"force has shape \(2,\); it must have shape \(3,\) \(N\)"):
-        objectives.wrench_objective(state, contacts, [1.0, 2.0], np.zeros(3))
-    with pytest.raises(fb.FloatbaseError, match=r"com_acceleration has shape \(2,\)"):
-        objectives.desired_wrench(state, [0.0, 0.0])
-    found = objectives.torque_for_forces(fb.equations_of_motion(state, contacts))
-    for call in (found.gap, found.nearest):
-        with pytest.raises(fb.FloatbaseError, match=r"forces has shape \(9,\); it must have shape \(12,\)"):
-            call(np.zeros(9))
+@pytest.mark.parametrize(
+    "case",
+    [
+        (lambda: objectives.com_wrench(STATE, MIXED), "bolts of base"),
+        (lambda: objectives.wrench_objective(STATE, MIXED, np.zeros(3), np.zeros(3)), "bolts of base"),
+        (lambda: objectives.tangential_bias(MIXED), "bolts of base"),
+        (lambda: objectives.force_bias(MIXED, 1.0, 0.0), "bolts of base"),
+        (lambda: objectives.normal_bias(FEET, [1.0, 2.0, 3.0]), "a", 3, 4),
+        (lambda: objectives.normal_bias(FEET, np.nan), "a", np.nan),
+        (lambda: objectives.normal_bias(FEET, [1.0, np.inf, 0.0, 0.0]), "a", np.inf),
+        (lambda: objectives.normal_bias(FEET, "much"), "a", "much"),
+        (lambda: objectives.force_bias(FEET, -1.0, 10.0), "alpha", -1),
+        (lambda: objectives.wrench_objective(STATE, FEET, [1.0, 2.0], np.zeros(3)), "force", 2, 3),
+        (lambda: objectives.desired_wrench(STATE, [0.0, 0.0]), "com_acceleration", 2, 3),
+        (lambda: objectives.torque_for_forces(EOM).gap(np.zeros(9)), "forces", 9, 12),
+        (lambda: objectives.torque_for_forces(EOM).nearest(np.zeros(9)), "forces", 9, 12),
+        (lambda: objectives.cost_on_torques(Quadratic.zero(12), EOM), 18, 12),
+        (
+            lambda: objectives.seen_from_best(Quadratic.zero(12), fb.feasible_space(EOM), "lambda"),
+            "lambda", "qdd", "tau", "forces",
+        ),
+    ],
+)  # fmt: skip
+def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+    call, *named = case
+    refused(call, InputError, *named)

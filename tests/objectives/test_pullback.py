@@ -6,11 +6,13 @@ import judges
 import numpy as np
 import pytest
 from judges import Array
+from messages import raises
 
 import floatbase as fb
 from floatbase import dynamics, objectives
 from floatbase.affine import Quadratic
 from floatbase.dynamics import EquationsOfMotion, fixed_frame
+from floatbase.errors import InputError
 
 BLOCKS = ("qdd", "tau", "forces")
 
@@ -198,7 +200,7 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
     squeeze = dynamics.internal_forces(eom)[:, 0]
     reward = objectives.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
     for call in (objectives.seen_from_best, objectives.best_coordinates):
-        with pytest.raises(fb.FloatbaseError, match="falls for ever along a direction without curvature. Add a cost"):
+        with raises(InputError):
             call(reward, space, "qdd")
     assert np.isfinite(objectives.seen_from_smallest(reward, space, "qdd")(np.zeros(18)))
 
@@ -208,7 +210,7 @@ def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> 
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     hill = objectives.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
-    with pytest.raises(fb.FloatbaseError, match="no minimum: its smallest curvature is -"):
+    with raises(InputError):
         objectives.seen_from_best(hill, space, "qdd")
 
 
@@ -238,15 +240,3 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
         beta = objectives.best_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)
         assert np.allclose(N.T @ (space.forces(beta) - desired), 0.0, atol=1e-3), weight
-
-
-def test_a_block_that_does_not_exist_is_named() -> None:
-    space = dynamics.feasible_space(judges.at_rest("go2"))
-    with pytest.raises(fb.FloatbaseError, match=r"no block 'lambda'; its blocks are \['qdd', 'tau', 'forces'\]"):
-        objectives.seen_from_best(Quadratic.zero(12), space, "lambda")
-
-
-def test_a_cost_of_another_size_is_refused() -> None:
-    eom = judges.at_rest("go2")
-    with pytest.raises(fb.FloatbaseError, match="the map gives 18 numbers, the cost takes 12"):
-        objectives.cost_on_torques(Quadratic.zero(12), eom)

@@ -86,7 +86,7 @@ def test_nobody_wins_by_waiting(card: Card) -> None:
 @pytest.mark.parametrize("card", [card for card in CARDS if "mass" in card.fixed], ids=lambda card: card.title)
 def test_what_may_not_be_changed_is_seen(card: Card) -> None:
     judge = play(card, [(0.0, change(mass=(1.0, 0.9))), *SOLUTIONS[card.title]], 2.0)
-    assert not judge.won and "mass may not be changed" in judge.says
+    assert not judge.won and "mass" in judge.says
 
 
 NEARLY = {

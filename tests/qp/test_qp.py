@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import copy
 import pickle
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Any
 
 import judges
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from messages import missing, raises, refused
 
 import floatbase as fb
 from floatbase.affine import Affine
-from floatbase.errors import InfeasibleError, InputError
+from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.qp import (
     INFEASIBLE,
     OPTIMAL,
@@ -25,10 +26,13 @@ from floatbase.qp import (
     Residuals,
     RowLabel,
     Solution,
+    active_set,
+    check_solver,
     conflicting_rows,
     linear_program,
     solve,
     solvers,
+    table_top,
 )
 
 seeds = st.integers(0, 100_000)
@@ -98,7 +102,7 @@ def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver: str) ->
     for right in (5.0, 1.0):
         assert np.allclose(solve(problems[right], solver).x, [1.0, 2.0], atol=1e-8)
         assert solve(problems[right], solver).residuals.stationarity < 1e-6
-    with pytest.raises(InfeasibleError, match="wall") as caught:
+    with raises(InfeasibleError, "wall") as caught:
         solve(problems[0.5], solver)
     assert caught.value.rows == ("wall",)
 
@@ -169,15 +173,12 @@ def test_rows_in_conflict_are_told_from_those_that_can_be_met(G: np.ndarray, h: 
 
 
 @pytest.mark.parametrize("solver", solvers())
-def test_the_error_of_an_infeasible_problem_names_its_rows_and_says_what_to_do(solver: str) -> None:
+def test_the_error_of_an_infeasible_problem_names_its_rows(solver: str) -> None:
     G, h = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]]), np.array([1.0, -2.0, 3.0])
     qp = QP(np.eye(2), np.zeros(2), *empty(2), G, h, inequality_names=("x ≤ 1", "x ≥ 2", "y ≤ 3"))
-    with pytest.raises(InfeasibleError) as caught:
+    with raises(InfeasibleError, "x ≤ 1", "x ≥ 2") as caught:
         solve(qp, solver)
     assert caught.value.rows == ("x ≤ 1", "x ≥ 2")
-    assert "no point satisfies all rows" in str(caught.value)
-    assert "these are in conflict: x ≤ 1, x ≥ 2." in str(caught.value)
-    assert "At least one of these rows has to be loosened" in str(caught.value)
 
 
 def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
@@ -226,37 +227,38 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
     G, h = np.vstack([-np.eye(6), np.ones(6)]), np.append(-np.ones(6), 5.0)
     with pytest.raises(InfeasibleError) as caught:
         solve(QP(np.eye(6), np.zeros(6), *empty(6), G, h, inequality_names=(*normal, *facets, "sixth", "sum")))
-    assert str(caught.value).splitlines() == [
-        "no point satisfies all rows. Given the equalities, these are in conflict:",
-        "  3 × normal force: FL, FR, RL",
-        "  2 × friction: FL facet 2, FL facet 3",
-        "  2 × other rows: sixth, sum",
-        "At least one of these rows has to be loosened or dropped; other rows may be in conflict too.",
-    ]
+    for line, named in zip(
+        str(caught.value).splitlines()[1:-1],
+        ((3, "normal force", "FL", "FR", "RL"), (2, "friction", "FL facet 2", "FL facet 3"), (2, "sixth", "sum")),
+        strict=True,
+    ):
+        assert not missing(line, *named)
 
 
 # bad input ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("make", "text"),
+    "case",
     [
-        (lambda: QP(np.eye(3), np.zeros(2), *empty(2), *empty(2)), r"H has shape \(3, 3\); it must have shape \(2, 2\)"),
-        (lambda: QP(np.eye(2), np.zeros(2), *empty(3), *empty(2)), r"A has shape \(0, 3\); it must have shape \(any, 2\)"),
-        (lambda: QP(np.eye(2), np.zeros(2), np.eye(2), [1.0], *empty(2)), r"b has shape \(1,\); .* \(2,\)"),
-        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), [1.0]), r"h has shape \(1,\); .* \(2,\)"),
-        (lambda: QP(np.eye(2), [0.0, np.nan], *empty(2), *empty(2)), r"g holds nan at index \[1\]"),
-        (lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]), r"h holds inf at index \[0\]"),
-        (
-            lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [1.0, 1.0], inequality_names=("a",)),
-            "1 inequality names for 2 rows; give one for each row, or none at all",
-        ),
-        (lambda: solve(SQUARE)["torques"], "this problem has no block 'torques'"),
+        (lambda: QP(np.eye(3), np.zeros(2), *empty(2), *empty(2)), InputError, "H", 3, 2),
+        (lambda: QP(np.eye(2), np.zeros(2), *empty(3), *empty(2)), InputError, "A", 3, 2),
+        (lambda: QP(np.eye(2), np.zeros(2), np.eye(2), [1.0], *empty(2)), InputError, "b", 1, 2),
+        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), [1.0]), InputError, "h", 1, 2),
+        (lambda: QP(np.eye(2), [0.0, np.nan], *empty(2), *empty(2)), InputError, "g", np.nan),
+        (lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]), InputError, "h", np.inf),
+        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=("a",)), InputError, 1, 2),
+        (lambda: QP(np.eye(1), np.zeros(1), *empty(1), [[1], [1]], [1, 1], inequality_names=("a", "a")), InputError, "a"),
+        (lambda: solve(SQUARE)["torques"], InputError, "torques"),
+        (lambda: check_solver("activeset"), UnknownNameError, "solver", "activeset", "active_set"),
+        (lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), InputError, "start", 3, 2),
+        (lambda: active_set(table_top(), working=["tabel"]), UnknownNameError, "tabel", "table"),
+        *[(lambda most=most: active_set(table_top(), most=most), InputError, "most", most) for most in (0, -1, 1.5, "3")],
+        (lambda: active_set(table_top(), most=True), InputError, "most", "True"),
     ],
 )
-def test_problems_that_do_not_fit_together_are_refused(make: Callable[[], object], text: str) -> None:
-    with pytest.raises(InputError, match=text):
-        make()
+def test_problems_that_do_not_fit_together_are_refused(case: tuple[Any, ...]) -> None:
+    refused(*case)
 
 
 def test_a_linear_program_says_optimal_infeasible_or_unbounded() -> None:

@@ -7,10 +7,11 @@ from fractions import Fraction
 import judges
 import numpy as np
 import pytest
+from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.errors import InfeasibleError, InputError, SolverError, UnknownNameError
-from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, check_solver, solve, solvers
+from floatbase.errors import InfeasibleError, SolverError
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, solve, solvers
 
 NONE = np.zeros((0, 2)), np.zeros(0)
 LAST_DIGITS = 1e-7  # N·m: a rounding of 1e-16 divided by a part of 1e-12 in curvature is 1e-4; polished answers leave some 1e-9
@@ -117,14 +118,13 @@ def test_every_solver_gives_the_controller_the_same_torques(name: str) -> None:
     ],
 )
 def test_every_solver_calls_an_objective_that_falls_for_ever_just_that(solver: str, qp: QP) -> None:
-    with pytest.raises(SolverError, match="has no minimum: it falls for ever .* regularisation"):
-        solve(qp, solver)
+    refused(lambda: solve(qp, solver), SolverError)
 
 
 @pytest.mark.parametrize("solver", solvers())
 def test_every_solver_calls_an_objective_that_curves_downwards_not_convex(solver: str) -> None:
     box = np.vstack([np.eye(2), -np.eye(2)])
-    with pytest.raises(SolverError, match="is not convex: along one direction its curvature is -1"):
+    with raises(SolverError, "H", -1):
         solve(QP(np.diag([1.0, -1.0]), [1.0, 0.0], *NONE, box, np.ones(4)), solver)
 
 
@@ -205,24 +205,15 @@ def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> Non
     A = np.array([[1.0, 0.0], [1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [0.0, 3.0]])
     names = ("x is 1", "sum is 3", "x is 1.5", "y is 2", "y is 2 again")
     qp = QP(np.eye(2), np.zeros(2), A, [1.0, 3.0, 3.0, 2.0, 6.0], *NONE, equality_names=names)
-    with pytest.raises(InfeasibleError, match="these equality rows are inconsistent: .* Drop one of them") as caught:
+    with pytest.raises(InfeasibleError) as caught:
         solve(qp, solver)
+    assert not missing(str(caught.value), *caught.value.rows)
     kept = [names.index(row) for row in caught.value.rows]
     assert set(caught.value.rows) in ({"x is 1", "x is 1.5"}, {"sum is 3", "x is 1.5", "y is 2"},
                                       {"sum is 3", "x is 1.5", "y is 2 again"})  # fmt: skip
     for row in kept:
         rest = [i for i in kept if i != row]
         assert QP(np.eye(2), np.zeros(2), A[rest], qp.b[rest], *NONE).equality_space.n_in >= 0
-
-
-def test_row_names_that_stand_twice_are_refused() -> None:
-    with pytest.raises(InputError, match="inequality name 'wall' stands twice; each row needs a name of its own"):
-        QP(np.eye(2), np.zeros(2), *NONE, np.eye(2), np.ones(2), inequality_names=("wall", "wall"))
-
-
-def test_a_solver_that_does_not_exist_is_refused_with_the_near_names() -> None:
-    with pytest.raises(UnknownNameError, match="unknown solver 'activeset'; near names: active_set"):
-        check_solver("activeset")
 
 
 def residual_torque(solution: Solution) -> float:

@@ -10,6 +10,7 @@ import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from messages import raises, refused, warns
 
 import floatbase as fb
 from floatbase.errors import InputError, RobotWarning
@@ -46,7 +47,7 @@ def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand
         assert np.allclose(state.h[6:], arm.standing().h)
         assert state.q[2] == pytest.approx(height)
     assert np.allclose(judges.stance(standing).positions(standing.standing())[:, 2], 0.0, atol=1e-9)
-    with pytest.raises(InputError, match="go2 has no bolts; unbolted takes a robot with a fixed base"):
+    with raises(InputError, "go2"):
         unbolted(judges.load("go2"))
 
 
@@ -57,7 +58,7 @@ def test_a_robot_is_the_one_of_example_robot_data_or_is_refused(name: str) -> No
     try:
         ours = fb.load(name, feet=[])
     except InputError as error:
-        assert name in CHANGED and any(word in str(error) for word in ("by changing it after reading", "are coupled"))
+        assert name in CHANGED and name in str(error)
         return
     state, data = ours.random_state(0), theirs.createData()
     q = np.array(state.q)
@@ -99,16 +100,10 @@ def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(name:
         assert judges.relative(state.h, h) < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("kind", "posture", "text"),
-    [
-        ("continuous", [2.0, 0.0], "posture.7:9., cosine and sine of 'elbow', has length 2"),
-        ("revolute", [10.0], "the posture of robot has elbow at 10; its limits are 0.5 and 2"),
-    ],
-)
-def test_a_joint_is_locked_only_where_it_can_be(kind: str, posture: list[float], text: str) -> None:
-    with pytest.raises(InputError, match=text):
-        fb.load_urdf(two_links(kind=kind), posture=[0.0] * 6 + [1.0, *posture], locked=["elbow"])
+def test_a_joint_is_locked_only_where_it_can_be() -> None:
+    for kind, posture, *numbers in (("continuous", [2.0, 0.0], 2), ("revolute", [10.0], 10, 0.5, 2)):
+        with raises(InputError, "posture", "elbow", *numbers):
+            fb.load_urdf(two_links(kind=kind), posture=[0.0] * 6 + [1.0, *posture], locked=["elbow"])
 
 
 def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice() -> None:
@@ -142,34 +137,33 @@ HUNG = """<link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" i
 
 
 @pytest.mark.parametrize(
-    ("urdf", "text"),
+    ("urdf", "named"),
     [
-        (two_links(mass=-0.5), r"<inertial> of link 'top' of robot has mass -0.5; it needs a mass ≥ 0, kg, and six numbers"),
-        (two_links(mass="inf"), "<inertial> of link 'top' of robot has mass inf"),
-        (two_links(mass="1,5"), "<inertial> of link 'top' of robot has mass 1,5"),
-        (two_links(iyy="nan"), "<inertial> of link 'top' of robot has iyy nan"),
-        (two_links(iyy=-0.1), "the link that joint 'elbow' moves of robot has a negative moment of inertia, -0.1 kg m²"),
-        (two_links().replace("0 1 0", "0 0 0"), "joint 'elbow' of robot has an <axis> of zeros; give its direction"),
-        (two_links(extra=LIMIT.replace("0.5", "3")), "'elbow' of robot has the lower limit 3 above the upper limit 2 .*Swap"),
-        (two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")), "lower limit 0 above the upper limit -2"),
-        (two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'), "a joint .* is called base"),
-        (two_links().replace('"base"', '"a"').replace('"top"', '"base"'), "a link .* is called base, .*rename"),
-        (two_links(joint="root_joint"), "a joint of robot is called root_joint, as Pinocchio calls that of a free base"),
-        (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), r"elbow mimics wrist.*Hold these joints still, locked=\['elbow'\]"),
-        (two_links(mass=0, iyy=0), "robot has a singular inertia M .*: elbow can accelerate without moving any mass"),
-        (two_links(extra=LIMIT + "<xacro:a/>"), "robot cannot be read as a URDF: unbound prefix.*run xacro first"),
-        (two_links(extra=""), "revolute joint 'elbow' has no <limit>, with lower, upper, effort and velocity"),
-        (two_links().replace('k name="top"', 'k name="base"'), "2 links are called 'base'; give each a name of its own"),
-        ("<html/>", "robot cannot be read as a URDF: its outermost element is <html>; that of a URDF is <robot>"),
-        (two_links().replace('"1"', '"0"', 4), "Give the links there mass and inertia, .*, or load it with floating=False"),
-        (two_links(kind="planar"), r"joint 'elbow' of robot moves in 3 ways; a motor drives one. Make it revolute"),
-        (two_links(kind="floating"), r"joint 'elbow' of robot moves in 6 ways; a motor drives one"),
-        ('<robot name="none"><link name="base"/></robot>', "robot has a mass of 0 kg; give its links <inertial> in the URDF"),
+        (two_links(mass=-0.5), ("inertial", "top", "mass", -0.5)),
+        (two_links(mass="inf"), ("inertial", "top", "mass", np.inf)),
+        (two_links(mass="1,5"), ("inertial", "top", "mass", "1,5")),
+        (two_links(iyy="nan"), ("inertial", "top", "iyy", np.nan)),
+        (two_links(iyy=-0.1), ("elbow", "inertia", -0.1)),
+        (two_links().replace("0 1 0", "0 0 0"), ("elbow", "axis")),
+        (two_links(extra=LIMIT.replace("0.5", "3")), ("elbow", "lower", 3, "upper", 2)),
+        (two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")), ("elbow", "lower", 0, "upper", -2)),
+        (two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'), ("joint", "base")),
+        (two_links().replace('"base"', '"a"').replace('"top"', '"base"'), ("link", "base")),
+        (two_links(joint="root_joint"), ("joint", "root_joint")),
+        (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), ("elbow", "wrist", "mimic", "locked")),
+        (two_links(mass=0, iyy=0), ("M", "elbow", "locked")),
+        (two_links(extra=LIMIT + "<xacro:a/>"), ("URDF", "xacro")),
+        (two_links(extra=""), ("elbow", "limit")),
+        (two_links().replace('k name="top"', 'k name="base"'), (2, "base")),
+        ("<html/>", ("html", "robot")),
+        (two_links().replace('"1"', '"0"', 4), ("M", "elbow", "floating=False")),
+        (two_links(kind="planar"), ("elbow", 3)),
+        (two_links(kind="floating"), ("elbow", 6)),
+        ('<robot name="none"><link name="base"/></robot>', ("mass", 0, "inertial")),
     ],
 )
-def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(urdf: str, text: str) -> None:
-    with pytest.raises(InputError, match=text):
-        fb.load_urdf(urdf)
+def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(urdf: str, named: tuple[str | float, ...]) -> None:
+    refused(lambda: fb.load_urdf(urdf), InputError, *named)
 
 
 def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equal_are_none() -> None:
@@ -181,23 +175,17 @@ def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equa
 
 def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_that_are_told() -> None:
     heavy = two_links(mass=20).replace("<mass", '<origin xyz="0.1 0 0"/><mass')
-    with pytest.warns(RobotWarning, match=r"robot sinks: its motors are too weak .*: elbow needs 17.2 and has 5"):
+    with warns(RobotWarning, "elbow", 17.2, 5):
         arm = fb.load_urdf(heavy, floating=False)
     assert arm.standing().q == pytest.approx([0.5])
-    with pytest.raises(InputError, match=r"the posture of robot has elbow at 0.4; its limits are 0.5 and 2 \(rad, or m\)"):
-        fb.load_urdf(heavy, floating=False, posture=[0.4])
-    with pytest.raises(InputError, match="nothing of robot moves: its base is fixed, and so are all its joints"):
-        fb.load_urdf(heavy, floating=False, locked=["elbow"])
+    refused(lambda: fb.load_urdf(heavy, floating=False, posture=[0.4]), InputError, "posture", "elbow", 0.4, 0.5, 2)
+    refused(lambda: fb.load_urdf(heavy, floating=False, locked=["elbow"]), InputError)
 
 
 def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"there is no file .*nothing\.urdf to read .*; give the path of a URDF file"):
-        fb.load_urdf(tmp_path / "nothing.urdf")
-    with pytest.raises(InputError, match="there is no file .* to read"):
-        fb.load_urdf("zero\0.urdf")
-    with pytest.raises(InputError, match=r'there is no file go2, but a robot of that name: fb.load\("go2"\) loads it'):
-        fb.load_urdf("go2")
+    refused(lambda: fb.load_urdf(tmp_path / "nothing.urdf"), InputError, "nothing.urdf")
+    refused(lambda: fb.load_urdf("zero\0.urdf"), InputError, "zero\0.urdf")
+    refused(lambda: fb.load_urdf("go2"), InputError, 'fb.load("go2")')
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot>")
-    with pytest.raises(InputError, match="broken cannot be read as a URDF"):
-        fb.load_urdf(broken)
+    refused(lambda: fb.load_urdf(broken), InputError, "broken", "URDF")

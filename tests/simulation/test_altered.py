@@ -7,6 +7,7 @@ import copy
 import judges
 import numpy as np
 import pytest
+from messages import raises
 
 import floatbase as fb
 from floatbase.control import Belief
@@ -147,7 +148,7 @@ def test_a_copy_is_on_its_own_and_mistakes_are_told() -> None:
     other = copy.copy(sim)
     other.world = World(mass=2.0)
     assert np.isclose(sim.model.body_mass.sum(), GO2.mass) and sim.world.mass == 1.0
-    with pytest.raises(UnknownNameError, match="FL_foot"):
+    with raises(UnknownNameError, "FL_fot", "FL_foot"):
         sim.world = World(untouched=["FL_fot"])
-    with pytest.raises(InputError, match="base_wrench"):
+    with raises(InputError, "base_wrench", 2, 6):
         sim.base_wrench = [1.0, 2.0]

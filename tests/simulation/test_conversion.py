@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from messages import raises
 
 import floatbase as fb
 from floatbase.errors import SimulationError
@@ -126,9 +127,8 @@ def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_pa
 
 
 def test_moving_links_with_an_impossible_inertia_are_named_with_the_joints_to_hold() -> None:
-    text = r"MuJoCo cannot move link 'r_hip_1' of icub_reduced .*principal inertias 0, 0, 0 kg.*locked=(\[.*\]) of fb.load"
-    with pytest.raises(SimulationError, match=text) as caught:
+    with raises(SimulationError, "r_hip_1", "icub_reduced", 0) as caught:
         fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"]))
-    found = re.search(text, str(caught.value))
+    found = re.search(r"locked=(\[.*?\])", str(caught.value))
     assert found
     fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"], locked=ast.literal_eval(found[1])))

@@ -62,13 +62,13 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slic
     ("status", "line"),
     [
         ("paused", "paused"),
-        ("fell", "fell: press reset, or push again"),
-        ("controller failed: no point satisfies all rows. In conflict:\n  6 × friction.", "rows: press reset, or push again"),
-        ("stopped: 0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd: press reset, or push again"),
+        ("fell", "fell"),
+        ("controller failed: no point satisfies all rows. In conflict:\n  6 × friction.", "rows"),
+        ("stopped: 0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
     ],
 )
 def test_what_stopped_a_run_is_told_in_one_sentence(status: str, line: str) -> None:
-    assert advice(status).endswith(line) and "\n" not in advice(status)
+    assert line in advice(status) and not {"\n", "Why", "6"} & {*advice(status), *advice(status).split()}
 
 
 class Held:
@@ -241,7 +241,7 @@ def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
     run = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append, idle=0.2)
     run.start()
     until(lambda: run.status == IDLE)
-    assert slices and advice(run.status) == f"{IDLE}: press run"
+    assert slices and IDLE in advice(run.status)
     before = slices[-1].time[-1]
     run.start()  # it goes on from there
     until(lambda: run.status == IDLE and slices[-1].time[-1] > before)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from messages import missing, raises
 
 import floatbase as fb
 from floatbase.errors import InputError, SimulationError, UnknownNameError
@@ -90,8 +91,7 @@ def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(tm
     full = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     kept = Table.read(tmp_path / "marked.jsonl")
     assert full.returncode == 1 and 0 < len(kept) < 60
-    last = "InputError: marked.jsonl cannot be written to: File too large. The rows before are kept: once the file takes more, "
-    assert full.stderr.splitlines()[-1].endswith(last + "the same sweep goes on from them.")
+    assert not missing(full.stderr.splitlines()[-1], "InputError", "marked.jsonl", "File too large")
     assert (tmp_path / "marked.jsonl").stat().st_size == 400, "the last row was written in part"
     script.write_text(SCRIPT)
     before = len((tmp_path / "calls").read_text().split())
@@ -117,7 +117,7 @@ def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path:
         running = thread.submit(fb.sweep, patient, {"i": [0, 1, 2, 3]}, setup=setup, workers=1, progress=False)
         while not (tmp_path / "begun").exists() and not running.done():
             time.sleep(0.02)
-        with pytest.raises(InputError, match="holds a value of type object"):
+        with raises(InputError, "result", "object"):
             fb.sweep(lambda i: object(), {"i": [0, 1]}, workers=1, progress=False)
         (tmp_path / "failed").touch()
         assert list(running.result()["result"]) == [0, 1, 2, 3]
@@ -141,12 +141,12 @@ def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
         by_address = fb.sweep(power, GRID, setup=setup, cluster=cluster.scheduler_address, progress=False)
         with distributed.Client(cluster) as client:
             by_client = fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
-            with pytest.raises(InputError, match="holds a value of type object"):
+            with raises(InputError, "result", "object"):
                 fb.sweep(lambda n: object(), {"n": [1, 2]}, cluster=client, progress=False)
             cluster.scheduler.allowed_failures = 0  # else it tries three times more
-            with pytest.raises(SimulationError, match="the cluster broke down at a point"):
+            with raises(SimulationError, "KilledWorker"):
                 fb.sweep(lambda n: os.kill(os.getpid(), 9), {"n": [1]}, cluster=client, progress=False)
-        with pytest.raises(InputError, match="the Dask client is closed"):
+        with raises(InputError, "Dask"):
             fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
     assert without_process(here) == without_process(by_address) == without_process(by_client)
     assert len(here.errors) == 2
@@ -165,27 +165,27 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
 
     first = fb.sweep(square, {"x": [1, 2.5]}, to=path, workers=1, progress=False)
     kept = path.read_bytes()
-    for function, grid, message in (
-        (cube, {"x": [1, 2.5]}, "of the function square, this sweep has cube"),
-        (square, {"x": [1, 2.5, 3]}, "of the number of points 2, this sweep has 3"),
-        (square, {"x": [1, 2.6]}, "of the same parameters at other values"),
+    for function, grid, named in (
+        (cube, {"x": [1, 2.5]}, ("square", "cube")),
+        (square, {"x": [1, 2.5, 3]}, (2, 3)),
+        (square, {"x": [1, 2.6]}, ()),
     ):
-        with pytest.raises(InputError, match=message):
+        with raises(InputError, "rows.jsonl", *named):
             fb.sweep(function, grid, to=path, progress=False)
     assert fb.sweep(square, {"x": [1, 2.5]}, to=path, progress=False).rows == first.rows == Table.read(path).rows
     assert path.read_bytes() == kept
     for content in ("a diary", "a diary\nof two lines\n", json.dumps({"point": 0}) + "\n"):
         path.write_text(content)
-        with pytest.raises(InputError, match="a file of no sweep; it is left as it is"):
+        with raises(InputError, "rows.jsonl"):
             fb.sweep(square, {"x": [1, 2.5]}, to=path, progress=False)
         assert path.read_text() == content
-    with pytest.raises(InputError, match="No such file"):
+    with raises(InputError, "nowhere/rows.jsonl"):
         fb.sweep(square, {"x": [1]}, to=tmp_path / "nowhere" / "rows.jsonl", progress=False)
-    with pytest.raises(InputError, match="knows its function by its name"):
+    with raises(InputError, "lambda"):
         fb.sweep(lambda x: x, {"x": [1]}, to=path, progress=False)
-    with pytest.raises(InputError, match="to must be the path of a file, .* not 3"):
+    with raises(InputError, "to", 3):
         fb.sweep(square, {"x": [1]}, to=3, progress=False)
-    with pytest.raises(UnknownNameError, match=r"unknown column 0; known: error, result, x\. table\.rows are its rows"):
+    with raises(UnknownNameError, 0, "error", "result", "x", "table.rows"):
         list(first)
 
 
@@ -193,24 +193,24 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.C
     def square(x: float) -> float:
         return x * x
 
-    for function, grid, options, message in (
-        (3, {"x": [1]}, {}, "needs a function first, not 3"),
-        (square, {}, {}, "the grid has no points"),
-        (square, [], {}, "the grid has no points"),
-        (square, {"x": []}, {}, "'x' has no values"),
-        (square, {"x": 1.0}, {}, "'x' must be a list of values, not 1.0"),
-        (square, [{"x": 1}, 2], {}, "a dict for each point, name -> value; it has 2"),
-        (square, {"error": [1]}, {}, "cannot be called 'error'"),
-        (square, {"y": [1]}, {}, r"the grid gives y; square takes \(x: "),
-        (square, [{"x": 1}, {"x": 1, "y": 1}], {}, "the grid gives x, y; square takes"),
-        (square, {"x": [square]}, {}, "parameter x cannot be stored: it holds a value of type function"),
-        (square, {"x": [1]}, {"to": 3.5}, r"to must be the path of a file, such as \"rows.jsonl\", not 3.5"),
-        (square, {"x": [1]}, {"workers": 0}, "workers is 0; it must be a whole number of processes ≥ 1"),
-        (square, {"x": [1]}, {"workers": 1.5}, "workers is 1.5"),
-        (square, {"x": [1]}, {"workers": 1, "cluster": "tcp://127.0.0.1:1"}, "Leave one of the two out"),
-        (square, {"x": [1]}, {"setup": 3}, "setup must be a function"),
+    for function, grid, options, *named in (
+        (3, {"x": [1]}, {}, "sweep", 3),
+        (square, {}, {}, "grid"),
+        (square, [], {}, "grid"),
+        (square, {"x": []}, {}, "grid", "x"),
+        (square, {"x": 1.0}, {}, "grid", "x", 1.0),
+        (square, [{"x": 1}, 2], {}, "grid", 2),
+        (square, {"error": [1]}, {}, "error"),
+        (square, {"y": [1]}, {}, "grid", "y", "square", "x"),
+        (square, [{"x": 1}, {"x": 1, "y": 1}], {}, "grid", "x", "y", "square"),
+        (square, {"x": [square]}, {}, "x", "function"),
+        (square, {"x": [1]}, {"to": 3.5}, "to", 3.5),
+        (square, {"x": [1]}, {"workers": 0}, "workers", 0),
+        (square, {"x": [1]}, {"workers": 1.5}, "workers", 1.5),
+        (square, {"x": [1]}, {"workers": 1, "cluster": "tcp://127.0.0.1:1"}, "workers", "cluster"),
+        (square, {"x": [1]}, {"setup": 3}, "setup", 3),
     ):
-        with pytest.raises(InputError, match=message):
+        with raises(InputError, *named):
             fb.sweep(function, grid, **options)
     assert capfd.readouterr().err == ""
 
@@ -224,10 +224,10 @@ def test_the_bar_counts_points_and_failures_and_can_be_switched_off(capfd: pytes
     fb.sweep(lambda x: 1 / x, {"x": [0, 1]}, workers=1)
     bar = capfd.readouterr().err
     assert "2/2" in bar and "failed=1" in bar
-    with pytest.raises(InputError, match="the function's result 'x' must be called otherwise"):
+    with raises(InputError, "result", "x"):
         fb.sweep(lambda x: {"x": x}, {"x": [0, 1]}, workers=1, progress=False)
     with pytest.raises(ZeroDivisionError):
         fb.sweep(lambda made, x: x, {"x": [0]}, setup=lambda: 1 / 0, workers=1, progress=False)
-    with pytest.raises(fb.FloatbaseError, match="a worker process ended in the middle of a point"):
+    with raises(SimulationError):
         fb.sweep(lambda x: os.kill(os.getpid(), 9), {"x": [0]}, workers=1, progress=False)
     assert capfd.readouterr().err == ""

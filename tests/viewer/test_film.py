@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browsers import needs_chromium
+from messages import raises, refused
 from PIL import Image
 
 import floatbase as fb
@@ -37,7 +38,7 @@ def test_a_film_that_would_take_hours_is_refused(tmp_path: Path) -> None:
     run = fb.rollout(fb.Simulation(robot), ConstantTorques(np.zeros(6)), 0.2)
     view = fb.Viewer(robot)
     view.play(run, speed=1e-3)
-    with pytest.raises(ViewerError, match="would last 199 s, and may last 120 s: play less, or faster"):
+    with raises(ViewerError, 199, 120):
         view.save(tmp_path / "slow.gif", size=SIZE)
     view.close()
 
@@ -70,16 +71,13 @@ def test_a_gif_repeats_and_an_image_is_its_first_picture(view: fb.Viewer, tmp_pa
 
 
 def test_what_a_film_needs_is_told(view: fb.Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ViewerError, match="choose a folder that exists"):
-        view.save(tmp_path / "nowhere" / "push.gif")
-    with pytest.raises(ViewerError, match=r"end the name in .html, .mp4, .gif or .png"):
-        view.save(tmp_path / "push.avi")
+    refused(lambda: view.save(tmp_path / "nowhere" / "push.gif"), ViewerError, "nowhere/push.gif")
+    refused(lambda: view.save(tmp_path / "push.avi"), ViewerError, "push.avi", "html", "mp4", "gif", "png")
     for size in ((321, 200), (20, 20), (10_000, 200)):
-        with pytest.raises(InputError, match="even numbers of pixels from 100 to 4000"):
+        with raises(InputError, "size", *size, 100, 4000):
             view.save(tmp_path / "push.mp4", size=size)
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
-    with pytest.raises(ViewerError, match=r"playwright.* is not installed; that needs .*floatbase\[video\]"):
-        view.save(tmp_path / "push.png", size=SIZE)
+    refused(lambda: view.save(tmp_path / "push.png", size=SIZE), ViewerError, "playwright", "floatbase[video]")
 
 
 @needs_chromium
@@ -87,5 +85,4 @@ def test_a_machine_without_a_browser_is_told(view: fb.Viewer, tmp_path: Path, mo
     pytest.importorskip("playwright", reason="playwright is not installed")
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))
-    with pytest.raises(ViewerError, match="no browser starts, so no film can be made"):
-        view.save(tmp_path / "push.png", size=SIZE)
+    refused(lambda: view.save(tmp_path / "push.png", size=SIZE), ViewerError, "browser")

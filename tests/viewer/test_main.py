@@ -13,6 +13,7 @@ from threading import Event
 
 import numpy as np
 import pytest
+from messages import missing
 from waiting import PATIENCE, until
 
 from floatbase.__main__ import main, start_when_seen
@@ -29,9 +30,9 @@ def test_the_robots_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", "go3", "--no-browser"]) == 2
-    assert "floatbase: unknown robot 'go3'; near names: go2" in capsys.readouterr().err
+    assert not missing(capsys.readouterr().err, "go3", "go2")
     assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
-    assert "port is 99999" in capsys.readouterr().err
+    assert not missing(capsys.readouterr().err, "port", 99999)
 
 
 def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -183,7 +184,7 @@ def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> Non
     until(lambda: playground.session.last is not None)
     playground.view.close()
     until(lambda: playground.run.status != "running")
-    assert "window is closed" in playground.run.status
+    assert "window" in playground.run.status
     playground.run.close()
 
 

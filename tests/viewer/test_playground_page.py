@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from messages import raises
 from waiting import until
 
 import floatbase as fb
@@ -145,7 +146,7 @@ def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(page, field
 
 
 def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(field: Playground) -> None:
-    with pytest.raises(TypeError, match="frction"):
+    with raises(TypeError, "frction"):
         field.set(frction=(0.5, 0.5))
     field.run.pause()
     field.set(facets=6)  # while its last slice may still run

@@ -11,6 +11,7 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import given
+from messages import raises, refused
 
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
@@ -205,7 +206,7 @@ def test_a_valley_is_drawn_where_it_is_and_nothing_of_a_side_below_the_other(go2
     np.testing.assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
     assert ground.clearances(shadow).min() == pytest.approx(0.0, abs=1e-5)
     viewer.close()
-    with pytest.raises(InputError, match="must point upwards"):
+    with raises(InputError, "ground"):
         Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
 
 
@@ -302,7 +303,7 @@ def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> No
     viewer.show(standing)
     before = viewer.window.scene.commands()
     for path in ("", "/", "//"):
-        with pytest.raises(InputError, match="has no name; give it one, as below"):
+        with raises(InputError, "path"):
             viewer.show(standing, extra={path: shapes.label([0.0, 0.0, 0.0], "x", 0.1)})
     assert viewer.window.scene.commands() == before
 
@@ -408,25 +409,24 @@ def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(viewer: Viewer,
 
 
 @pytest.mark.parametrize(
-    ("values", "words"),
+    ("name", "value", "number"),
     [
-        ({"angle": 0.0}, "angle of a View is 0; it must be > 0 degrees"),
-        ({"angle": 180.0}, "angle of a View is 180; it must be below 180 degrees"),
-        ({"angle": np.nan}, "angle of a View is nan; it must be > 0"),
-        ({"azimuth": np.nan}, "azimuth of a View is nan; it must be a finite number"),
-        ({"azimuth": "front"}, "azimuth of a View must be a number \\(degrees\\), not 'front'"),
-        ({"elevation": None}, "elevation of a View must be a number \\(degrees\\), not None"),
-        ({"elevation": 91.0}, "elevation of a View is 91; it must be from -90 .below. to 90"),
-        ({"distance": 0.0}, "distance of a View is 0; it must be > 0"),
-        ({"around": (0.0, 0.0, 0.3)}, r"around of a View is .*; it must be a point and a radius, as"),
-        ({"around": ((0.0, 0.0), 0.3)}, r"point in around of a View has shape \(2,\)"),
-        ({"around": ((0.0, 0.0, np.inf), 0.3)}, "point in around of a View holds inf"),
-        ({"around": ((0.0, 0.0, 0.3), 0.0)}, "radius in around of a View is 0; it must be > 0 m"),
+        ("angle", 0.0, 0),
+        ("angle", 180.0, 180),
+        ("angle", np.nan, np.nan),
+        ("azimuth", np.nan, np.nan),
+        ("azimuth", "front", "front"),
+        ("elevation", None, "None"),
+        ("elevation", 91.0, 91),
+        ("distance", 0.0, 0),
+        ("around", (0.0, 0.0, 0.3), 0.3),
+        ("around", ((0.0, 0.0), 0.3), 2),
+        ("around", ((0.0, 0.0, np.inf), 0.3), np.inf),
+        ("around", ((0.0, 0.0, 0.3), 0.0), 0),
     ],
 )
-def test_what_no_camera_can_do_is_explained(values: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        View(**values)
+def test_what_no_camera_can_do_is_refused_by_name(name: str, value: Any, number: str | float) -> None:
+    refused(lambda: View(**{name: value}), InputError, name, "View", number)
 
 
 def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
@@ -478,32 +478,24 @@ def test_the_name_of_a_robot_is_text_in_the_notebook(go2: Robot) -> None:
     assert 'title="a &quot;&lt;b&gt;&quot;"' in view._repr_mimebundle_()["text/html"]
 
 
-def test_wrong_input_is_explained(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
+def test_wrong_input_is_refused_by_name(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
     other, locked = load("solo12").standing(), load("go2", locked=["FL_hip_joint"]).standing()
-    for wrong, words in (
-        (
-            lambda: viewer.show(other),
-            "this viewer shows Robot.'go2'.*, but the state is one of Robot.'solo12'.*make a Viewer",
-        ),
-        (lambda: viewer.show(locked), "this viewer shows Robot.'go2'.*, but the state is one of Robot.'go2'.*d=11 joints"),
-        (lambda: viewer.show(standing, ghost=locked), "this viewer shows Robot.'go2'.*, but the state is one of Robot.'go2'"),
-        (lambda: viewer.show(standing.q), "state must be a State, as robot.standing.., not an array"),
-        (lambda: viewer.show(standing, forces=np.zeros(12)), "forces were given without contacts.*pass contacts="),
-        (
-            lambda: viewer.show(standing, contacts, np.zeros(9)),
-            r"forces has shape \(9,\); 4 contact points .* \(12,\) or \(4, 3\)",
-        ),
-        (lambda: viewer.show(standing, contacts, planned=np.full(12, np.nan)), r"planned holds nan at index \[0, 0\]"),
-        (lambda: viewer.camera("above"), "camera view is 'above'; it must be one of default, front"),
-        (lambda: viewer.camera(90.0), "camera view is 90.0; it must be one of default, .* or a View"),  # type: ignore[arg-type]
-        (lambda: Viewer("go2"), "robot must be a Robot, as fb.load"),
-        (lambda: Viewer(go2, background="pink"), "background is 'pink'; it must be one of white, light, dark"),
-        (lambda: Viewer(go2, ground=[1, 0, 0]), "the normal of the ground must point up"),
-        (lambda: Viewer(go2, facets=2), "facets is 2; .* whole number ≥ 3"),
-        (lambda: Viewer(go2, scale=-1), "scale is -1; it must be > 0 m/N"),
+    for wrong, *named in (
+        (lambda: viewer.show(other), "go2", "solo12"),
+        (lambda: viewer.show(locked), "go2", 12, 11),
+        (lambda: viewer.show(standing, ghost=locked), "go2", 12, 11),
+        (lambda: viewer.show(standing.q), "state", "State", 19),
+        (lambda: viewer.show(standing, forces=np.zeros(12)), "forces", "contacts"),
+        (lambda: viewer.show(standing, contacts, np.zeros(9)), "forces", 9, 12),
+        (lambda: viewer.show(standing, contacts, planned=np.full(12, np.nan)), "planned", np.nan),
+        (lambda: viewer.camera("above"), "above", "front"),
+        (lambda: viewer.camera(90.0), 90, "View"),  # type: ignore[arg-type]
+        (lambda: Viewer("go2"), "robot", "Robot", "go2"),
+        (lambda: Viewer(go2, background="pink"), "background", "pink", "white", "light", "dark"),
+        (lambda: Viewer(go2, ground=[1, 0, 0]), "ground", 1),
+        (lambda: Viewer(go2, facets=2), "facets", 2),
+        (lambda: Viewer(go2, scale=-1), "scale", -1),
     ):
-        with pytest.raises(InputError, match=words):
-            wrong()
+        refused(wrong, InputError, *named)
     viewer.close()
-    with pytest.raises(ViewerError, match="window is closed"):
-        viewer.show(standing)
+    refused(lambda: viewer.show(standing), ViewerError)

@@ -26,6 +26,7 @@ import pytest
 import tornado.httpclient
 import tornado.websocket
 import umsgpack
+from messages import raises, refused
 from waiting import PATIENCE, until
 
 from floatbase.errors import FloatbaseError, ViewerError
@@ -150,7 +151,7 @@ def test_threads_that_ask_for_the_port_at_once_get_the_same_one(window: Window) 
 def test_a_closed_window_that_had_no_page_opens_none() -> None:
     window = Window()
     window.close()
-    with pytest.raises(ViewerError, match=r"window is closed, so it has no page; open a new one"):
+    with pytest.raises(ViewerError):
         _ = window.port
     assert repr(window) == "Window(closed)"
 
@@ -176,20 +177,19 @@ def test_a_closed_window_says_so() -> None:
     window.close()
     window.close()
     assert not window.is_open
-    with pytest.raises(ViewerError, match=r"window is closed.*open a new one"):
+    with pytest.raises(ViewerError):
         meshcat.Visualizer(window=window)["a"].set_object(meshcat.geometry.Sphere(0.1))
 
 
 def test_a_taken_port_is_an_error_that_names_it(window: Window) -> None:
-    with pytest.raises(ViewerError, match=rf"port {window.port} .* cannot be used .*choose another port"):
+    with raises(ViewerError, "port", window.port):
         Window(port=window.port)
     assert issubclass(ViewerError, FloatbaseError)
 
 
 @pytest.mark.parametrize("port", [-1, 65536, 3.5, "8000", True])
 def test_a_port_that_is_none_is_an_error(port: object) -> None:
-    with pytest.raises(ViewerError, match=r"from 0 .a free one. to 65535"):
-        Window(port=port)  # type: ignore[arg-type]
+    refused(lambda: Window(port=port), ViewerError, "port", 0, 65535)  # type: ignore[arg-type]
 
 
 def test_a_port_is_free_at_once_after_close() -> None:
@@ -201,14 +201,11 @@ def test_a_port_is_free_at_once_after_close() -> None:
 
 def test_no_browser_is_an_error_at_once(window: Window) -> None:
     start = time.monotonic()
-    with pytest.raises(ViewerError, match=r"no browser shows this window.*open the page at its `web_url`"):
-        window.get_image()
+    refused(window.get_image, ViewerError, "web_url")
     assert not window.listens
     assert window.web_url == f"http://127.0.0.1:{window.port}/"
-    with pytest.raises(ViewerError, match=r"no browser shows this window.*open http://127.0.0.1"):
-        window.get_image()
-    with pytest.raises(ViewerError, match=r"no browser opened http://127.0.0.1.* within 0.1 s"):
-        window.wait(timeout=0.1)
+    refused(window.get_image, ViewerError, window.web_url)
+    refused(lambda: window.wait(timeout=0.1), ViewerError, window.web_url, 0.1)
     assert time.monotonic() - start < 8.0  # one that is there may take 10 s to answer
 
 
@@ -217,13 +214,13 @@ def test_unknown_commands_are_refused(window: Window) -> None:
         def lower(self) -> dict:
             return {"type": "nonsense", "path": ""}
 
-    with pytest.raises(ViewerError, match=r"unknown viewer command 'nonsense'; known: set_object"):
+    with raises(ViewerError, "nonsense", "set_object"):
         window.send(Nonsense())
 
 
 def test_another_origin_is_refused(window: Window) -> None:
     async def tries() -> None:
-        with pytest.raises(tornado.httpclient.HTTPClientError, match="403"):
+        with raises(tornado.httpclient.HTTPClientError, 403):
             await connect(window, origin="http://evil.example")
         own = await connect(window, origin=window.web_url.rstrip("/"))
         own.close()
@@ -234,7 +231,7 @@ def test_another_origin_is_refused(window: Window) -> None:
 def test_another_host_name_is_refused(window: Window) -> None:
     for path in ("", "main.min.js", "socket"):
         request = urllib.request.Request(window.web_url + path, headers={"Host": "evil.example"})
-        with pytest.raises(urllib.error.HTTPError, match="403"):
+        with raises(urllib.error.HTTPError, 403):
             urllib.request.urlopen(request, timeout=PATIENCE)
     assert urllib.request.urlopen(window.web_url, timeout=PATIENCE).status == 200
 
@@ -411,6 +408,6 @@ def test_what_no_page_says_is_ignored(window: Window, caplog: pytest.LogCaptureF
     in_a_loop(say())
     assert heard == [("slider", 0.5), ("slider", 1.0), ("box", False), ("broken", None)]
     told = [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")]
-    assert [record.getMessage() for record in told] == ["the control 'broken' failed"]
+    assert len(told) == 1 and "broken" in told[0].getMessage()
     assert "of the callback" in str(told[0].exc_info)
     assert window.is_open
