@@ -54,6 +54,7 @@ def test_the_soles_of_every_state_are_level_and_straight():
                 assert np.allclose(state.frame_pose(foot.frame).rotation, np.eye(3), atol=1e-12)
 
 
+@pytest.mark.front_end
 def test_a_process_gives_the_torques_of_its_controller():
     problem = peer_problems.problem("go2", "tsid")
     states = problem.states("medium", 2)
@@ -74,6 +75,7 @@ def test_a_task_of_ones_own_is_measured_on_the_same_problem():
         assert np.allclose(own(q, v).tau, package(q, v).tau, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.front_end
 def test_a_process_that_ends_says_why(tmp_path):
     script = tmp_path / "broken.py"
     script.write_text("raise SystemExit('there is no such library')")
@@ -106,6 +108,7 @@ def test_times_are_given_for_equal_torques_alone():
     assert "Not measured: placo. There is no network." in other
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("name", soak.SOAKS)
 def test_a_short_soak_holds(name, monkeypatch):
     monkeypatch.setattr(soak, "SAMPLES", 2)
@@ -116,6 +119,7 @@ def test_a_short_soak_holds(name, monkeypatch):
     assert (row.name, row.times, row.broken) == (name, 3, "")
 
 
+@pytest.mark.front_end
 def test_a_soak_tells_what_stays_and_what_breaks(monkeypatch):
     kept = []
 

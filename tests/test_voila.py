@@ -25,7 +25,7 @@ PLAYGROUND = 'from floatbase.playground import playground\nplayground("go2")'
 ICONS = "/@fortawesome/"
 MASS = "viewer.gui_controllers['mass [×] true']"
 
-pytestmark = [needs_chromium, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.front_end, needs_chromium, pytest.mark.timeout(600)]
 pytest.importorskip("voila", reason="Voilà is not installed")
 
 
