@@ -66,6 +66,7 @@ test: TIER := -m "not front_end"
 test test-all: $(VENV)/tests-$(KEY)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/python .ci/lint.py
 	$(BIN)/python -m pytest $(WORKERS) $(TIER) --durations=30 $(PYTEST_ARGS)
 
 site: $(VENV)/tests-$(KEY)
