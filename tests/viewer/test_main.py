@@ -50,6 +50,7 @@ def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert process.wait(timeout=20) == 0
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     command = [sys.executable, "-m", "floatbase", "view", "ur5", "--no-browser"]

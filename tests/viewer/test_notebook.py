@@ -397,6 +397,7 @@ push_panel(live(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(s
 )
 
 
+@pytest.mark.front_end
 def test_a_saved_notebook_shows_every_picture_as_html(tmp_path: Path) -> None:
     saved = NotebookClient(new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120).execute()
     saved.metadata.pop("widgets")  # JupyterLab saves no widgets by default
