@@ -1,5 +1,5 @@
-# `make lab` opens the course, `make test` checks everything, `make site` builds the web site. All first make .venv, from the exact
-# lock in environment.txt.
+# `make lab` opens the course, `make test` tests it, `make site` builds the web site. All first make .venv, from the exact lock
+# in environment.txt.
 #
 #   PYTHON=…       the Python to use, such as python3.12 or a path; without it that of .venv, or the first of python3, python3.13, …
 #                  that fits
@@ -9,7 +9,7 @@
 #   LOCK_ARGS=…    more options for `uv pip compile`, such as --upgrade
 
 .DEFAULT_GOAL := help
-.PHONY: help lab test site setup lock clean python
+.PHONY: help lab test test-all site setup lock clean python
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -31,8 +31,8 @@ FIRST := /lab/tree/my/00_start_here.ipynb
 # which tabs were open is kept with this copy of the course, so that tabs of another copy do not open here
 TABS := $(CURDIR)/$(VENV)/workspaces
 
-# two processes share the files of tests; the slowest files come first (tests/conftest.py)
-WORKERS := -n 2 --dist loadfile --no-loadscope-reorder
+# two processes share the tests; the slowest come first (tests/conftest.py)
+WORKERS := -n 2 --dist worksteal
 
 # how often JupyterLab saves, s; its own is every two minutes
 SAVING := {"@jupyterlab/docmanager-extension:plugin": {"autosaveInterval": 30}}
@@ -47,7 +47,8 @@ PROGRESS := n=0; while read -r what which rest; do case "$$what $$which" in \
 
 help:
 	@echo "make lab     open the course in JupyterLab"
-	@echo "make test    run ruff, mypy, the tests and the notebooks"
+	@echo "make test    run ruff, mypy, the tests and the lessons"
+	@echo "make test-all  also test JupyterLab, Voilà, a hub, the site, films and every detail of the pages"
 	@echo "make site    run the lessons and build the web site, into build/site"
 	@echo "make setup   only make .venv"
 	@echo "make lock    write environment.txt anew from pyproject.toml"
@@ -61,10 +62,12 @@ lab: setup
 	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
 		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(QUIET) $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
-test: $(VENV)/tests-$(KEY)
+test: TIER := -m "not front_end"
+test test-all: $(VENV)/tests-$(KEY)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest $(WORKERS) --durations=30 $(PYTEST_ARGS)
+	$(BIN)/python .ci/lint.py
+	$(BIN)/python -m pytest $(WORKERS) $(TIER) --durations=30 $(PYTEST_ARGS)
 
 site: $(VENV)/tests-$(KEY)
 	$(BIN)/python -m floatbase.lessons.publish site $(SITE_ARGS)

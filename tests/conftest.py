@@ -16,8 +16,11 @@ import numpy as np
 import psutil
 import pytest
 
-# started first, so that no worker is left alone with one of them at the end
-SLOWEST = ("test_lab", "test_notebooks", "test_browser", "test_displays", "test_main")
+# What takes longest is started first, so that no worker is left alone with it at the end:
+# each lesson by itself, and these files as a whole.
+LESSONS = "test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything"
+SLOWEST = ("test_site", "test_lab", "test_hub", "test_voila", "test_playground_page", "test_convert", "test_main")
+ENDING = 5.0  # s that a process may take to end after the tests have ended it
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices of 30 rows: more threads only wait for one another
@@ -59,10 +62,11 @@ def no_idle_workers() -> Iterator[None]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """End the processes that tests have left, browsers and kernels say, and fail when there are any."""
+    """End the processes that tests have left running, such as browsers and kernels, and fail if there are any."""
     if not is_no_worker(session.config):
         return
-    left = [process for process in psutil.process_iter() if is_left(process)]
+    _, left = psutil.wait_procs([process for process in psutil.process_iter() if is_left(process)], timeout=ENDING)
+    left = [process for process in left if is_left(process)]
     for process in left:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
         with suppress(psutil.Error):
@@ -72,13 +76,15 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def is_left(process: psutil.Process) -> bool:
-    """Whether a process, whoever is its parent now, has been started by these tests: it has their folder.
+    """Whether a process, whoever is its parent now, has been started by these tests and runs on: it has their folder.
 
-    Python's own resource tracker of process pools ends with the process that has it.
+    One that has ended is a zombie, or has no command line, until its parent knows. Python's own resource tracker of process
+    pools ends with the process that has it.
     """
     try:
-        ours = process.environ().get("TMPDIR") == tempfile.tempdir
-        return ours and not any("resource_tracker" in word for word in process.cmdline())
+        words = process.cmdline()
+        ours = words and process.environ().get("TMPDIR") == tempfile.tempdir
+        return bool(ours) and not any("resource_tracker" in word for word in words)
     except psutil.Error:  # of another user, or gone
         return False
 
@@ -103,5 +109,19 @@ def pytest_report_header(config: pytest.Config) -> str:
     return f"random numbers: --seed {config.getoption('--seed')}"
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: item.path.stem not in SLOWEST)
+@pytest.hookimpl(trylast=True)  # of what is selected
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deal what takes longest out to the workers. Each begins with an equal part of the list, and steals from the end."""
+    long: dict[str, list[pytest.Item]] = {}
+    rest: list[pytest.Item] = []
+    for item in items:
+        name = item.name if item.name.startswith(LESSONS) else item.path.stem
+        (long.setdefault(name, []) if name == item.name or name in SLOWEST else rest).append(item)
+    workers = getattr(config, "workerinput", {}).get("workercount", 1)
+    size = len(items) // workers
+    items.clear()
+    for i in range(workers):
+        dealt = [item for hand in list(long.values())[i::workers] for item in hand]
+        short = max(size - len(dealt), 0) if i < workers - 1 else len(rest)
+        items += dealt + rest[:short]
+        del rest[:short]

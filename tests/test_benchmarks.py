@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import mmap
 import socket
 import sys
@@ -17,25 +16,10 @@ if not BENCHMARKS.is_dir():
     pytest.skip("benchmarks are not part of this copy", allow_module_level=True)
 sys.path.append(str(BENCHMARKS))
 
-import peer_environments  # noqa: E402
 import peer_problems  # noqa: E402
 import peer_wire  # noqa: E402
 import peers  # noqa: E402
 import soak  # noqa: E402
-
-import floatbase as fb  # noqa: E402
-
-
-@pytest.mark.parametrize(("peer", "place"), peer_problems.REGULARISATION)
-def test_a_problem_is_told_whole_in_plain_numbers(peer, place):
-    problem = peer_problems.problem("talos" if place == "flat" else "solo12", peer)
-    told = json.loads(json.dumps(problem.description))
-    robot = problem.robot
-    assert told["joints"] == list(robot.joint_names)
-    assert len(told["torque_limits"]) == len(told["armature"]) == len(told["posture"]["target"]) == robot.d
-    assert np.allclose(told["com"]["target"], robot.standing().com)
-    assert [contact["frame"] for contact in told["contacts"]] == list(problem.contacts.names)
-    assert all((contact["corners"] is not None) == (place == "flat") for contact in told["contacts"])
 
 
 def test_the_friction_rows_are_those_of_the_peers():
@@ -46,15 +30,7 @@ def test_the_friction_rows_are_those_of_the_peers():
     assert np.allclose(rows, expected, atol=1e-12)
 
 
-def test_the_soles_of_every_state_are_level_and_straight():
-    problem = peer_problems.problem("talos", "tsid")
-    for label in peer_problems.SPREADS:
-        for q, v in problem.states(label, 3):
-            state = fb.State(problem.robot, q, v)
-            for foot in problem.robot.feet:
-                assert np.allclose(state.frame_pose(foot.frame).rotation, np.eye(3), atol=1e-12)
-
-
+@pytest.mark.front_end
 def test_a_process_gives_the_torques_of_its_controller():
     problem = peer_problems.problem("go2", "tsid")
     states = problem.states("medium", 2)
@@ -75,6 +51,7 @@ def test_a_task_of_ones_own_is_measured_on_the_same_problem():
         assert np.allclose(own(q, v).tau, package(q, v).tau, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.front_end
 def test_a_process_that_ends_says_why(tmp_path):
     script = tmp_path / "broken.py"
     script.write_text("raise SystemExit('there is no such library')")
@@ -82,31 +59,7 @@ def test_a_process_that_ends_says_why(tmp_path):
         peer_wire.Process(Path(sys.executable), script).ask("problem", {})
 
 
-def test_a_missing_compiler_is_said_before_anything_is_made(tmp_path, monkeypatch):
-    monkeypatch.setattr(peer_environments.shutil, "which", lambda tool: None)
-    with raises(peer_environments.MissingError, "c++", "g++"):
-        peer_environments.python_of("tsid", tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
-def row(difference: float, way: str = "compiled") -> peers.Row:
-    times = np.array([1.0, 2.0, 3.0])
-    size = np.array([difference])
-    ratios = np.full(2, 0.25)
-    return peers.Row(way, "go2", "tsid", "easy", 3, (0, 0), 1e-4, size, 1e-9, times, 4 * times, ratios, {"solve": 2.0})
-
-
-def test_times_are_given_for_equal_torques_alone():
-    same = peers.report([row(1e-6)], {}, [])
-    assert same.count("**0.25**") == 1 and "own task median" not in same
-    assert f"floatbase {fb.__version__}" in same
-    both = peers.report([row(1e-6), row(1e-6, "own")], {}, [])
-    assert both.count("**0.25**") == 2 and "own task median | own task p99 | peer median | peer p99" in both
-    other = peers.report([row(1e-2)], {}, ["placo. There is no network."])
-    assert "**0.25**" not in other and "Not the same, so no times: go2 with tsid, easy, compiled" in other
-    assert "Not measured: placo. There is no network." in other
-
-
+@pytest.mark.front_end
 @pytest.mark.parametrize("name", soak.SOAKS)
 def test_a_short_soak_holds(name, monkeypatch):
     monkeypatch.setattr(soak, "SAMPLES", 2)
@@ -117,6 +70,7 @@ def test_a_short_soak_holds(name, monkeypatch):
     assert (row.name, row.times, row.broken) == (name, 3, "")
 
 
+@pytest.mark.front_end
 def test_a_soak_tells_what_stays_and_what_breaks(monkeypatch):
     kept = []
 

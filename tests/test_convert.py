@@ -19,7 +19,7 @@ NAME = "03_feasible_space"
 WITHOUT_STATE = "--ClearMetadataPreprocessor.enabled=True"
 WIDTHS = "() => [...document.images].map((image) => image.complete ? image.naturalWidth : 0)"
 
-pytestmark = [needs_chromium, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.front_end, needs_chromium, pytest.mark.timeout(600)]
 browser = browser_of_a_file
 
 

@@ -49,6 +49,7 @@ STANDS = 1e-3  # m: a robot that nobody pushes sways by less, one that falls goe
 START, SPACE = "00_start_here", "03_feasible_space"
 
 pytestmark = [
+    pytest.mark.front_end,
     needs_chromium,
     pytest.mark.skipif(
         PROXY is None,

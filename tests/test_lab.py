@@ -42,7 +42,7 @@ from floatbase.lessons.publish import FOLDER, MINE, prepare, read
 LESSONS = ("00_start_here", "03_feasible_space")  # a robot that is simulated under the page; panels of many sliders
 MOVES = {LESSONS[0]: {"robot"}, LESSONS[1]: {"robot", "ghost", "planned"}}  # in their pictures; the ghost is the veil
 
-pytestmark = [needs_chromium, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.front_end, needs_chromium, pytest.mark.timeout(600)]
 
 # what a reader may press; none of it is writing
 LOOKS = (

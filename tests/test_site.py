@@ -20,7 +20,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from floatbase.lessons.publish import FOLDER, equations, read
 from floatbase.lessons.publish.site import docstrings, linked, mathml, prepared, run_all
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.front_end, pytest.mark.timeout(600)]
 SHOWN = ["00_start_here.ipynb", "06_friction_cones.ipynb"]
 MOST = 3e6  # bytes of a page with its images
 browser = browser_of_a_file

@@ -14,7 +14,7 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
-from values import COMMAND, CONTACTS, CONTROLLER, RECORD, ROBOT, STATE, UP, VALUES
+from values import UP, controller, record, values
 
 import floatbase as fb
 from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
@@ -67,13 +67,14 @@ def test_every_class_of_the_rooms_is_tested_here_or_no_value() -> None:
     }
     protocols = {name for name, found in classes.items() if getattr(found, "_is_protocol", False)}
     excused = " ".join(NO_VALUES.values()).split()
-    assert sorted(set(classes) - protocols) == sorted({*excused, *(name for name in VALUES if name in classes)})
-    assert [name for name, found in classes.items() if name in VALUES and type(VALUES[name]) is not found] == []
+    assert sorted(set(classes) - protocols) == sorted({*excused, *(name for name in values() if name in classes)})
+    assert [name for name, found in classes.items() if name in values() and type(values()[name]) is not found] == []
 
 
 def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
-    own = {"AnalyticController": AnalyticController(ROBOT, CONTACTS, STATE), "Cylinders": HydraulicActuators(ROBOT).cylinders}
-    for kind, value in (VALUES | own).items():
+    robot, state, contacts = values()["Robot"], values()["State"], values()["Contacts"]
+    own = {"AnalyticController": AnalyticController(robot, contacts, state), "Cylinders": HydraulicActuators(robot).cylinders}
+    for kind, value in (values() | own).items():
         arrays = arrays_of(value)
         assert bool(arrays) != (kind in WITHOUT_ARRAYS), kind
         for name, array in arrays.items():
@@ -90,37 +91,40 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
 def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> None:
-    for kind, value in VALUES.items():
+    robot = values()["Robot"]
+    for kind, value in values().items():
         other = copied(value)
         assert same(value, other), kind
         assert [name for name, array in arrays_of(other).items() if array.flags.writeable] == [], kind
-    mapped = copied(VALUES["Affine"])
+    mapped = copied(values()["Affine"])
     with pytest.raises(TypeError):
         mapped.blocks["top"] = slice(0, 2)
-    assert copied(ROBOT) == ROBOT != judges.load("solo12") and judges.load("go2") in {copied(ROBOT)}
+    assert copied(robot) == robot != judges.load("solo12") and judges.load("go2") in {copied(robot)}
     assert judges.load("go2") != fb.load("go2", torque_limits=10.0)
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
 def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
+    robot, state, contacts, control = values()["Robot"], values()["State"], values()["Contacts"], controller()
     push = fb.Push([0.0, 60.0, 0.0], start=0.005)
-    sim, oil = fb.Simulation(ROBOT), HydraulicActuators(ROBOT)
-    fb.rollout(sim, CONTROLLER, 0.01, [push], actuators=oil)
-    others, alone = copied((sim, CONTROLLER, oil)), copied(CONTROLLER)
-    runs = [fb.rollout(s, c, 0.02, [push], actuators=a) for s, c, a in ((sim, CONTROLLER, oil), others)]
+    sim, oil = fb.Simulation(robot), HydraulicActuators(robot)
+    fb.rollout(sim, control, 0.01, [push], actuators=oil)
+    others, alone = copied((sim, control, oil)), copied(control)
+    runs = [fb.rollout(s, c, 0.02, [push], actuators=a) for s, c, a in ((sim, control, oil), others)]
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
     assert np.ptp(runs[0].q, axis=0).max() > 1e-4
     assert not others[2].state.pressures.flags.writeable and not others[2].cylinders.areas.flags.writeable
     fb.rollout(sim, alone, 0.001)  # the controller of a robot that was copied, and not the robot
-    analytic = AnalyticController(ROBOT, CONTACTS, STATE)
-    np.testing.assert_array_equal(copied(analytic)(STATE.q, STATE.v).tau, analytic(STATE.q, STATE.v).tau)
+    analytic = AnalyticController(robot, contacts, state)
+    np.testing.assert_array_equal(copied(analytic)(state.q, state.v).tau, analytic(state.q, state.v).tau)
     assert not copied(analytic).com.flags.writeable
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
 def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied: Any) -> None:
+    robot = values()["Robot"]
     still, first, second = np.zeros(12), np.arange(12.0), -np.arange(12.0)
-    for late in (Delay(ROBOT, 2e-3), FirstOrderLag(ROBOT, 10.0)):
+    for late in (Delay(robot, 2e-3), FirstOrderLag(robot, 10.0)):
         late.step(first, still, still, 1e-3)
         other = copied(late)
         steps = [[one.step(second, still, still, 1e-3) for _ in range(3)] for one in (late, other)]
@@ -129,13 +133,14 @@ def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied: A
 
 
 def test_values_come_back_from_another_process() -> None:
+    robot, control = values()["Robot"], controller()
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        values = dict(zip(VALUES, pool.map(copy.copy, VALUES.values()), strict=True))
-        record = pool.submit(fb.rollout, fb.Simulation(ROBOT), CONTROLLER, 0.005).result()
-    assert [kind for kind, value in values.items() if not same(value, VALUES[kind])] == []
-    np.testing.assert_array_equal(record.q, RECORD.q)
-    assert isinstance(values["State"], fb.State) and not values["State"].q.flags.writeable
-    fb.Simulation(ROBOT).reset(record.final)  # a state of the same robot
+        back = dict(zip(values(), pool.map(copy.copy, values().values()), strict=True))
+        run = pool.submit(fb.rollout, fb.Simulation(robot), control, 0.005).result()
+    assert [kind for kind, value in back.items() if not same(value, values()[kind])] == []
+    np.testing.assert_array_equal(run.q, record().q)
+    assert isinstance(back["State"], fb.State) and not back["State"].q.flags.writeable
+    fb.Simulation(robot).reset(run.final)  # a state of the same robot
 
 
 def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_the_same() -> None:
@@ -160,15 +165,16 @@ def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_
 
 
 def test_what_a_value_returns_cannot_be_written_to() -> None:
-    wrenches = VALUES["WrenchSet"]
+    state, contacts, command = values()["State"], values()["Contacts"], values()["Command"]
+    wrenches = values()["WrenchSet"]
     answers = {
-        "frame_jacobian": STATE.frame_jacobian("base"), "frame_drift": STATE.frame_drift("base"), "point": STATE.point("base"),
-        "positions": CONTACTS.positions(STATE), "jacobian": CONTACTS.jacobian(STATE), "A": CONTACTS.constraint(STATE)[0],
-        "torques": wrenches.torques(), "support_region": wrenches.support_region(), "solution block": COMMAND.solution["tau"],
-        "slip": RECORD.slip(), "final q": RECORD.final.q, "command force": COMMAND.force("FL_foot"),
+        "frame_jacobian": state.frame_jacobian("base"), "frame_drift": state.frame_drift("base"), "point": state.point("base"),
+        "positions": contacts.positions(state), "jacobian": contacts.jacobian(state), "A": contacts.constraint(state)[0],
+        "torques": wrenches.torques(), "support_region": wrenches.support_region(), "solution block": command.solution["tau"],
+        "slip": record().slip(), "final q": record().final.q, "command force": command.force("FL_foot"),
     }  # fmt: skip
-    for shape in (VALUES["FrictionCone"], VALUES["FrictionPolyhedron"]):
+    for shape in (values()["FrictionCone"], values()["FrictionPolyhedron"]):
         answers |= {f"projection of {force} to {shape}": shape.project(force) for force in ([5.0, 0.0, 1.0], UP, -UP)}
     assert [name for name, array in answers.items() if array.flags.writeable] == []
     with pytest.raises(TypeError):
-        COMMAND.solution.qp.blocks["tau"] = slice(0, 1)
+        command.solution.qp.blocks["tau"] = slice(0, 1)

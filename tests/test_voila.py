@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from typing import Any
 
 import nbformat
@@ -25,8 +26,12 @@ PLAYGROUND = 'from floatbase.playground import playground\nplayground("go2")'
 ICONS = "/@fortawesome/"
 MASS = "viewer.gui_controllers['mass [×] true']"
 
-pytestmark = [needs_chromium, pytest.mark.timeout(600)]
-pytest.importorskip("voila", reason="Voilà is not installed")
+pytestmark = [
+    pytest.mark.front_end,
+    needs_chromium,
+    pytest.mark.skipif(find_spec("voila") is None, reason="Voilà is not installed"),
+    pytest.mark.timeout(600),
+]
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import judges
 import numpy as np
 
@@ -16,38 +19,50 @@ from floatbase.qp import active_set, table_top
 from floatbase.simulation import PushRose, Table, World
 
 UP = np.array([0.0, 0.0, 1.0])
-ROBOT = judges.load("go2")
-STATE = ROBOT.random_state(1, 0.1)
-CONTACTS = judges.stance(ROBOT)
-EOM = fb.equations_of_motion(STATE, CONTACTS)
-CONTROLLER = judges.controller_of("go2")
-COMMAND = CONTROLLER(STATE.q, STATE.v)
-RECORD = fb.rollout(fb.Simulation(ROBOT), CONTROLLER, 0.005)
-HYDRAULIC = HydraulicActuators(ROBOT)
-POSE = HYDRAULIC.cylinders.pose(STATE.q[7:])
-RUN = active_set(table_top())
-PLAN = LIPM([(0.0, 1.0, np.zeros(2), np.full(2, 0.1))], np.zeros(2), 5.0)
-VALUES = {
-    "Robot": ROBOT, "Foot": judges.load("talos").feet[0], "State": STATE, "Contacts": CONTACTS,
-    "PointContact": CONTACTS["FL_foot"],
-    "FlatFootContact": next(iter(judges.stance(judges.load("talos")))), "RollingWheel": RollingWheel("base", [0, 1, 0], 0.2),
-    "LinearConstraint": fixed_frame("base"), "EquationsOfMotion": EOM, "FeasibleSpace": fb.feasible_space(EOM),
-    "Affine": fb.Affine(np.eye(2), np.ones(2), {"top": slice(0, 1)}),
-    "Quadratic": fb.Quadratic(np.eye(2), np.ones(2)), "QP": CONTROLLER.qp(STATE), "Solution": COMMAND.solution,
-    "ActiveSetRun": RUN, "Iteration": RUN.iterations[0], "Residuals": COMMAND.solution.residuals,
-    "CoMTask": fb.CoMTask(STATE.com), "FrameTask": fb.FrameTask("FL_foot", UP), "OrientationTask": fb.OrientationTask(),
-    "PostureTask": fb.PostureTask(STATE.q), "ForceTask": fb.ForceTask(np.ones(12)), "TorqueTask": fb.TorqueTask(np.ones(12)),
-    "TorqueForForces": torque_for_forces(EOM), "Limits": CONTROLLER.limits, "Problem": CONTROLLER.problem,
-    "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),
-    "Decomposition": decompose([5.0, 0.0, 1.0], UP), "WrenchSet": wrench_set(STATE, CONTACTS),
-    "Command": COMMAND, "AnalyticCommand": AnalyticController(ROBOT, CONTACTS, STATE)(STATE.q, STATE.v), "Rollout": RECORD,
-    "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(), "Hydraulics": HYDRAULIC.cylinders.hydraulics,
-    "OilState": HYDRAULIC.state, "Pose": POSE,
-    "Power": HYDRAULIC.cylinders.power(np.zeros(12), HYDRAULIC.state.pressures, POSE, np.zeros(12)),
-    "bias forces": bias_forces(STATE), "contact space": contact_space(EOM), "drive": moving_frame("base", np.zeros_like),
-    "Rows": Rows("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
-    "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", STATE, CONTACTS),
-    "Gait": Gait.trot(ROBOT), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": PLAN, "Gains": Gains(),
-    "Belief": Belief(mass=1.2), "World": World(mass=1.2),
-    "turning view": seen_from_turning_frame([0.0, 0.1], UP, UP),
-}  # fmt: skip
+
+
+@cache
+def controller() -> fb.WholeBodyController:
+    return judges.controller_of("go2")
+
+
+@cache
+def record() -> fb.Rollout:
+    return fb.rollout(fb.Simulation(judges.load("go2")), controller(), 0.005)
+
+
+@cache
+def values() -> dict[str, Any]:
+    """The values, by the names of their classes."""
+    robot, control, talos = judges.load("go2"), controller(), judges.load("talos")
+    state, contacts = robot.random_state(1, 0.1), judges.stance(robot)
+    eom, command = fb.equations_of_motion(state, contacts), control(state.q, state.v)
+    hydraulic, run = HydraulicActuators(robot), active_set(table_top())
+    pose = hydraulic.cylinders.pose(state.q[7:])
+    plan = LIPM([(0.0, 1.0, np.zeros(2), np.full(2, 0.1))], np.zeros(2), 5.0)
+    return {
+        "Robot": robot, "Foot": talos.feet[0], "State": state, "Contacts": contacts,
+        "PointContact": contacts["FL_foot"],
+        "FlatFootContact": next(iter(judges.stance(talos))), "RollingWheel": RollingWheel("base", [0, 1, 0], 0.2),
+        "LinearConstraint": fixed_frame("base"), "EquationsOfMotion": eom, "FeasibleSpace": fb.feasible_space(eom),
+        "Affine": fb.Affine(np.eye(2), np.ones(2), {"top": slice(0, 1)}),
+        "Quadratic": fb.Quadratic(np.eye(2), np.ones(2)), "QP": control.qp(state), "Solution": command.solution,
+        "ActiveSetRun": run, "Iteration": run.iterations[0], "Residuals": command.solution.residuals,
+        "CoMTask": fb.CoMTask(state.com), "FrameTask": fb.FrameTask("FL_foot", UP), "OrientationTask": fb.OrientationTask(),
+        "PostureTask": fb.PostureTask(state.q), "ForceTask": fb.ForceTask(np.ones(12)),
+        "TorqueTask": fb.TorqueTask(np.ones(12)),
+        "TorqueForForces": torque_for_forces(eom), "Limits": control.limits, "Problem": control.problem,
+        "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),
+        "Decomposition": decompose([5.0, 0.0, 1.0], UP), "WrenchSet": wrench_set(state, contacts),
+        "Command": command, "AnalyticCommand": AnalyticController(robot, contacts, state)(state.q, state.v),
+        "Rollout": record(),
+        "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(), "Hydraulics": hydraulic.cylinders.hydraulics,
+        "OilState": hydraulic.state, "Pose": pose,
+        "Power": hydraulic.cylinders.power(np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)),
+        "bias forces": bias_forces(state), "contact space": contact_space(eom), "drive": moving_frame("base", np.zeros_like),
+        "Rows": Rows("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
+        "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
+        "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan, "Gains": Gains(),
+        "Belief": Belief(mass=1.2), "World": World(mass=1.2),
+        "turning view": seen_from_turning_frame([0.0, 0.1], UP, UP),
+    }  # fmt: skip

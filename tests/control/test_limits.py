@@ -34,7 +34,7 @@ def own_rows(robot: Robot, contacts: fb.Contacts) -> list[Rows]:
     ]
 
 
-@pytest.mark.parametrize("name", ["go2", "solo12", "talos"])
+@pytest.mark.parametrize("name", ["go2", "talos"])
 def test_rows_of_ones_own_hold_and_have_their_names_on_both_paths(name: str) -> None:
     robot = judges.load(name)
     contacts = judges.stance(robot)

@@ -351,6 +351,7 @@ def test_a_slider_moves_the_robot_without_a_kernel(page: Any) -> None:
     assert page.locator(".floatbase-note").nth(1).text_content() == "x is 2"
 
 
+@pytest.mark.front_end
 @needs_chromium
 def test_a_stop_looks_alike_whatever_was_shown_before(page: Any) -> None:
     frame = inside(page)
@@ -366,6 +367,7 @@ def test_a_stop_looks_alike_whatever_was_shown_before(page: Any) -> None:
     assert not arrows[0] and arrows[1] and seen[1] != seen[2]
 
 
+@pytest.mark.front_end
 @needs_chromium
 def test_a_recording_waits_where_motion_is_unwanted_plays_on_request_and_rests_out_of_sight(page: Any) -> None:
     frame = inside(page, 1)
@@ -390,6 +392,7 @@ FRAMED = """(address) => new Promise((done) => {
 })"""
 
 
+@pytest.mark.front_end
 @needs_chromium
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])  # the site's own, and another origin on the same machine
 def test_the_viewer_obeys_pages_of_its_own_site_only(site: Path, browser: Any, host: str) -> None:
@@ -405,6 +408,7 @@ def test_the_viewer_obeys_pages_of_its_own_site_only(site: Path, browser: Any, h
     page.close()
 
 
+@pytest.mark.front_end
 @needs_chromium
 def test_a_page_of_pictures_fits_a_phone(page: Any) -> None:
     page.set_viewport_size({"width": 390, "height": 800})

@@ -297,6 +297,7 @@ def work(course: Path, first: int, acknowledged: int) -> None:
         os.write(acknowledged, b".")
 
 
+@pytest.mark.front_end
 def test_a_kill_at_any_moment_loses_nothing(mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
     write(mine / LESSON, "first = 'my answer'")
@@ -320,6 +321,7 @@ def test_a_kill_at_any_moment_loses_nothing(mine: Path, tmp_path: Path, monkeypa
     assert source(mine / NEW) == source(mine.parent / LESSON)
 
 
+@pytest.mark.front_end
 def test_two_at_once_are_both_right(mine: Path) -> None:
     write(mine / LESSON, "first = 'my answer'")
     for n in range(2, 12):

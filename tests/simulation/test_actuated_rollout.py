@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from types import SimpleNamespace
 
 import judges
@@ -12,8 +13,12 @@ import pytest
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators, Hydraulics
 
-CONTROLLER = judges.controller_of("go2")
 PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),)  # N: a fifth of go2's weight for 0.2 s
+
+
+@cache
+def controller() -> fb.WholeBodyController:
+    return judges.controller_of("go2")
 
 
 @dataclass
@@ -38,8 +43,8 @@ def stand(sim: fb.Simulation, bandwidth: float, pushes: tuple[fb.Push, ...] = ()
     sim.reset()
     q, v = sim.q, sim.v
     actuators = HydraulicActuators(sim.robot, Hydraulics(loop_bandwidth=bandwidth))
-    actuators.reset(CONTROLLER(q, v).tau, q[7:])
-    return fb.rollout(sim, CONTROLLER, duration, pushes, actuators=actuators)
+    actuators.reset(controller()(q, v).tau, q[7:])
+    return fb.rollout(sim, controller(), duration, pushes, actuators=actuators)
 
 
 def sway(rollout: fb.Rollout) -> float:
@@ -52,7 +57,7 @@ def sway(rollout: fb.Rollout) -> float:
 
 def test_without_actuators_applied_torques_are_desired_ones(sim: fb.Simulation) -> None:
     sim.reset()
-    rollout = fb.rollout(sim, CONTROLLER, 0.02, control_period=4e-3)
+    rollout = fb.rollout(sim, controller(), 0.02, control_period=4e-3)
     assert rollout.tau.shape == rollout.tau_desired.shape == (5, 12)
     assert np.array_equal(rollout.tau, rollout.tau_desired)
 
@@ -60,7 +65,7 @@ def test_without_actuators_applied_torques_are_desired_ones(sim: fb.Simulation) 
 def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mean(sim: fb.Simulation) -> None:
     sim.reset()
     lag = Lag(0.1)
-    rollout = fb.rollout(sim, CONTROLLER, 0.012, control_period=4e-3, actuators=lag)
+    rollout = fb.rollout(sim, controller(), 0.012, control_period=4e-3, actuators=lag)
     assert len(lag.calls) == 12 and {dt for *_, dt in lag.calls} == {1e-3}
     for tick in range(3):
         calls = lag.calls[4 * tick : 4 * tick + 4]
@@ -77,7 +82,7 @@ def test_the_physics_gets_what_the_actuators_give(sim: fb.Simulation) -> None:
         return SimpleNamespace(tau=np.zeros(12))
 
     sim.reset()
-    held_back = fb.rollout(sim, CONTROLLER, 0.1, actuators=Lag(0.0))
+    held_back = fb.rollout(sim, controller(), 0.1, actuators=Lag(0.0))
     sim.reset()
     assert np.array_equal(held_back.q, fb.rollout(sim, limp, 0.1).q)
     assert held_back.q[-1, 2] < held_back.q[0, 2] - 0.01
@@ -103,7 +108,7 @@ def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation) -> None
     for parts in ((0.1,), (0.05, 0.05)):
         sim.reset()
         actuators = HydraulicActuators(sim.robot)
-        rows = [fb.rollout(sim, CONTROLLER, duration, actuators=actuators).tau for duration in parts]
+        rows = [fb.rollout(sim, controller(), duration, actuators=actuators).tau for duration in parts]
         records.append(np.vstack(rows))
     assert np.array_equal(records[0], records[1])
 
@@ -150,7 +155,7 @@ def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(sim:
 def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(sim: fb.Simulation) -> None:
     """12 mm both, the same to 0.1 mm, when 30 N push for 0.2 s."""
     sim.reset()
-    ideal = fb.rollout(sim, CONTROLLER, 0.6, PUSH)
+    ideal = fb.rollout(sim, controller(), 0.6, PUSH)
     hydraulic = stand(sim, 50.0, PUSH, 0.6)
     assert ideal.outcome == hydraulic.outcome == "completed"
     assert sway(ideal) == pytest.approx(0.012, abs=1e-3)
@@ -176,7 +181,7 @@ def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints
     """A spool of 1 Hz hardly moves: the torques lag, but each joint stands on a stiff spring of oil."""
     sim.reset()
     actuators = HydraulicActuators(sim.robot, Hydraulics(valve_bandwidth=1.0))
-    actuators.reset(CONTROLLER(sim.q, sim.v).tau, sim.q[7:])
-    rollout = fb.rollout(sim, CONTROLLER, 1.0, PUSH, actuators=actuators)
+    actuators.reset(controller()(sim.q, sim.v).tau, sim.q[7:])
+    rollout = fb.rollout(sim, controller(), 1.0, PUSH, actuators=actuators)
     assert rollout.outcome == "completed"
     assert sway(rollout) < 0.015

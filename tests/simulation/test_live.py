@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 
 import judges
@@ -16,7 +17,11 @@ from floatbase.simulation import IDLE, SEEN, Live, advice
 from floatbase.viewer import push_at
 
 ROBOT = judges.load("go2")
-CONTROLLER = fb.WholeBodyController(ROBOT, fb.Contacts.points(ROBOT), fb.standing_tasks(ROBOT.standing()))
+
+
+@cache
+def controller() -> fb.WholeBodyController:
+    return fb.WholeBodyController(ROBOT, fb.Contacts.points(ROBOT), fb.standing_tasks(ROBOT.standing()))
 
 
 @pytest.fixture
@@ -26,7 +31,7 @@ def slices() -> list[fb.Rollout]:
 
 @pytest.fixture
 def run(slices: list[fb.Rollout]) -> Iterator[Live]:
-    live = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append)
+    live = Live(fb.Simulation(ROBOT), controller(), slices.append)
     yield live
     live.close()
 
@@ -53,7 +58,7 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slic
     until(lambda: run.status != "running")
     assert str(error) in run.status
     assert run.error is error
-    run.use(CONTROLLER)
+    run.use(controller())
     run.start()
     until(lambda: len(slices) > 1)
 
@@ -100,7 +105,7 @@ def held() -> Held:
 
 @pytest.fixture
 def held_run(held: Held) -> Iterator[Live]:
-    live = Live(fb.Simulation(ROBOT), CONTROLLER, held)
+    live = Live(fb.Simulation(ROBOT), controller(), held)
     yield live
     held.go_on.set()
     live.close()
@@ -238,7 +243,7 @@ def test_a_status_is_told_as_it_comes(run: Live, slices: list[fb.Rollout]) -> No
 
 
 def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
-    run = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append, idle=0.2)
+    run = Live(fb.Simulation(ROBOT), controller(), slices.append, idle=0.2)
     run.start()
     until(lambda: run.status == IDLE)
     assert slices and IDLE in advice(run.status)
@@ -267,7 +272,7 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
             self.reset()
 
         def reset(self) -> None:
-            self.last = CONTROLLER(ROBOT.standing().q, np.zeros(ROBOT.nv)).tau
+            self.last = controller()(ROBOT.standing().q, np.zeros(ROBOT.nv)).tau
             self.steps, self.resets = 0, getattr(self, "resets", -1) + 1
 
         def step(self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
@@ -276,7 +281,7 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
             return now
 
     delay = Delay()
-    run = Live(fb.Simulation(ROBOT), CONTROLLER, slices.append, actuators=delay, after_reset=delay.reset)
+    run = Live(fb.Simulation(ROBOT), controller(), slices.append, actuators=delay, after_reset=delay.reset)
     run.start()
     until(lambda: len(slices) > 3)
     run.pause()
@@ -296,7 +301,7 @@ def test_another_world_controller_and_period_are_taken_between_slices(run: Live,
 
     def change() -> None:
         seen.append(threading.current_thread())
-        run.use(CONTROLLER, sim=ice, control_period=5e-3)
+        run.use(controller(), sim=ice, control_period=5e-3)
 
     run.soon(change)
     until(lambda: run.sim is ice)

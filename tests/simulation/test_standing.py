@@ -20,7 +20,7 @@ def stood(name: str, duration: float, push: bool = False) -> fb.Rollout:
     return fb.rollout(fb.Simulation(robot), controller, duration, pushes)
 
 
-LONG = [("go2", 5.0), ("solo12", 5.0)]
+LONG = [("go2", 5.0)]
 SHORT = [(name, 1.5) for name in judges.FLOATING if name not in dict(LONG)]
 
 

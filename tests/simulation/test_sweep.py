@@ -60,6 +60,7 @@ def test_the_table_is_the_same_for_one_worker_and_for_two() -> None:
     assert frame["error"].notna().sum() == 2 and frame["values"][9] == list(two["values"][9])
 
 
+@pytest.mark.front_end
 def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     """Killed at a random moment: the points in flight are computed twice, and no others."""
     after = np.random.default_rng(0).integers(2, 45)
@@ -124,6 +125,7 @@ def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path:
     assert (tmp_path / "setups").read_text() == "x"
 
 
+@pytest.mark.front_end
 def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install floatbase[cluster]")
 

@@ -49,6 +49,7 @@ def test_a_page_has_what_is_shown(page, viewer: Viewer, standing: State, contact
         assert hue_pixels(image, colour) < 30
 
 
+@pytest.mark.front_end
 def test_get_image_is_the_picture_in_the_page(page, viewer: Viewer, standing: State) -> None:
     page.set_viewport_size(SMALL)
     viewer.show(standing)
@@ -63,6 +64,7 @@ def test_get_image_is_the_picture_in_the_page(page, viewer: Viewer, standing: St
     assert hue_pixels(np.asarray(image.convert("RGB")).astype(int), COM) > 12
 
 
+@pytest.mark.front_end
 def test_the_page_comes_back_when_the_window_does(page) -> None:
     first = Window()
     page.goto(first.web_url)
@@ -77,6 +79,7 @@ def test_the_page_comes_back_when_the_window_does(page) -> None:
         assert page.evaluate(NOTICE) == "none"
 
 
+@pytest.mark.front_end
 def test_pushes_and_frames_are_seen_through_the_robot_and_its_ghost(page, viewer: Viewer, go2: Robot, standing: State) -> None:
     page.set_viewport_size({"width": 600, "height": 400})
     page.goto(viewer.url)
@@ -97,6 +100,7 @@ def test_pushes_and_frames_are_seen_through_the_robot_and_its_ghost(page, viewer
     assert axes > 22 and axes_and_ghost > 0.9 * axes
 
 
+@pytest.mark.front_end
 def test_a_push_on_a_robot_of_its_own_colour_has_an_outline(screen: Screen) -> None:
     screen.page.set_viewport_size({"width": 600, "height": 400})
     for background, name in (("light", "solo12"), ("dark", "go2")):
@@ -112,6 +116,7 @@ def test_a_push_on_a_robot_of_its_own_colour_has_an_outline(screen: Screen) -> N
         assert np.sum((after < DARK) & (before - after > CHANGE)) > 45, background
 
 
+@pytest.mark.front_end
 def test_the_camera_moves_when_it_is_called_and_not_when_a_picture_is_drawn(page, viewer: Viewer, standing: State) -> None:
     def eye_at(title: str) -> list[float]:
         """Where the page looks from once it has the title."""
@@ -164,6 +169,7 @@ HIDDEN = """() => {
 }"""
 
 
+@pytest.mark.front_end
 def test_a_legend_never_hides_the_robot_and_is_folded_where_it_would(
     page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
@@ -191,6 +197,7 @@ def test_a_legend_never_hides_the_robot_and_is_folded_where_it_would(
     assert not page.evaluate(FOLDED)  # no button for nothing
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("background", ["light", "dark"])
 def test_a_folded_legend_opens_by_mouse_and_by_keyboard(browser, go2: Robot, standing: State, background: str) -> None:
     viewer = Viewer(go2, background=background)
@@ -228,6 +235,7 @@ def test_a_folded_legend_opens_by_mouse_and_by_keyboard(browser, go2: Robot, sta
     viewer.close()
 
 
+@pytest.mark.front_end
 def test_a_folded_legend_leaves_room_for_the_player_of_a_recording(browser, viewer: Viewer, tmp_path: Path) -> None:
     viewer.play(rollout(Simulation(viewer.robot), judges.limp, 0.05))
     page = browser.new_page()
@@ -247,6 +255,7 @@ LABELS = "[...document.querySelectorAll('#panel .row > span, #panel .buttons but
 VALUES = "Object.values(viewer.gui_controllers).map((one) => one.getValue()).filter((value) => typeof value != 'function')"
 
 
+@pytest.mark.front_end
 def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser, viewer: Viewer) -> None:
     heard: defaultdict[str, list[object]] = defaultdict(list)
     for name in NAMES:
@@ -292,6 +301,7 @@ def test_backgrounds(screen: Screen, go2: Robot, standing: State) -> None:
         assert (corner.mean() > 200) == (background != "dark"), background
 
 
+@pytest.mark.front_end
 def test_every_robot_is_in_the_page(screen: Screen) -> None:
     screen.page.set_viewport_size(SMALL)
     for name in catalogue():
@@ -312,6 +322,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
 };"""
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize(
     ("lacks", "pages", "words"),
     [

@@ -142,6 +142,7 @@ def stands_at(frame, z: float) -> None:
     frame.wait_for_function(f"{DRAWN} && Math.abs({HEIGHT} - {z}) < {FLOATS}")
 
 
+@pytest.mark.front_end
 def test_later_cells_leave_the_pictures_of_earlier_ones_alone(shell: InteractiveShell, notebook: Notebook, page) -> None:
     one = add(notebook, page, run(shell, "view.show(at(0.30)).widget()"))
     run(shell, "view.show(at(0.40), title='still the first')")
@@ -180,6 +181,7 @@ def test_later_cells_leave_the_pictures_of_earlier_ones_alone(shell: Interactive
         stands_at(frame, 0.35)
 
 
+@pytest.mark.front_end
 def test_an_animation_stays_one_when_the_next_cell_shows_something_else(
     shell: InteractiveShell, notebook: Notebook, page
 ) -> None:
@@ -201,6 +203,7 @@ def test_a_shell_forgets_a_viewer_that_is_closed(shell: InteractiveShell) -> Non
     assert len(shell.events.callbacks["pre_run_cell"]) == hooks
 
 
+@pytest.mark.front_end
 def test_many_displays_share_the_few_contexts_that_a_browser_has(shell: InteractiveShell, notebook: Notebook, page) -> None:
     page.set_viewport_size({"width": 450, "height": 200})
     heard: list[str] = []

@@ -17,6 +17,8 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.lessons import ConstantTorques
 from floatbase.simulation import Push
 
+pytestmark = pytest.mark.front_end
+
 SIZE = (320, 200)
 SOME = 20  # of 255: by which a pixel is another
 

@@ -45,6 +45,7 @@ def answers(port: int) -> bool:
     return True
 
 
+@pytest.mark.front_end
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found on the path")
 def test_a_killed_browser_leaves_nothing_behind(
     viewer: Viewer, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, tmp_path: Path
@@ -90,6 +91,7 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
         yield client
 
 
+@pytest.mark.front_end
 def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(window: Window, sleeper: socket.socket) -> None:
     (_, command) = wire.set_object("/meshcat/a", umsgpack.packb({"data": "x" * 20_000}))
 
@@ -164,6 +166,7 @@ class Kernel:
         self.manager.shutdown_kernel(now=True)
 
 
+@pytest.mark.front_end
 def test_a_kernel_is_interrupted_and_restarted_under_a_viewer() -> None:
     kernel = Kernel()
     try:
@@ -207,6 +210,7 @@ print(repr(view), repr(field), type(view.widget()).__name__)"""
 PORTS = "import psutil; print(sorted(c.laddr.port for c in psutil.Process().net_connections('inet') if c.status == 'LISTEN'))"
 
 
+@pytest.mark.front_end
 def test_a_kernel_that_shows_pictures_listens_where_jupyter_does_and_nowhere_else() -> None:
     kernel = Kernel()
     try:

@@ -51,6 +51,7 @@ def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert process.wait(timeout=20) == 0
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     command = [sys.executable, "-m", "floatbase", "view", "ur5", "--no-browser"]
@@ -63,6 +64,7 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     assert (process.returncode, errors.replace(compiled, "")) == (0, "")
 
 
+@pytest.mark.front_end
 def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
     with closing(Playground(go2)) as playground, ThreadPoolExecutor(1) as other:
         ended = Event()
@@ -123,6 +125,7 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
     assert "measured/FR_foot" in drawn()
 
 
+@pytest.mark.front_end
 def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground: Playground) -> None:
     def work() -> None:
         page.wait_for_timeout(20)
@@ -151,6 +154,7 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground:
     until(lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05, work)
 
 
+@pytest.mark.front_end
 def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 

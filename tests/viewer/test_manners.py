@@ -14,6 +14,8 @@ from floatbase.viewer import Viewer
 
 from .looks import picture
 
+pytestmark = pytest.mark.front_end
+
 CAMERA = "viewer.camera.position.toArray()"
 DRAWN = "window.viewer && viewer.num_messages_received > 0"
 SCENE = "viewer.scene_tree.children.meshcat.children"

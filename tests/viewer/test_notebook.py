@@ -273,6 +273,7 @@ def notebook(page) -> Iterator[Notebook]:
     opened.close()
 
 
+@pytest.mark.front_end
 def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_again(
     notebook: Notebook, page: Any, standing: State
 ) -> None:
@@ -295,6 +296,7 @@ def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_
         view.close()
 
 
+@pytest.mark.front_end
 def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes(
     notebook: Notebook, page: Any, viewer: Viewer, standing: State
 ) -> None:
@@ -332,6 +334,7 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
     assert (page.evaluate("posted") == 0) == reached
 
 
+@pytest.mark.front_end
 def test_keys_that_move_a_slider_are_no_shortcuts_of_the_notebook(notebook: Notebook, page: Any, viewer: Viewer) -> None:
     notebook.show(page, viewer.widget())
     page.evaluate("""() => {
@@ -348,6 +351,7 @@ def test_keys_that_move_a_slider_are_no_shortcuts_of_the_notebook(notebook: Note
     assert [key for key, is_no_shortcut in suppressed.items() if not is_no_shortcut] == ["Shift+Enter", "a"]
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("how", ["kernel", "window"])
 def test_a_picture_stays_when_its_kernel_or_its_window_has_gone_and_says_so(
     notebook: Notebook, page: Any, viewer: Viewer, standing: State, how: str
@@ -393,6 +397,7 @@ push_panel(live(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(s
 )
 
 
+@pytest.mark.front_end
 def test_a_saved_notebook_shows_every_picture_as_html(tmp_path: Path) -> None:
     saved = NotebookClient(new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120).execute()
     saved.metadata.pop("widgets")  # JupyterLab saves no widgets by default

@@ -14,6 +14,8 @@ from floatbase.robots import Robot
 
 from .looks import picture
 
+pytestmark = pytest.mark.front_end
+
 ENDS = """() => {
   for (const input of document.querySelectorAll('#panel input[type=range]'))
     for (const end of [input.min, input.max]) { input.value = end; input.dispatchEvent(new Event('input')); }

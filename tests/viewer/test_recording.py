@@ -247,6 +247,7 @@ def leaning(viewer: Viewer, state: State, contacts: Contacts, tangents: list[flo
     return [viewer.painter.picture(state, contacts, force) for force in forces]
 
 
+@pytest.mark.front_end
 def test_a_paused_record_hides_what_comes_later(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
     page.set_viewport_size(SMALL)
     first, second = leaning(viewer, standing, contacts, [0.0, 0.6])
@@ -267,6 +268,7 @@ WITHHOLD = """() => {
 }"""
 
 
+@pytest.mark.front_end
 def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
     page.set_viewport_size(SMALL)
     viewer.play_pictures([0, 1, 2], leaning(viewer, standing, contacts, [0.0, 0.6, 0.0]), paused=True)
@@ -289,6 +291,7 @@ def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer: Viewer, stan
     assert arrow[1] == pytest.approx(length, rel=1e-3)
 
 
+@pytest.mark.front_end
 def test_every_record_has_one_clock_and_its_speed(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
     page.set_viewport_size(SMALL)
     page.goto(viewer.url)

@@ -224,6 +224,7 @@ def test_every_background_has_readable_text() -> None:
     assert len(LEGEND) == len({text for *_, text in LEGEND})
 
 
+@pytest.mark.front_end
 def test_figures(screen: Screen) -> None:
     screen.page.set_viewport_size(SMALL)
     for name, figure in FIGURES.items():
@@ -308,6 +309,7 @@ def test_figure_1_adds_up() -> None:
     right.close(), left.close()
 
 
+@pytest.mark.front_end
 def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
     extra = below("wheel", {"": props.wheel([0.7, -0.5, 0.15], [0, 1, 0], 0.15, 0.6)})
     extra |= below("cylinder", props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)))

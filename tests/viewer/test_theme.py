@@ -57,6 +57,7 @@ def saved(go2: Robot, standing: State, contacts: Contacts, tmp_path: Path) -> It
     view.close()
 
 
+@pytest.mark.front_end
 def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path) -> None:
     inside = saved.read_text(encoding="utf-8").replace("&", "&amp;").replace('"', "&quot;")
     frame = f'<iframe srcdoc="{inside}" style="width: 100%; height: 560px; border: 0"></iframe>'
@@ -87,6 +88,7 @@ def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path
     assert picture(page, "light_again")[300, 100].min() > 180
 
 
+@pytest.mark.front_end
 def test_a_page_of_its_own_is_as_the_browser_is_and_as_wide_as_a_phone(browser, saved: Path) -> None:
     context = browser.new_context(color_scheme="dark", viewport={"width": 390, "height": 800}, is_mobile=True, has_touch=True)
     page = context.new_page()

@@ -232,6 +232,7 @@ def moved(state: State, x: float, y: float, z: float = 0.0) -> State:
     return State(state.robot, q)
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("slope", [0.0, 0.3])
 def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_the_scale_comes_along(
     page, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, slope: float
@@ -272,6 +273,7 @@ def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_t
         viewer.close()
 
 
+@pytest.mark.front_end
 def test_a_saved_walk_is_followed_and_looks_as_it_was(
     page, viewer: Viewer, walked: tuple[Rollout, Walk], tmp_path: Path
 ) -> None:

@@ -1,0 +1,174 @@
+"""Check the files that no test runs: lock, container, hub, workflows, README, and the pages that the code writes.
+
+`python .ci/lint.py` prints what is wrong and exits with 1 if anything is. It builds nothing and needs no network.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parent.parent
+Faults = Iterator[str]
+
+
+def text(path: str) -> str:
+    """The text of a file, with its continued lines joined."""
+    return (ROOT / path).read_text(encoding="utf-8").replace("\\\n", " ")
+
+
+PROJECT = tomllib.loads(text("pyproject.toml"))["project"]
+PYTHONS = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))
+TARGETS = re.findall(r"^([a-z-]+)(?: [a-z-]+)*:(?!=)", text("Makefile"), flags=re.M)
+TARGETS += re.findall(r"^[a-z-]+ ([a-z-]+):(?!=)", text("Makefile"), flags=re.M)
+
+
+def lock() -> Faults:
+    """Every dependency is pinned to one version within its range, on every platform."""
+    lines = [line for line in text("environment.txt").splitlines() if line and not line.startswith("#")]
+    pins = {canonicalize_name(pin.name): pin for pin in map(Requirement, lines)}
+    if len(pins) < len(lines):
+        yield "a package is pinned twice"
+    for pin in pins.values():
+        if pin.url or [spec.operator for spec in pin.specifier] != ["=="]:
+            yield f"{pin} is not an exact version"
+    extras = PROJECT["optional-dependencies"].values()
+    for required in (Requirement(line) for lines in (PROJECT["dependencies"], *extras) for line in lines):
+        pin = pins.get(canonicalize_name(required.name))
+        if pin is None or pin.marker:
+            yield f"{required.name} is not pinned for every platform; run `make lock`"
+        elif not required.specifier.contains(next(iter(pin.specifier)).version, prereleases=True):
+            yield f"{pin} is not within {required}; run `make lock`"
+
+
+def version() -> Faults:
+    """The version is the same everywhere."""
+    number = PROJECT["version"]
+    lines = {"CITATION.cff": f"version: {number}", "CHANGELOG.md": f"## [{number}]", "floatbase/__init__.py": f'= "{number}"'}
+    yield from (f"{path} has no {line}" for path, line in lines.items() if line not in text(path))
+
+
+def container() -> Faults:
+    """Images install from the lock, compile for any processor, and do not run as root."""
+    docker = text("Dockerfile")
+    for path in ("Dockerfile", ".binder/postBuild"):
+        installed = [line for line in text(path).splitlines() if "pip install" in line]
+        if not installed or any(part.count("-c environment.txt") < part.count("pip install") for part in installed):
+            yield f"{path} installs without -c environment.txt"
+        if not re.search(r"NUMBA_CPU_NAME=generic.*pip install.*-m floatbase compile", text(path), flags=re.S):
+            yield f"{path} does not compile for a generic processor after it installs"
+    if not re.search(r"^USER learner$(?!.*^(?:USER|RUN) ).*^CMD ", docker, flags=re.M | re.S) or "allow-root" in docker:
+        yield "the container runs as root"
+    _, _, command = json.loads(re.findall(r"^CMD (.+)$", docker, flags=re.M)[-1])
+    subprocess.run(["sh", "-n", "-c", command], check=True)
+    folder, lesson = re.findall(r"/lab/tree/(\w+)/(\w+\.ipynb)", command)[0]
+    if f"workspace --to {folder};" not in command or not (ROOT / "notebooks" / lesson).exists():
+        yield f"no lesson at /lab/tree/{folder}/{lesson}"
+
+
+def pythons() -> Faults:
+    """Every file names Pythons that the package supports."""
+    named = {
+        "Dockerfile": re.findall(r"^FROM python:(3\.\d+)", text("Dockerfile"), flags=re.M),
+        ".binder/runtime.txt": re.findall(r"python-(3\.\d+)", text(".binder/runtime.txt")),
+        ".devcontainer/devcontainer.json": re.findall(r"python:(3\.\d+)", text(".devcontainer/devcontainer.json")),
+        ".github/workflows/test.yml": re.findall(r'"(3\.\d+)"', text(".github/workflows/test.yml")),
+    }
+    for path, found in named.items():
+        if not found or not set(found) <= set(PYTHONS):
+            yield f"{path} names Python {found}, and the package supports {PYTHONS}"
+
+
+def scripts() -> Faults:
+    """Scripts are executable and have no syntax error."""
+    for path in (".binder/postBuild", ".binder/start", ".ci/run"):
+        if not os.access(ROOT / path, os.X_OK) or subprocess.run(["bash", "-n", ROOT / path]).returncode:
+            yield f"{path} cannot be run"
+
+
+def hub() -> Faults:
+    """Root cannot log in to the hub, and no kernel listens on a port."""
+    configuration = text(".binder/jupyterhub_config.py")
+    ast.parse(configuration)
+    for needed in ('\nc.Authenticator.blocked_users = {"root"}\n', "--KernelManager.transport=ipc"):
+        if needed not in configuration:
+            yield f"the hub's configuration has no {needed.strip()}"
+
+
+def workflows() -> Faults:
+    """A release is tested before it is published, by scripts that exist, and without a password."""
+    tests, publish = (text(f".github/workflows/{name}.yml") for name in ("test", "publish"))
+    release = publish[publish.index("  pypi:") : publish.index("  site:")]
+    for needed, there in {"needs: [package, tests]": release, "id-token: write": release, "workflow_call:": tests}.items():
+        if needed not in there:
+            yield f"a workflow has no {needed}"
+    for script in re.findall(r"\.ci/\w+(?:\.py)?", tests + publish):
+        if not (ROOT / script).exists():
+            yield f"a workflow runs {script}, which does not exist"
+    if "secrets." in publish:
+        yield "publish.yml has a password"
+
+
+def commands() -> Faults:
+    """Make targets and files that texts name exist."""
+    readme = text("README.md")
+    named = re.findall(r'(?:[`"]|    )make ([a-z-]+)', readme + text(".devcontainer/devcontainer.json"))
+    yield from (f"there is no target make {name}" for name in set(named) - set(TARGETS))
+    links = {link for link in re.findall(r"\]\(([^)#]+)\)", readme) if "://" not in link}
+    yield from (f"the README links to {link}, which does not exist" for link in links if not (ROOT / link).exists())
+
+
+def pages() -> Faults:
+    """The pages that the code writes are up to date, and every equation has a function, a test and a lesson."""
+    from floatbase.lessons.publish import FOLDER, README, conventions, equations, lesson_table, read, readme_with_table
+
+    made = {
+        FOLDER / "equations.md": equations.table(),
+        FOLDER / "conventions.md": conventions.page(),
+        README: readme_with_table(README.read_text(encoding="utf-8")),
+    }
+    for path, page in made.items():
+        if path.read_text(encoding="utf-8") != page:
+            yield f"{path.name} is out of date; run `python -m floatbase.lessons.publish map`"
+    entries = equations.entries()
+    yield from (f"no test names {entry.path}" for entry in entries if not entry.tests)
+    found = {number for entry in entries for number in entry.equations}
+    yield from (f"{number}: the docstrings and the map do not agree" for number in found ^ set(equations.TITLES))
+    taught = {name: _numbers(row) for row in lesson_table().splitlines() for name in re.findall(r"notebooks/(\w+\.ipynb)", row)}
+    yield from (f"no lesson teaches {number}" for number in set(equations.TITLES) - set().union(*taught.values()))
+    for name, numbers in taught.items():
+        cells = [cell.source for cell in read(FOLDER / name).cells if cell.cell_type == "markdown"]
+        (source,) = re.findall(r"^\*\*Source\*\*.*$", "\n".join(cells), flags=re.M)
+        yield from (f"the source line of {name} does not name {number}" for number in numbers - _numbers(source))
+
+
+def _numbers(ranges: str) -> set[str]:
+    """The equations of a text such as "(1)-(3), (5), App. A"."""
+    spans = re.findall(r"\((\d+)\)(?:-\((\d+)\))?", ranges)
+    numbers = {f"({n})" for first, last in spans for n in range(int(first), int(last or first) + 1)}
+    return numbers | set(re.findall(r"App\. [ABC]", ranges))
+
+
+CHECKS: tuple[Callable[[], Faults], ...]
+CHECKS = (lock, version, container, pythons, scripts, hub, workflows, commands, pages)
+
+
+def main() -> int:
+    """Run all checks; 1 when one found a fault."""
+    faults = [f"{check.__name__}: {fault}" for check in CHECKS for fault in check()]
+    print(*faults, sep="\n", end="\n" if faults else "")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
