@@ -1,7 +1,7 @@
 """TSID's side of the comparison: `peers.py` starts it in TSID's environment. What is said here is said in TSID's own words.
 
-Contacts are motion constraints without gains (J q̈ = -J̇ q̇); forces are regularised alike along all axes (by default the normal
-counts a thousandth) and may be as large as they like.
+Contacts are motion constraints without gains (J q̈ = -J̇ q̇); forces are regularised alike along all axes (by default the
+normal counts a thousandth) and may be as large as they like.
 """
 
 from __future__ import annotations

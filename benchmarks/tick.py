@@ -211,7 +211,7 @@ def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
                     expected = readable(state.q, state.v)
                 except InfeasibleError as error:
                     infeasible += 1
-                    check_verdict(compiled, state, error.rows, f"{name}, state {seed}")
+                    check_verdict(compiled, state, error.constraints, f"{name}, state {seed}")
                     continue
                 found = compiled(state.q, state.v)
                 left += found.path == "readable"
@@ -224,7 +224,7 @@ def check_verdict(compiled: fb.WholeBodyController, state: fb.State, rows: Seque
     try:
         compiled(state.q, state.v)
     except InfeasibleError as error:
-        if error.rows != rows:
+        if error.constraints != rows:
             raise SystemExit(f"{where}: other rows on the compiled path") from None
         return
     raise SystemExit(f"{where}: not infeasible on the compiled path")

@@ -33,15 +33,15 @@ class SimulationWarning(UserWarning):
 
 
 class InfeasibleError(FloatbaseError):
-    """No point satisfies all rows of a quadratic program.
+    """No point satisfies all constraints of a quadratic program.
 
-    `rows` holds the names of a smallest set of rows in conflict: they can be met without any one of them. Other rows
-    may be in conflict too.
+    `constraints` holds the names of a smallest set of constraints in conflict: they can be met without any one of them. Other
+    constraints may be in conflict too.
     """
 
-    def __init__(self, message: str, rows: Iterable[str] = ()):
+    def __init__(self, message: str, constraints: Iterable[str] = ()):
         super().__init__(message)
-        self.rows = tuple(rows)
+        self.constraints = tuple(constraints)
 
 
 class SolverError(FloatbaseError):
@@ -59,10 +59,10 @@ class ViewerError(FloatbaseError):
 def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:
     """An `UnknownNameError` that lists the names nearest to `name`, and all of them when there are few."""
     known = sorted(known)
-    wanted = str(name).strip().lower()
-    alike = get_close_matches(wanted, {k.lower() for k in known}, n=5)
-    near = [k for low in alike for k in known if k.lower() == low][:5] or [k for k in known if wanted in k.lower()][:5]
-    parts = ["near names: " + ", ".join(near)] if near else []
-    if not near or len(known) <= 6:
+    query = str(name).strip().lower()
+    matches = get_close_matches(query, {k.lower() for k in known}, n=5)
+    close = [k for match in matches for k in known if k.lower() == match][:5] or [k for k in known if query in k.lower()][:5]
+    parts = ["near names: " + ", ".join(close)] if close else []
+    if not close or len(known) <= 6:
         parts.append("known: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else ""))
     return UnknownNameError(f"unknown {kind} {name!r}; {'; '.join(parts)}." + (f" {hint}" if hint else ""))

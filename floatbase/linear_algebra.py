@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, read_only
+from floatbase._validation import Array, read_only
 
 RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
 
@@ -15,10 +15,10 @@ def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
 
     absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding altogether.
     """
-    return ranked_svd(A, absolute)[3]
+    return svd_with_rank(A, absolute)[3]
 
 
-def ranked_svd(A: npt.ArrayLike, absolute: bool = False) -> tuple[Array, Array, Array, int]:
+def svd_with_rank(A: npt.ArrayLike, absolute: bool = False) -> tuple[Array, Array, Array, int]:
     """The singular value decomposition A = U diag(s) Vᵀ and the rank r of A: (U, s, Vᵀ, r); absolute as for `rank`.
 
     A: (m, n). U: (m, m), its first r columns span the range of A, the others what A does not reach. s: falling. Vᵀ: (n, n),
@@ -31,11 +31,11 @@ def ranked_svd(A: npt.ArrayLike, absolute: bool = False) -> tuple[Array, Array, 
 
 def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
     """Orthonormal columns that span {x : A x = 0}, shape (n, n - rank); absolute as for `rank`."""
-    _, _, Vt, r = ranked_svd(A, absolute)
+    _, _, Vt, r = svd_with_rank(A, absolute)
     return read_only(Vt[r:].T)
 
 
-def row_lengths(rows: Array) -> Array:
+def row_norms(A: Array) -> Array:
     """Euclidean length of each row, shape (m,), 1 for a row of zeros: the unit to compare violations of rows in."""
-    size = np.linalg.norm(rows, axis=1)
-    return np.where(size > 0.0, size, 1.0)
+    norms = np.linalg.norm(A, axis=1)
+    return np.where(norms > 0.0, norms, 1.0)

@@ -87,7 +87,7 @@ def difference(one: fb.WholeBodyController, other: fb.WholeBodyController, state
     except InfeasibleError as error:
         with pytest.raises(InfeasibleError) as caught:
             one(state.q, state.v, t)
-        assert caught.value.rows == error.rows
+        assert caught.value.constraints == error.constraints
         return 0.0
     found = one(state.q, state.v, t)
     assert found.path == one.path, "the compiled tick left this state to the readable path"

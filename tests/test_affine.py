@@ -102,7 +102,7 @@ def test_the_cost_of_a_residual_is_half_its_weighted_square(seed: int, m: int, n
     rng = np.random.default_rng(seed)
     f, x, r = affine(rng, m, n), rng.normal(size=n), rng.normal(size=m)
     expected = 0.5 * 3.0 * np.sum(f(x) ** 2)
-    assert fb.Quadratic.of(f, 3.0)(x) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert fb.Quadratic.from_affine(f, 3.0)(x) == pytest.approx(expected, rel=1e-9, abs=1e-9)
     expected = 0.5 * 2.0 * np.sum((f.A @ x - r) ** 2)
     assert fb.Quadratic.from_residual(f.A, r, 2.0)(x) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
@@ -135,16 +135,16 @@ def test_among_many_minimisers_the_smallest_is_given(seed: int, m: int, n: int) 
 def test_what_counts_as_curvature_is_decided_in_one_place(curvature: float, counts: bool) -> None:
     """A direction with a 1e-12th of the largest curvature or less is flat, for the minimiser and for a partial one."""
     cost = fb.Quadratic(np.diag([1.0, curvature]), np.array([0.0, -curvature]))
-    over = cost.minimised_over(np.array([[0.0], [1.0]]))
+    over = cost.argmin_over(np.array([[0.0], [1.0]]))
     assert np.allclose(cost.minimiser(), [0.0, float(counts)])
-    assert np.allclose(cost.minimised_over(np.eye(2))([3.0, 4.0]), [0.0, 1.0 if counts else 4.0])
+    assert np.allclose(cost.argmin_over(np.eye(2))([3.0, 4.0]), [0.0, 1.0 if counts else 4.0])
     assert np.allclose(over([3.0, 4.0]), [3.0, 1.0])  # alone it is the largest there is
 
 
 def test_a_partial_minimum_is_the_least_of_all_points_that_keep_the_rest() -> None:
     rng = np.random.default_rng(0)
     cost, N = quadratic(rng, 5), np.linalg.qr(rng.normal(size=(5, 2)))[0]
-    best, x = cost.minimised_over(N), rng.normal(size=5)
+    best, x = cost.argmin_over(N), rng.normal(size=5)
     assert np.allclose(N @ (N.T @ (best(x) - x)), best(x) - x)
     assert all(cost(x + N @ z) >= cost(best(x)) for z in rng.normal(size=(20, 2)))
     assert np.allclose(best(best(x)), best(x))
@@ -230,7 +230,7 @@ def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks
         (lambda: fb.Quadratic(np.eye(2), np.zeros(3)), InputError, "H", 2, 3),
         (lambda: fb.Quadratic.zero(2) + fb.Quadratic.zero(3), InputError, 2, 3),
         (lambda: fb.Quadratic.zero(2).pullback(fb.Affine.identity(3)), InputError, 3, 2),
-        (lambda: fb.Quadratic.of(fb.Affine.identity(1), -1.0), InputError, "weight", -1),
+        (lambda: fb.Quadratic.from_affine(fb.Affine.identity(1), -1.0), InputError, "weight", -1),
     ],
 )
 def test_shapes_that_do_not_fit_are_named(case: tuple[Any, ...]) -> None:

@@ -57,7 +57,7 @@ WRONG: dict[str, Any] = {
 CHECKS: dict[str, tuple[Callable[[Any], object], set[str]]] = {
     "text": (lambda x: fb.FrameTask(x, UP), {"x", "1"}),
     "texts": (lambda x: fb.load("ur5", locked=x), {"empty"}),
-    "flag": (lambda x: FrictionPolyhedron(UP, 0.7, inside=x), {"True"}),
+    "flag": (lambda x: FrictionPolyhedron(UP, 0.7, inner_approximation=x), {"True"}),
     "whole number": (lambda x: fb.Affine.identity(x), {"0"}),
     "number": (lambda x: fb.Push(UP, start=x), {"0", "10**7"}),
     "positive number": (lambda x: FrictionCone(UP, x), {"10**7"}),
@@ -107,7 +107,7 @@ def right() -> dict[str, Any]:
         "beta": np.zeros(space.dimension), "wrench": np.ones(6), "direction": np.ones(6),
         "points": contacts.positions(state), "max_normal_force": np.full(4, 200.0), "a": 10.0,
         "torque_limits": np.full(12, 20.0), "corners": talos.feet[0].corners, "flat_feet.robot": talos,
-        "Gait.walk.robot": talos, "unbolted.robot": judges.load("ur5"), "force": np.array([0.1, 0.0, 1.0]),
+        "Gait.walk.robot": talos, "with_floating_base.robot": judges.load("ur5"), "force": np.array([0.1, 0.0, 1.0]),
         "cost": fb.Quadratic.zero(space.dimension), "cost_on_qdd": fb.Quadratic.zero(18),
         "f": fb.Affine(np.eye(12), ZERO), "residual": fb.Affine(np.eye(12), ZERO), "parts": fb.Affine(np.eye(12), ZERO),
         "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind, "programs.allowed.qp": table_top(),
@@ -116,8 +116,8 @@ def right() -> dict[str, Any]:
         "point": np.zeros(2), "support_margin.feet": np.eye(2), "places": np.zeros((2, 3)), "time": (0.0, 0.1),
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3, "alpha": 0.1, "rate": 30.0,
-        "high": 1.0, "low": 0.0, "lift": 0.0, "omega": 5.0, "inward_acceleration.omega": UP,
-        "inward_acceleration.r": UP, "seen_from_turning_frame.omega": UP, "Rows.rows": (np.eye(18), np.ones(18)),
+        "high": 1.0, "low": 0.0, "lift": 0.0, "omega": 5.0, "centripetal_acceleration.omega": UP,
+        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP, "Rows.rows": (np.eye(18), np.ones(18)),
         "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2", "solver": "daqp",
         "column": "force", "status": "inside", "root": "/robot", "lesson": "07", "path": "floatbase-view.html",
         "load_urdf.path": str(judges.load("ur5").urdf),
@@ -126,8 +126,8 @@ def right() -> dict[str, Any]:
 
 # what only the package makes
 RESULTS = """
-    EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorqueForForces Pose
-    Power Robot PushRose Table Step AnalyticCommand Command Verdict Piece Item RowLabel recording.Animation OilState
+    EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorquesFromForces Pose
+    Power Robot PushRose Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation OilState
 """
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live"),
@@ -136,8 +136,9 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
         "Simulation.advance", "AlteredSimulation.advance",
-        "Conversion", "check_unit_lengths", "checked_corners", "torque_limits_of", "cone_rows",
-        "vertices", "conflicting_rows", "linear_program", "motion_of", "below_the_body", "target_shapes", "targets_at",
+        "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
+        "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian", "below_the_body",
+        "target_shapes", "targets_at",
         "QP.objective", "Belief.program", "Belief.check",
         "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
         "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
@@ -149,7 +150,7 @@ LEFT_OUT = {
     "Contacts and rollout call them, and have checked": (
         "ConstantTorques.__call__", "Torques", *(f"{kind}.{method}"
             for kind in ("PointContact", "FlatFootContact", "RollingWheel", "LinearConstraint")
-            for method in ("positions", "jacobian", "constraint", "generators", "slip")),
+            for method in ("positions", "jacobian", "constraint", "force_generator_matrix", "slip")),
     ),
     "moves a control that is there, with tests of its own": ("Viewer.move",),
     "ends what other calls need": ("Viewer.close", "Live.close"),

@@ -18,7 +18,7 @@ PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
 # from the ground up; rooms named on one line stand side by side on one floor and may see each other
 FLOORS = (
-    ("conventions", "errors", "_arrays", "_assets", "affine", "linear_algebra"),
+    ("conventions", "errors", "_validation", "_assets", "affine", "linear_algebra"),
     ("qp",),
     ("robots",),
     ("dynamics",),

@@ -25,7 +25,7 @@ WITHOUT_ARRAYS = ("ActiveSetRun", "Belief", "FeasibleSpace", "Gains", "Gait", "P
 NO_VALUES = {
     "physics that changes": "AlteredSimulation",
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators Simulation WholeBodyController",
-    "a text": "RowLabel",
+    "a text": "ConstraintLabel",
     "memory of a thread or a window": "Live SliderPanel Viewer Window",
     "an answer that rollout copies": "Torques",
     "with a memory of what they do": "Stand Step Walk",
@@ -170,7 +170,8 @@ def test_what_a_value_returns_cannot_be_written_to() -> None:
     answers = {
         "frame_jacobian": state.frame_jacobian("base"), "frame_drift": state.frame_drift("base"), "point": state.point("base"),
         "positions": contacts.positions(state), "jacobian": contacts.jacobian(state), "A": contacts.constraint(state)[0],
-        "torques": wrenches.torques(), "support_region": wrenches.support_region(), "solution block": command.solution["tau"],
+        "torques": wrenches.moment_vertices(), "support_region": wrenches.support_region(),
+        "solution block": command.solution["tau"],
         "slip": record().slip(), "final q": record().final.q, "command force": command.force("FL_foot"),
     }  # fmt: skip
     for shape in (values()["FrictionCone"], values()["FrictionPolyhedron"]):

@@ -12,9 +12,9 @@ import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.behaviours import LIPM, Gains, Gait, Swing
 from floatbase.control import AnalyticController, Belief, Rows
-from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_frame, moving_frame, seen_from_turning_frame
+from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_frame, moving_frame, view_from_rotating_frame
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
-from floatbase.objectives import torque_for_forces
+from floatbase.objectives import torques_from_forces
 from floatbase.qp import active_set, table_top
 from floatbase.simulation import PushRose, Table, World
 
@@ -51,7 +51,7 @@ def values() -> dict[str, Any]:
         "CoMTask": fb.CoMTask(state.com), "FrameTask": fb.FrameTask("FL_foot", UP), "OrientationTask": fb.OrientationTask(),
         "PostureTask": fb.PostureTask(state.q), "ForceTask": fb.ForceTask(np.ones(12)),
         "TorqueTask": fb.TorqueTask(np.ones(12)),
-        "TorqueForForces": torque_for_forces(eom), "Limits": control.limits, "Problem": control.problem,
+        "TorquesFromForces": torques_from_forces(eom), "Limits": control.limits, "Problem": control.problem,
         "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),
         "Decomposition": decompose([5.0, 0.0, 1.0], UP), "WrenchSet": wrench_set(state, contacts),
         "Command": command, "AnalyticCommand": AnalyticController(robot, contacts, state)(state.q, state.v),
@@ -64,5 +64,5 @@ def values() -> dict[str, Any]:
         "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
         "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan, "Gains": Gains(),
         "Belief": Belief(mass=1.2), "World": World(mass=1.2),
-        "turning view": seen_from_turning_frame([0.0, 0.1], UP, UP),
+        "turning view": view_from_rotating_frame([0.0, 0.1], UP, UP),
     }  # fmt: skip

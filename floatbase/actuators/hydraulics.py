@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, positive, read_only
+from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
 from floatbase.errors import InputError
 
 _LAMINAR = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
@@ -53,7 +53,7 @@ class Hydraulics:
     def __post_init__(self) -> None:
         parts = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
         for name, value in parts.items():
-            positive(f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage"))
+            as_positive(f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage"))
         for small, large in (("rod", "bore"), ("crank", "base"), ("tank pressure", "supply pressure")):
             if parts[small] >= parts[large]:
                 size, bound = parts[small], parts[large]
@@ -149,13 +149,13 @@ class Cylinders(Value):
     _best: float
 
     def __init__(self, hydraulics: Hydraulics, size: npt.ArrayLike, centre: npt.ArrayLike):
-        of_kind("hydraulics", hydraulics, Hydraulics)
-        size = checked("size", size, (None,))
+        as_instance("hydraulics", hydraulics, Hydraulics)
+        size = as_array("size", size, (None,))
         if np.any(size <= 0.0):
             raise InputError(f"size of a cylinder is {size.min():g}; it must be > 0.")
         vars(self).update(
             hydraulics=hydraulics,
-            centre=checked("centre", centre, size.shape, "rad"),
+            centre=as_array("centre", centre, size.shape, "rad"),
             areas=read_only(np.outer(hydraulics.areas, size ** (2.0 / 3.0))),
             crank=read_only(hydraulics.crank * size ** (1.0 / 3.0)),
             base=read_only(hydraulics.base * size ** (1.0 / 3.0)),
@@ -172,7 +172,7 @@ class Cylinders(Value):
 
     def pose(self, q: npt.ArrayLike) -> Pose:
         """Lengths, levers and chambers at joint angles q, shape (d,), rad."""
-        gamma = self._best + checked("q", q, (self.d,), "rad") - self.centre
+        gamma = self._best + as_array("q", q, (self.d,), "rad") - self.centre
         length = np.sqrt(self.base**2 + self.crank**2 - 2.0 * self.base * self.crank * np.cos(gamma))
         out = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
         volumes = self._dead + self.areas * np.array([out, 2.0 * self.crank - out])

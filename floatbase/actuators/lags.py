@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, of_kind, positive, read_only
+from floatbase._validation import Array, as_array, as_instance, as_positive, read_only
 from floatbase.robots import Robot
 
 _TICK = 1e-9  # s: times are counted in whole nanoseconds, so that no rounding adds up from step to step
@@ -22,8 +22,8 @@ class Delay:
     """
 
     def __init__(self, robot: Robot, delay: float):
-        self.robot = of_kind("robot", robot, Robot)
-        self.delay = positive("delay", delay, "s", allow_zero=True, most=_LONGEST)
+        self.robot = as_instance("robot", robot, Robot)
+        self.delay = as_positive("delay", delay, "s", allow_zero=True, maximum=_LONGEST)
         self.reset()
 
     def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
@@ -61,8 +61,8 @@ class FirstOrderLag:
     """
 
     def __init__(self, robot: Robot, bandwidth: float):
-        self.robot = of_kind("robot", robot, Robot)
-        self.bandwidth = positive("bandwidth", bandwidth, "Hz")
+        self.robot = as_instance("robot", robot, Robot)
+        self.bandwidth = as_positive("bandwidth", bandwidth, "Hz")
         self.reset()
 
     def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
@@ -79,7 +79,7 @@ class FirstOrderLag:
         q_joints, v_joints: (d,) rad and rad/s, not used.
         """
         desired = _given(self.robot, tau_desired, q_joints, v_joints)
-        time = positive("dt", dt, "s", most=_LONGEST)
+        time = as_positive("dt", dt, "s", maximum=_LONGEST)
         gone = -np.expm1(-2.0 * np.pi * self.bandwidth * time)
         self.tau = read_only(self.tau + gone * (desired - self.tau))
         return self.tau
@@ -87,18 +87,18 @@ class FirstOrderLag:
 
 def _ticks(dt: float) -> int:
     """A step's time in whole nanoseconds, at least one."""
-    return max(1, round(positive("dt", dt, "s", most=_LONGEST) / _TICK))
+    return max(1, round(as_positive("dt", dt, "s", maximum=_LONGEST) / _TICK))
 
 
 def _held(robot: Robot, tau: npt.ArrayLike | None, q_joints: npt.ArrayLike | None) -> Array:
     """What a reset is given, looked at: torques, zero by default."""
     if q_joints is not None:
-        checked("q_joints", q_joints, (robot.d,), "rad")
-    return read_only(checked("tau", np.zeros(robot.d) if tau is None else tau, (robot.d,), "N·m"))
+        as_array("q_joints", q_joints, (robot.d,), "rad")
+    return read_only(as_array("tau", np.zeros(robot.d) if tau is None else tau, (robot.d,), "N·m"))
 
 
 def _given(robot: Robot, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike) -> Array:
     """What a step is given, looked at: the desired torques."""
-    checked("q_joints", q_joints, (robot.d,), "rad")
-    checked("v_joints", v_joints, (robot.d,), "rad/s")
-    return read_only(checked("tau_desired", tau_desired, (robot.d,), "N·m"))
+    as_array("q_joints", q_joints, (robot.d,), "rad")
+    as_array("v_joints", v_joints, (robot.d,), "rad/s")
+    return read_only(as_array("tau_desired", tau_desired, (robot.d,), "N·m"))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, positive, read_only
+from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
 from floatbase.actuators.hydraulics import Cylinders, Hydraulics, Pose
 from floatbase.errors import InputError
 from floatbase.robots import Robot
@@ -58,8 +58,8 @@ class HydraulicActuators:
     """
 
     def __init__(self, robot: Robot, hydraulics: Hydraulics | None = None, centre: npt.ArrayLike | None = None):
-        self.robot = of_kind("robot", robot, Robot)
-        hydraulics = Hydraulics() if hydraulics is None else of_kind("hydraulics", hydraulics, Hydraulics)
+        self.robot = as_instance("robot", robot, Robot)
+        hydraulics = Hydraulics() if hydraulics is None else as_instance("hydraulics", hydraulics, Hydraulics)
         for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
             kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
             if not kind.startswith("JointModelR"):
@@ -81,7 +81,7 @@ class HydraulicActuators:
         The integrals begin empty: torques are off, by what leaks, until they have learned how much that is.
         """
         cylinders = self.cylinders
-        tau = checked("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
+        tau = as_array("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
         force = self._force_for(tau, cylinders.pose(cylinders.centre if q_joints is None else q_joints))
         # a valve with equal edges holds a force with as much pressure missing at A as there is too much at B
         lines = cylinders.hydraulics.supply_pressure + cylinders.hydraulics.tank_pressure
@@ -102,9 +102,9 @@ class HydraulicActuators:
         """
         cylinders = self.cylinders
         pose = cylinders.pose(q_joints)
-        force = self._force_for(checked("tau_desired", tau_desired, (cylinders.d,), "N·m"), pose)
-        v = checked("v_joints", v_joints, (cylinders.d,), "rad/s")
-        steps = max(1, int(np.ceil(positive("dt", dt, "s", most=_LONGEST_CALL) / _LONGEST_STEP - _STEP_ROUNDING)))
+        force = self._force_for(as_array("tau_desired", tau_desired, (cylinders.d,), "N·m"), pose)
+        v = as_array("v_joints", v_joints, (cylinders.d,), "rad/s")
+        steps = max(1, int(np.ceil(as_positive("dt", dt, "s", maximum=_LONGEST_CALL) / _LONGEST_STEP - _STEP_ROUNDING)))
         oil = (self.state.opening, self.state.pressures, self.state.integral)
         for _ in range(steps):
             oil = self._advance(oil, force, pose, v, dt / steps)

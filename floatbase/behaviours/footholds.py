@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, number, positive, read_only
+from floatbase._validation import Array, as_array, as_number, as_positive, read_only
 from floatbase.errors import InputError
 
 _FARTHEST = 50.0  # ω times a time: what grows by e^{50} is out of reach of any robot
@@ -20,8 +20,8 @@ def neutral_point(place: npt.ArrayLike, velocity: npt.ArrayLike, stance_time: fl
 
     Source: Raibert, Legged robots that balance, 1986.
     """
-    place, velocity = checked("place", place, (2,), "m"), checked("velocity", velocity, (2,), "m/s")
-    return read_only(place + velocity * positive("stance_time", stance_time, "s", allow_zero=True) / 2.0)
+    place, velocity = as_array("place", place, (2,), "m"), as_array("velocity", velocity, (2,), "m/s")
+    return read_only(place + velocity * as_positive("stance_time", stance_time, "s", allow_zero=True) / 2.0)
 
 
 def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> Array:
@@ -34,12 +34,12 @@ def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> 
     point, 2006; Englsberger, Ott, Albu-Schäffer, 2015.
     """
     c, v = _horizontal("com", com, "m"), _horizontal("velocity", velocity, "m/s")
-    return read_only(c + v / positive("omega", omega, "1/s"))
+    return read_only(c + v / as_positive("omega", omega, "1/s"))
 
 
 def _horizontal(name: str, vector: npt.ArrayLike, unit: str) -> Array:
     """x and y of a vector of two or three."""
-    found = checked(name, vector, (None,), unit)
+    found = as_array(name, vector, (None,), unit)
     if len(found) not in (2, 3):
         raise InputError(f"{name} has shape {found.shape}; it must have shape (2,) or (3,) ({unit}).")
     return found[:2]
@@ -52,7 +52,7 @@ def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
         heights, which do not count.
     On other ground the support region is another: `floatbase.friction.WrenchSet.support_region`, whose corners fit, too.
     """
-    point, feet = _horizontal("point", point, "m"), checked("feet", feet, (None, None), "m")
+    point, feet = _horizontal("point", point, "m"), as_array("feet", feet, (None, None), "m")
     if feet.shape[1] not in (2, 3):
         raise InputError(f"feet has shape {feet.shape}; it must have shape (n, 2) or (n, 3) (m).")
     feet = feet[:, :2]
@@ -94,8 +94,8 @@ def step_adjustment(dcm_error: npt.ArrayLike, time_left: float, omega: float, de
     omega: 1/s, √(g / height).
     dead_zone: m; an error below it counts as none, and a larger one by what is beyond.
     """
-    error = checked("dcm_error", dcm_error, (2,), "m")
+    error = as_array("dcm_error", dcm_error, (2,), "m")
     size = float(np.linalg.norm(error))
-    beyond = max(0.0, size - positive("dead_zone", dead_zone, "m", allow_zero=True)) / (size or 1.0)
-    exponent = positive("omega", omega, "1/s") * max(0.0, number("time_left", time_left, "s"))
+    beyond = max(0.0, size - as_positive("dead_zone", dead_zone, "m", allow_zero=True)) / (size or 1.0)
+    exponent = as_positive("omega", omega, "1/s") * max(0.0, as_number("time_left", time_left, "s"))
     return read_only(beyond * np.exp(min(exponent, _FARTHEST)) * error)

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from floatbase._arrays import Value, number, of_kind, positive, text, whole
+from floatbase._validation import Value, as_number, as_instance, as_positive, as_string, as_integer
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot
 
@@ -40,16 +40,16 @@ class Gait(Value):
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Mapping) or not self.offsets:
             raise InputError('offsets must be a mapping from feet to parts of the period, such as {"left": 0.0, "right": 0.5}.')
-        offsets = {text("foot", foot): number(f"offset of {foot}", offset) for foot, offset in self.offsets.items()}
+        offsets = {as_string("foot", foot): as_number(f"offset of {foot}", offset) for foot, offset in self.offsets.items()}
         for foot, offset in offsets.items():
             if not 0.0 <= offset < 1.0:
                 raise InputError(f"the offset of {foot} is {offset:g}; it must be from 0 to less than 1.")
         object.__setattr__(self, "offsets", MappingProxyType(offsets))
         for name in ("swing", "period"):
-            object.__setattr__(self, name, positive(name, getattr(self, name), "s", most=_LONGEST))
-        object.__setattr__(self, "start", number("start", self.start, "s"))
+            object.__setattr__(self, name, as_positive(name, getattr(self, name), "s", maximum=_LONGEST))
+        object.__setattr__(self, "start", as_number("start", self.start, "s"))
         if self.stop is not None:
-            object.__setattr__(self, "stop", number("stop", self.stop, "s"))
+            object.__setattr__(self, "stop", as_number("stop", self.stop, "s"))
         if self.swing > self.period - SAME_TIME:
             raise InputError(f"swing is {self.swing:g} s of a period of {self.period:g} s; each foot must stand for a while.")
 
@@ -57,7 +57,7 @@ class Gait(Value):
     def trot(robot: Robot, swing: float = 0.25, pause: float = 0.0, start: float = 1.0) -> Gait:
         """Diagonal pairs of a quadruped in turns, with a pause on all feet after each swing; all times in s."""
         front, hind = _rows_of_feet(robot)
-        step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
+        step = as_positive("swing", swing, "s") + as_positive("pause", pause, "s", allow_zero=True)
         offsets = {front[0]: 0.0, hind[1]: 0.0, front[1]: 0.5, hind[0]: 0.5}
         return Gait({foot: offsets[foot] for foot in _names(robot)}, 2.0 * step, swing, start)
 
@@ -65,7 +65,7 @@ class Gait(Value):
     def crawl(robot: Robot, swing: float = 0.3, pause: float = 0.2, start: float = 1.0) -> Gait:
         """One foot of a quadruped after the other, hind before front on each side, with a pause after each; times in s."""
         front, hind = _rows_of_feet(robot)
-        step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
+        step = as_positive("swing", swing, "s") + as_positive("pause", pause, "s", allow_zero=True)
         offsets = {hind[0]: 0.0, front[0]: 0.25, hind[1]: 0.5, front[1]: 0.75}
         return Gait({foot: offsets[foot] for foot in _names(robot)}, 4.0 * step, swing, start)
 
@@ -77,7 +77,7 @@ class Gait(Value):
             raise InputError(
                 f"{robot.name} has {len(names)} feet; Gait.walk is for two. Gait.trot and Gait.crawl are for four."
             )
-        step = positive("swing", swing, "s") + positive("pause", pause, "s", allow_zero=True)
+        step = as_positive("swing", swing, "s") + as_positive("pause", pause, "s", allow_zero=True)
         return Gait(dict(zip(names, (0.0, 0.5), strict=True)), 2.0 * step, swing, start)
 
     @property
@@ -87,7 +87,7 @@ class Gait(Value):
 
     def swing_of(self, foot: str, t: float) -> tuple[float, float] | None:
         """When a foot lifted and when it lands, s, if it is in the air at time t, s; None if it stands."""
-        t, first = number("t", t, "s"), self._first(foot)
+        t, first = as_number("t", t, "s"), self._first(foot)
         cycles = floor((t + SAME_TIME - first) / self.period)
         lift = first + cycles * self.period
         in_the_air = cycles >= 0 and t < lift + self.swing - SAME_TIME and self._lifts_at(lift)
@@ -99,7 +99,7 @@ class Gait(Value):
 
     def next_swing(self, foot: str, t: float) -> tuple[float, float] | None:
         """The first swing of a foot that begins at time t, s, or later, as (lift, land), s; None where there is none."""
-        t, first = number("t", t, "s"), self._first(foot)
+        t, first = as_number("t", t, "s"), self._first(foot)
         lift = first + max(0, -floor((first - t + SAME_TIME) / self.period)) * self.period
         return (lift, lift + self.swing) if self._lifts_at(lift) else None
 
@@ -108,7 +108,7 @@ class Gait(Value):
 
         longest: s, after which a stance is cut, and the list ends.
         """
-        n, t, longest = whole("n", n, 1, _MOST_PHASES), number("t", t, "s"), positive("longest", longest, "s")
+        n, t, longest = as_integer("n", n, 1, _MOST_PHASES), as_number("t", t, "s"), as_positive("longest", longest, "s")
         found: list[tuple[float, float, tuple[str, ...]]] = []
         while len(found) < n:
             end = self._next_change(t)
@@ -121,7 +121,7 @@ class Gait(Value):
 
     def after(self, t: float) -> Gait:
         """The same lift-offs, but for those before time t, s: what would be in the air then stands until it lifts next."""
-        if number("t", t, "s") <= self.start:
+        if as_number("t", t, "s") <= self.start:
             return self
         nearly_one = 1.0 - SAME_TIME / self.period
         waits = {foot: (self._first(foot) - t) / self.period % 1.0 for foot in self.offsets}
@@ -160,7 +160,7 @@ def check_that_one_stands(gait: Gait) -> None:
 
 
 def _names(robot: Robot) -> tuple[str, ...]:
-    return tuple(foot.frame for foot in of_kind("robot", robot, Robot).feet)
+    return tuple(foot.frame for foot in as_instance("robot", robot, Robot).feet)
 
 
 def _rows_of_feet(robot: Robot) -> tuple[tuple[str, str], tuple[str, str]]:

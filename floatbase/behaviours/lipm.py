@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property, checked, number, positive, read_only, said
+from floatbase._validation import Array, Value, cached_property, as_array, as_number, as_positive, read_only, short_repr
 from floatbase.errors import InputError
 
 Piece: TypeAlias = tuple[float, float, Array, Array]
@@ -34,22 +34,22 @@ class LIPM(Value):
     omega: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "com", checked("com", self.com, (2,), "m"))
-        object.__setattr__(self, "omega", positive("omega", self.omega, "1/s"))
+        object.__setattr__(self, "com", as_array("com", self.com, (2,), "m"))
+        object.__setattr__(self, "omega", as_positive("omega", self.omega, "1/s"))
         form = "a plan needs pieces of the ZMP: [(begin, end, p at begin, p at end), …]"
         if not isinstance(self.pieces, list | tuple) or not self.pieces:
-            raise InputError(f"{form}, not {said(self.pieces)}.")
+            raise InputError(f"{form}, not {short_repr(self.pieces)}.")
         pieces: list[Piece] = []
         for piece in self.pieces:
             if not isinstance(piece, list | tuple) or len(piece) != 4:
-                raise InputError(f"{form}; one of them is {said(piece)}.")
+                raise InputError(f"{form}; one of them is {short_repr(piece)}.")
             begin, end, p0, p1 = piece
-            begin, end = number("begin of a piece", begin, "s"), number("end of a piece", end, "s")
+            begin, end = as_number("begin of a piece", begin, "s"), as_number("end of a piece", end, "s")
             if not end > begin or (pieces and abs(pieces[-1][1] - begin) > _GAP):
                 raise InputError(
                     f"a piece of the ZMP goes from {begin:g} to {end:g} s; each must end later, and the next begin there."
                 )
-            pieces.append((begin, end, checked("ZMP", p0, (2,), "m"), checked("ZMP", p1, (2,), "m")))
+            pieces.append((begin, end, as_array("ZMP", p0, (2,), "m"), as_array("ZMP", p1, (2,), "m")))
         length = pieces[-1][1] - pieces[0][0]
         if self.omega * length > _FARTHEST:
             raise InputError(f"a plan of {length:g} s is too long: omega times its length must be at most {_FARTHEST:g}.")
@@ -92,7 +92,7 @@ class LIPM(Value):
 
     def _at(self, t: float) -> tuple[Array, Array, Array, Array]:
         """p, its slope, and the rising and the falling part of c - p at time t; before the first piece as at its begin."""
-        t = max(number("t", t, "s"), self.pieces[0][0])
+        t = max(as_number("t", t, "s"), self.pieces[0][0])
         begin, p0, slope, a, b = next(part for part in reversed(self._parts) if part[0] <= t)
         growth = np.exp(min(self.omega * (t - begin), _FARTHEST))  # beyond the last piece a is 0
         return p0 + slope * (t - begin), slope, a * growth, b / growth

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from floatbase._arrays import Value, checked, of_kind, positive
+from floatbase._validation import Value, as_array, as_instance, as_positive
 from floatbase.behaviours.gait import Gait
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
@@ -24,14 +24,14 @@ class Gains(Value):
 
     def __post_init__(self) -> None:
         for name in ("com", "base", "swing", "posture"):
-            kp, weight = checked(f"gains of {name}", getattr(self, name), (2,)).tolist()
-            gains = positive(f"kp of {name}", kp, "1/s²"), positive(f"weight of {name}", weight, allow_zero=True)
+            kp, weight = as_array(f"gains of {name}", getattr(self, name), (2,)).tolist()
+            gains = as_positive(f"kp of {name}", kp, "1/s²"), as_positive(f"weight of {name}", weight, allow_zero=True)
             object.__setattr__(self, name, gains)
 
     @staticmethod
     def of(contacts: Contacts) -> Gains:
         """Gains that go with point feet or with flat feet."""
-        flat = flat_among(of_kind("contacts", contacts, Contacts))
+        flat = flat_among(as_instance("contacts", contacts, Contacts))
         return Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
 
 

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from floatbase._arrays import Array, sealed
+from floatbase._validation import Array, frozen
 from floatbase.affine import Affine
 from floatbase.behaviours.gait import SAME_TIME, Gait
 from floatbase.behaviours.lipm import LIPM
@@ -18,7 +18,7 @@ from floatbase.robots import State
 Motion: TypeAlias = tuple[Array, Array, Array]  # position, velocity, acceleration
 FREE = 1e6  # N: a bound that no robot of the catalogue reaches
 _SPEEDING = 1.0  # m/s² and rad/s²: a jump of the desired velocity makes robots fall
-_NO_VECTOR = sealed(np.zeros(3))
+_NO_VECTOR = frozen(np.zeros(3))
 _THIN = 1e-3  # part of the feet's extent: what is thinner shows no slope
 
 
@@ -104,13 +104,13 @@ class Reference:
         x, v, a = self.plan(t)
         slope = self.ground.A[0]
         height = self.standing.com[2] + self._height(x)
-        return sealed(np.array([*x, height])), sealed(np.array([*v, slope @ v])), sealed(np.array([*a, slope @ a]))
+        return frozen(np.array([*x, height])), frozen(np.array([*v, slope @ v])), frozen(np.array([*a, slope @ a]))
 
     def base(self, t: float) -> Motion:
         """Target of the base's rotation at t in s: as in the posture, turned by the path's yaw."""
         yaw = self.yaw + self.velocity[2] * (t - self.time)
-        rotation = sealed(about_z(yaw) @ self.standing.frame_pose("base").rotation)
-        return rotation, sealed(np.array([0.0, 0.0, self.velocity[2]])), _NO_VECTOR
+        rotation = frozen(about_z(yaw) @ self.standing.frame_pose("base").rotation)
+        return rotation, frozen(np.array([0.0, 0.0, self.velocity[2]])), _NO_VECTOR
 
     def foot(self, foot: str, t: float) -> Motion:
         """Target of a foot in the air at t in s; where it stands otherwise."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, number, of_kind, positive
+from floatbase._validation import Array, as_number, as_instance, as_positive
 from floatbase.behaviours.footholds import capture_point, support_margin
 from floatbase.behaviours.gait import Gait, check_that_one_stands
 from floatbase.behaviours.walk import Walk
@@ -33,9 +33,9 @@ class Stand(Walk):
     """
 
     def __init__(self, robot: Robot, contacts: Contacts, steps: Gait | None = None, *, margin: float = 0.03, **options: Any):
-        gait = Gait(dict.fromkeys(of_kind("contacts", contacts, Contacts).names, 0.0), 1.0, 0.5) if steps is None else steps
-        self._never = replace(of_kind("steps", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0)
-        self.steps, self.margin = steps, positive("margin", margin, "m", allow_zero=True, most=1.0)
+        gait = Gait(dict.fromkeys(as_instance("contacts", contacts, Contacts).names, 0.0), 1.0, 0.5) if steps is None else steps
+        self._never = replace(as_instance("steps", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0)
+        self.steps, self.margin = steps, as_positive("margin", margin, "m", allow_zero=True, maximum=1.0)
         if {"velocity", "yaw_rate", "gait"} & set(options):
             raise InputError("a Stand goes nowhere, and has no velocity, yaw_rate or gait: give it steps, or make a Walk.")
         super().__init__(robot, contacts, self._never, **options)
@@ -49,7 +49,7 @@ class Stand(Walk):
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
-        t = number("t", t, "s")
+        t = as_number("t", t, "s")
         if self.steps is not None and self._goes_on(t):
             self._decide(State(self.robot, q, v), t, self.steps)
         return super().__call__(q, v, t)

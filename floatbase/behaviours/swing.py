@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, number, positive, read_only
+from floatbase._validation import Array, Value, as_array, as_number, as_positive, read_only
 from floatbase.errors import InputError
 
 
@@ -29,18 +29,18 @@ class Swing(Value):
     height: float = 0.05
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", checked("start", self.start, (3,), "m"))
-        object.__setattr__(self, "end", checked("end", self.end, (3,), "m"))
+        object.__setattr__(self, "start", as_array("start", self.start, (3,), "m"))
+        object.__setattr__(self, "end", as_array("end", self.end, (3,), "m"))
         for name in ("lift", "land"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "s"))
-        object.__setattr__(self, "height", positive("height", self.height, "m", allow_zero=True))
+            object.__setattr__(self, name, as_number(name, getattr(self, name), "s"))
+        object.__setattr__(self, "height", as_positive("height", self.height, "m", allow_zero=True))
         if not self.land > self.lift:
             raise InputError(f"the foot lifts at {self.lift:g} s and lands at {self.land:g} s; it must land later.")
 
     def towards(self, end: npt.ArrayLike) -> Swing:
         """The same path to another end, (3,), m, world; cheap enough for the loop."""
         other = object.__new__(Swing)
-        vars(other).update(vars(self), end=checked("end", end, (3,), "m"))
+        vars(other).update(vars(self), end=as_array("end", end, (3,), "m"))
         return other
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
@@ -49,7 +49,7 @@ class Swing(Value):
         With u from 0 to 1: start + (end - start) (10 u³ - 15 u⁴ + 6 u⁵), and 64 u³ (1 - u)³ height upwards.
         """
         T = self.land - self.lift
-        u = min(max((number("t", t, "s") - self.lift) / T, 0.0), 1.0)
+        u = min(max((as_number("t", t, "s") - self.lift) / T, 0.0), 1.0)
         w = u * (1.0 - u)
         along = (u**3 * (10.0 - 15.0 * u + 6.0 * u * u), 30.0 * w * w / T, 60.0 * w * (1.0 - 2.0 * u) / T**2)
         bump = (64.0 * w**3, 192.0 * w * w * (1.0 - 2.0 * u) / T, 384.0 * w * (1.0 - 5.0 * w) / T**2)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, function
+from floatbase._validation import Array, as_callable
 
 _STEP = 1e-4  # s, of the differences: their error is below 1e-5 of what a base does in a second
 
@@ -18,7 +18,7 @@ def pitch_and_yaw(angles: Callable[[float], Array]) -> Callable[[float], tuple[A
     angles: angles(t) is (2,), rad, about the body's y axis after the turn about the world's z axis; smooth in t, s.
     Returns R (3, 3), angular velocity and acceleration, rad/s and rad/s², world, as a function of t.
     """
-    function("angles", angles, "angles(t)")
+    as_callable("angles", angles, "angles(t)")
 
     def path(t: float) -> tuple[Array, Array, Array]:
         before, now, after = angles(t - _STEP), angles(t), angles(t + _STEP)

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Fixed, checked, function, number, of_kind, positive
+from floatbase._validation import Array, FixedAttributes, as_array, as_callable, as_number, as_instance, as_positive
 from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
 from floatbase.behaviours.gait import SAME_TIME, Gait, check_that_one_stands
 from floatbase.behaviours.lipm import LIPM, Piece
@@ -62,7 +62,7 @@ class Step:
     swings: dict[str, Swing]
 
 
-class Walk(Fixed):
+class Walk(FixedAttributes):
     """Walks by a gait at a velocity: a controller like any other, for `fb.rollout`, `Live`, `fb.sweep` and `fb.push_rose`.
 
     At each change of stance it takes the feet where they are, plans the next footholds (`neutral_point`) and a linear inverted
@@ -90,7 +90,7 @@ class Walk(Fixed):
     `contacts`, as they are at each tick. Raises `InputError` for arguments that do not fit.
     """
 
-    _instead: ClassVar[dict[str, str]] = {
+    _hints: ClassVar[dict[str, str]] = {
         **dict.fromkeys(("robot", "clearance", "reach", "ramp", "foothold", "gains", "omega"), "make another one"),
         **dict.fromkeys(("time", "stance", "contacts", "footholds", "swings", "plan", "history"), "it tells what it is doing"),
     }
@@ -112,15 +112,15 @@ class Walk(Fixed):
         gains: Gains | None = None,
         **options: Any,
     ):
-        self.robot, self._all = of_kind("robot", robot, Robot), of_kind("contacts", contacts, Contacts)
+        self.robot, self._all = as_instance("robot", robot, Robot), as_instance("contacts", contacts, Contacts)
         self._flat = flat_among(contacts)
         self._reference: Reference | None = None
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
-        self.clearance = positive("clearance", clearance, "m", allow_zero=True, most=1.0)
-        self.reach = positive("reach", (_REACH_FLAT if self._flat else _REACH) if reach is None else reach, "m", most=1.0)
-        self.ramp = positive("ramp", ramp, "s", allow_zero=True, most=1.0)
-        self.foothold = below_the_body if foothold is None else function("foothold", foothold, "foothold(foot, land, walk)")
-        self.gains = Gains.of(contacts) if gains is None else of_kind("gains", gains, Gains)
+        self.clearance = as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0)
+        self.reach = as_positive("reach", (_REACH_FLAT if self._flat else _REACH) if reach is None else reach, "m", maximum=1.0)
+        self.ramp = as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0)
+        self.foothold = below_the_body if foothold is None else as_callable("foothold", foothold, "foothold(foot, land, walk)")
+        self.gains = Gains.of(contacts) if gains is None else as_instance("gains", gains, Gains)
         check_options(type(self).__name__, options)
         self._limits = WholeBodyController(robot, contacts, (), **options).limits  # what does not fit is told now
         self._options, self._standing = options, robot.standing()
@@ -131,7 +131,7 @@ class Walk(Fixed):
         ground = float(contacts.positions(self._standing)[:, 2].mean())
         self.omega = sqrt(robot.gravity / (self._standing.com[2] - ground))
         self._forget()
-        self._made = True
+        self._initialised = True
 
     @property
     def gait(self) -> Gait:
@@ -140,7 +140,7 @@ class Walk(Fixed):
 
     @gait.setter
     def gait(self, gait: Gait) -> None:
-        check_feet(of_kind("gait", gait, Gait, "Gait.trot(robot)"), self._all)
+        check_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all)
         if len(gait.feet) == len(self._all):
             check_that_one_stands(gait)
         self._gait = gait
@@ -152,8 +152,8 @@ class Walk(Fixed):
 
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
-        self._velocity = checked("velocity", velocity, (2,), "m/s")
-        number("speed", float(np.linalg.norm(self._velocity)), "m/s", most=_FASTEST)
+        self._velocity = as_array("velocity", velocity, (2,), "m/s")
+        as_number("speed", float(np.linalg.norm(self._velocity)), "m/s", maximum=_FASTEST)
 
     @property
     def yaw_rate(self) -> float:
@@ -162,7 +162,7 @@ class Walk(Fixed):
 
     @yaw_rate.setter
     def yaw_rate(self, yaw_rate: float) -> None:
-        self._yaw_rate = number("yaw_rate", yaw_rate, "rad/s", -_FASTEST, _FASTEST)
+        self._yaw_rate = as_number("yaw_rate", yaw_rate, "rad/s", -_FASTEST, _FASTEST)
 
     @property
     def time(self) -> float | None:
@@ -198,17 +198,17 @@ class Walk(Fixed):
     def below(self, foot: str, t: float) -> Array:
         """Where a foot would stand below the body at time t in s, (2,) m, world, if the desired velocity goes on."""
         foot = self._all[foot].name  # an `UnknownNameError` tells what there is
-        place, yaw, _ = self._path(number("t", t, "s"))
+        place, yaw, _ = self._path(as_number("t", t, "s"))
         return place + turned(self._nominal[foot][:2], yaw)
 
     def velocity_at(self, t: float) -> Array:
         """The body's velocity at time t in s, (2,) m/s, world, if the desired one goes on."""
-        _, yaw, velocity = self._path(number("t", t, "s"))
+        _, yaw, velocity = self._path(as_number("t", t, "s"))
         return turned(velocity[:2], yaw)
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
-        state, t = State(self.robot, q, checked("v", v, (self.robot.nv,))), number("t", t, "s")
+        state, t = State(self.robot, q, as_array("v", v, (self.robot.nv,))), as_number("t", t, "s")
         if not self._goes_on(t):
             self._begin(state, t)
         now = self._now
@@ -334,7 +334,7 @@ class Walk(Fixed):
             for foot in now.gait.feet:
                 times = now.gait.swing_of(foot, begin)
                 if times is not None:
-                    place = checked(f"the foothold of {foot}", self.foothold(foot, times[1], self), (2,), "m")
+                    place = as_array(f"the foothold of {foot}", self.foothold(foot, times[1], self), (2,), "m")
                     now.footholds.setdefault(foot, now.on_ground(foot, place))
                     if abs(times[1] - end) < 2.0 * SAME_TIME:
                         feet[foot] = now.on_ground(foot, place)

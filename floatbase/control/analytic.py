@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, of_kind, positive, read_only
+from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
 from floatbase.affine import Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, equations_of_motion, feasible_space
 from floatbase.errors import InputError
-from floatbase.objectives import cost_on_space, desired_wrench, force_bias, rotational_inertia, wrench_objective
+from floatbase.objectives import cost_on_space, desired_wrench, force_bias, centroidal_inertia, wrench_objective
 from floatbase.robots import Robot, State
 
 
@@ -79,9 +79,9 @@ class AnalyticController(Value):
         posture: float = 1e-3,
         torque: float = 1e-6,
     ):
-        of_kind("robot", robot, Robot)
-        of_kind("contacts", contacts, Contacts)
-        of_kind("the state to hold", state, State)
+        as_instance("robot", robot, Robot)
+        as_instance("contacts", contacts, Contacts)
+        as_instance("the state to hold", state, State)
         if state.robot != robot:
             raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
         equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
@@ -89,24 +89,24 @@ class AnalyticController(Value):
         vars(self).update(
             robot=robot,
             contacts=contacts,
-            com=checked("com", state.com if com is None else com, (3,), "m"),
+            com=as_array("com", state.com if com is None else com, (3,), "m"),
             _desired=state,
-            _bias=positive("bias_weight", bias_weight) * force_bias(contacts, alpha, share if a is None else a),
-            _kp=positive("kp", kp, "1/s²"),
-            _kd=positive("kd", kd, "1/s"),
-            _posture=positive("posture", posture),
-            _torque=positive("torque", torque),
+            _bias=as_positive("bias_weight", bias_weight) * force_bias(contacts, alpha, share if a is None else a),
+            _kp=as_positive("kp", kp, "1/s²"),
+            _kd=as_positive("kd", kd, "1/s"),
+            _posture=as_positive("posture", posture),
+            _torque=as_positive("torque", torque),
         )
 
     def objective(self, eom: EquationsOfMotion) -> tuple[Quadratic, Quadratic, Quadratic]:
         """The costs on q̈, τ and λ whose sum is minimised."""
-        state = of_kind("eom", eom, EquationsOfMotion).state
+        state = as_instance("eom", eom, EquationsOfMotion).state
         if state.robot != self.robot:
             raise InputError(f"the equations are of {state.robot.name}, the controller of another robot, {self.robot.name}.")
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
         R, R_desired = state.frame_pose("base").rotation, self._desired.frame_pose("base").rotation
         turn = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
-        wrench = desired_wrench(state, a, rotational_inertia(state) @ turn)
+        wrench = desired_wrench(state, a, centroidal_inertia(state) @ turn)
         on_forces = wrench_objective(state, eom.contacts, *wrench) + self._bias
         joints = (-self._kp * state.difference(self._desired.q) - self._kd * state.v)[eom.nv - eom.d :]
         on_qdd = Quadratic.from_residual(eom.S.T, joints, self._posture)
@@ -114,7 +114,7 @@ class AnalyticController(Value):
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> AnalyticCommand:
         """The tick: the minimum over β, mapped back to (q̈, τ, λ)."""
-        v = checked("v", v, (self.robot.nv,))  # State takes None for rest; here it is a slip
+        v = as_array("v", v, (self.robot.nv,))  # State takes None for rest; here it is a slip
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         space = feasible_space(eom)
         qdd, tau, forces = space(cost_on_space(space, *self.objective(eom)).minimiser())

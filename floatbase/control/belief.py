@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from floatbase._arrays import Value, flag, of_kind, positive, texts
+from floatbase._validation import Value, as_bool, as_instance, as_positive, as_strings
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import unknown_name
-from floatbase.qp import QP, RowLabel
+from floatbase.qp import QP, ConstraintLabel
 
 _SWITCHES = ("gravity", "velocity_forces", "drift", "underactuated", "cones")
 
@@ -41,10 +41,10 @@ class Belief(Value):
     cones: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", positive("mass believed, as a multiple of the true one,", self.mass))
-        object.__setattr__(self, "unfelt", texts("unfelt", self.unfelt))
+        object.__setattr__(self, "mass", as_positive("mass believed, as a multiple of the true one,", self.mass))
+        object.__setattr__(self, "unfelt", as_strings("unfelt", self.unfelt))
         for name in _SWITCHES:
-            flag(name, getattr(self, name))
+            as_bool(name, getattr(self, name))
 
     @property
     def is_true(self) -> bool:
@@ -53,7 +53,7 @@ class Belief(Value):
 
     def equations(self, eom: EquationsOfMotion) -> EquationsOfMotion:
         """The equations of motion as they are believed."""
-        if of_kind("eom", eom, EquationsOfMotion) and self.is_true:
+        if as_instance("eom", eom, EquationsOfMotion) and self.is_true:
             return eom
         gravity = eom.state.replace(v=np.zeros(eom.nv)).h
         h = self.gravity * gravity + self.velocity_forces * (eom.h - gravity)
@@ -66,7 +66,7 @@ class Belief(Value):
     def program(self, qp: QP, eom: EquationsOfMotion) -> QP:
         """The QP of `build_qp` as it is believed: without the base's rows of (7), or without cones, where these are off."""
         if not self.cones:
-            kinds = {label.kind for label in qp.inequality_names if isinstance(label, RowLabel)}
+            kinds = {label.kind for label in qp.inequality_names if isinstance(label, ConstraintLabel)}
             qp = qp.without(*sorted(kinds & {"friction", "normal force"}))
         if self.underactuated:
             return qp

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property
+from floatbase._validation import Array, Value, cached_property
 from floatbase.dynamics import Contacts
 from floatbase.qp import Solution
 
@@ -53,7 +53,7 @@ class Command(Value):
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Names of the active inequality rows, such as "FL_foot facet 2": `RowLabel`s, which also know kind and owner."""
+        """Names of the active inequalities, such as "FL_foot facet 2": `ConstraintLabel`s, which also know kind and owner."""
         return self.solution.active
 
     @property

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
 import numpy.typing as npt
 
-from floatbase._arrays import LARGEST, Array, Fixed, checked, number, of_kind, plain_numbers, read_only
+from floatbase._validation import MAX_MAGNITUDE, Array, FixedAttributes, as_array, as_number, as_instance, numeric_copy, read_only
 from floatbase.control.belief import TRUTH, Belief
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, NormalForces, Rows
@@ -20,7 +20,7 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver, solve
-from floatbase.robots import Robot, State, torque_limits_of
+from floatbase.robots import Robot, State, as_torque_limits
 
 Path: TypeAlias = Literal["auto", "compiled", "readable"]
 
@@ -40,7 +40,7 @@ _OPTIONS = (
 )
 
 
-class WholeBodyController(Fixed):
+class WholeBodyController(FixedAttributes):
     """(26)(27) at every tick: the torques that serve the tasks best while (7), friction, contacts and motors allow them.
 
     robot: the robot to control.
@@ -75,7 +75,7 @@ class WholeBodyController(Fixed):
     Raises `InputError` for arguments that do not fit. A call raises `InfeasibleError` with the rows in conflict.
     """
 
-    _instead: ClassVar[dict[str, str]] = {
+    _hints: ClassVar[dict[str, str]] = {
         **{name: f"controller.replace({name}=…) is a new one that has it" for name in ("contacts", "tasks", "limits")},
         **{name: _ANOTHER.format(name) for name in _OPTIONS},
         **dict.fromkeys(("robot", "problem", "compiled", "path_reason", "requested_path"), _ANOTHER.format("…")),
@@ -99,8 +99,8 @@ class WholeBodyController(Fixed):
         solver: str = "daqp",
         path: Path = "auto",
     ):
-        of_kind("robot", robot, Robot)
-        limits = robot.torque_limits if torque_limits is None else torque_limits_of(robot.d, torque_limits)
+        as_instance("robot", robot, Robot)
+        limits = robot.torque_limits if torque_limits is None else as_torque_limits(robot.d, torque_limits)
         bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows, turn)
         problem = Problem(robot, contacts, tasks, bounds, belief)
         if contact_weight is not None:
@@ -126,7 +126,7 @@ class WholeBodyController(Fixed):
         self.compiled = None if reason else compiled
         self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
         self.path_reason = reason or "nothing stands in its way" + cache_warning()
-        self._made = True
+        self._initialised = True
 
     def __getstate__(self) -> tuple[Problem, str, Path]:
         """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""
@@ -161,10 +161,10 @@ class WholeBodyController(Fixed):
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time t in s."""
-        if type(t) is not float or not -LARGEST <= t <= LARGEST:
-            t = number("t", t, "s")
+        if type(t) is not float or not -MAX_MAGNITUDE <= t <= MAX_MAGNITUDE:
+            t = as_number("t", t, "s")
         if v is None:  # State takes it for rest; here it is a slip
-            checked("v", v, (self.robot.nv,))
+            as_array("v", v, (self.robot.nv,))
         command = None if self.compiled is None else self._compiled_command(self.compiled, q, v, t)
         if command is not None:
             return command
@@ -174,7 +174,7 @@ class WholeBodyController(Fixed):
 
     def _compiled_command(self, tick: Compiled, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
         """The compiled tick's answer, or None where the readable path must answer, or say what is wrong."""
-        at, moving = plain_numbers(q), plain_numbers(v)
+        at, moving = numeric_copy(q), numeric_copy(v)
         if at is None or moving is None:
             return None
         answer = tick(at, moving, t)

@@ -11,25 +11,25 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import (
+from floatbase._validation import (
     Array,
     Value,
     cached_property,
-    checked,
-    function,
-    of_kind,
-    plain_numbers,
-    positive,
+    as_array,
+    as_callable,
+    as_instance,
+    numeric_copy,
+    as_positive,
     read_only,
-    said,
-    text,
-    texts,
+    short_repr,
+    as_string,
+    as_strings,
 )
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
-from floatbase.qp import RowLabel
-from floatbase.robots import Robot, torque_limits_of
+from floatbase.qp import ConstraintLabel
+from floatbase.robots import Robot, as_torque_limits
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
 SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of each block: its name among the equations of motion
@@ -59,12 +59,12 @@ class Rows(Value):
     owners: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        text("name of the rows", self.name)
-        if text("block of the rows", self.block) not in BLOCKS:
-            raise InputError(f'rows {self.name!r} have block {said(self.block)}; it must be "qdd", "tau" or "forces".')
-        object.__setattr__(self, "owners", texts(f"owners of {self.name}", self.owners))
+        as_string("name of the rows", self.name)
+        if as_string("block of the rows", self.block) not in BLOCKS:
+            raise InputError(f'rows {self.name!r} have block {short_repr(self.block)}; it must be "qdd", "tau" or "forces".')
+        object.__setattr__(self, "owners", as_strings(f"owners of {self.name}", self.owners))
         if callable(self.rows) and not isinstance(self.rows, type):
-            function(f"rows of {self.name}", self.rows, "rows(eom, t)")
+            as_callable(f"rows of {self.name}", self.rows, "rows(eom, t)")
         else:
             object.__setattr__(self, "rows", self._checked(self.rows, None))
 
@@ -75,22 +75,22 @@ class Rows(Value):
             return cast("tuple[Array, Array]", self.rows)
         return self._checked(self.rows(eom, t) if callable(self.rows) else self.rows, n)
 
-    def labels(self, m: int) -> tuple[RowLabel, ...]:
+    def labels(self, m: int) -> tuple[ConstraintLabel, ...]:
         """A label for each of m rows. Raises `InputError` where there is another number of owners."""
         if self.owners and len(self.owners) != m:
             raise InputError(f"rows {self.name!r} have {len(self.owners)} owners and {m} rows; give one for each row.")
         if self.owners:
-            return tuple(RowLabel(f"{self.name} {owner}", self.name, owner) for owner in self.owners)
-        return tuple(RowLabel(f"{self.name} {i}" if m > 1 else self.name, "rows", self.name, i) for i in range(m))
+            return tuple(ConstraintLabel(f"{self.name} {owner}", self.name, owner) for owner in self.owners)
+        return tuple(ConstraintLabel(f"{self.name} {i}" if m > 1 else self.name, "rows", self.name, i) for i in range(m))
 
     def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
         if not isinstance(given, tuple | list) or len(given) != 2:
-            raise InputError(f"rows {self.name!r} must be G and h, as in (G, h), not {said(given)}.")
-        G = checked(f"G of {self.name}", given[0], (None, None))
+            raise InputError(f"rows {self.name!r} must be G and h, as in (G, h), not {short_repr(given)}.")
+        G = as_array(f"G of {self.name}", given[0], (None, None))
         if n is not None and G.shape[1] != n:
             follows = "; a function of (eom, t) can follow the contacts" if self.block == "forces" else ""
             raise InputError(f"rows {self.name!r} take {G.shape[1]} numbers; their block {self.block!r} has {n}{follows}.")
-        return G, checked(f"h of {self.name}", given[1], (len(G),))
+        return G, as_array(f"h of {self.name}", given[1], (len(G),))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +119,8 @@ class Limits(Value):
     turn: float = 0.0
 
     def __post_init__(self) -> None:
-        limits = plain_numbers(self.torque_limits)
-        object.__setattr__(self, "torque_limits", torque_limits_of(1 if limits is None else limits.size, self.torque_limits))
+        limits = numeric_copy(self.torque_limits)
+        object.__setattr__(self, "torque_limits", as_torque_limits(1 if limits is None else limits.size, self.torque_limits))
         object.__setattr__(self, "min_normal_force", _kept("min_normal_force", self.min_normal_force))
         object.__setattr__(
             self, "max_normal_force", _kept("max_normal_force", {} if self.max_normal_force is None else self.max_normal_force)
@@ -129,9 +129,9 @@ class Limits(Value):
         for name in ("facets", "inside", "turn"):
             object.__setattr__(self, name, getattr(polyhedron, name))
         if isinstance(self.rows, Rows) or not isinstance(self.rows, Sequence):
-            raise InputError(f"rows must be a list of Rows, not {said(self.rows)}.")
+            raise InputError(f"rows must be a list of Rows, not {short_repr(self.rows)}.")
         example = "floatbase.control.Rows(name, block, (G, h))"
-        object.__setattr__(self, "rows", tuple(of_kind("each of rows", rows, Rows, example) for rows in self.rows))
+        object.__setattr__(self, "rows", tuple(as_instance("each of rows", rows, Rows, example) for rows in self.rows))
 
     @property
     def cut(self) -> tuple[int, bool, float]:
@@ -180,16 +180,16 @@ class Limits(Value):
 def _kept(name: str, given: NormalForces) -> NormalForces:
     """A checked copy of what bounds normal forces."""
     if not isinstance(given, Mapping):
-        one = plain_numbers(given)
+        one = numeric_copy(given)
         if one is None or one.ndim:
             by_name = 'or a mapping from the name of a contact to one or to a function, as {"FL_foot": lambda t: …}'
-            raise InputError(f"{name} must be one number (N), {by_name}, not {said(given)}.")
-        return positive(name, given, "N", allow_zero=True)
+            raise InputError(f"{name} must be one number (N), {by_name}, not {short_repr(given)}.")
+        return as_positive(name, given, "N", allow_zero=True)
     return MappingProxyType(
         {
-            contact: function(f"{name} of {contact}", value, "force(t)")
+            contact: as_callable(f"{name} of {contact}", value, "force(t)")
             if callable(value)
-            else positive(f"{name} of {contact}", value, "N", allow_zero=True)
+            else as_positive(f"{name} of {contact}", value, "N", allow_zero=True)
             for contact, value in given.items()
         }
     )
@@ -203,7 +203,7 @@ def _at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise:
     for each in contacts:
         value = given.get(each.name, otherwise)
         if callable(value):
-            value = positive(f"{name} of {each.name}", value(t), "N", allow_zero=True)
+            value = as_positive(f"{name} of {each.name}", value(t), "N", allow_zero=True)
         found += [value] * len(each.point_names)
     return np.array(found, dtype=np.float64)
 
@@ -216,19 +216,19 @@ def _still_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Arr
 
 
 @lru_cache(maxsize=64)
-def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[RowLabel, ...]]:
+def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[ConstraintLabel, ...]]:
     """G of friction facets and least normal force of every point, then of the largest normal forces, and the rows' names."""
     per_point = limits.facets + 1
-    names: list[RowLabel] = []
+    names: list[ConstraintLabel] = []
     G = np.zeros((per_point * contacts.n_points, contacts.k))
     for i, point in enumerate(contacts.point_names):
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], *limits.cut)
-        G[per_point * i : per_point * (i + 1), contacts.point_entries[3 * i : 3 * i + 3]] = np.vstack([cone.rows, -cone.normal])
-        names += [RowLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
-        names.append(RowLabel(f"{point} normal force", "normal force", point))
+        G[per_point * i : per_point * (i + 1), contacts.point_force_indices[3 * i : 3 * i + 3]] = np.vstack([cone.face_matrix, -cone.normal])
+        names += [ConstraintLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
+        names.append(ConstraintLabel(f"{point} normal force", "normal force", point))
     bounded = np.flatnonzero(limits.bounded_points(contacts))
     names += [
-        RowLabel(f"{contacts.point_names[i]} largest normal force", "largest normal force", contacts.point_names[i])
+        ConstraintLabel(f"{contacts.point_names[i]} largest normal force", "largest normal force", contacts.point_names[i])
         for i in bounded
     ]
     return read_only(np.vstack([G, -G[limits.facets :: per_point][bounded]])), tuple(names)
@@ -242,10 +242,10 @@ def force_bounds(contacts: Contacts, limits: Limits, least: Array, largest: Arra
 
 
 @lru_cache(maxsize=64)
-def torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[RowLabel, ...]]:
+def torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
     """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h, and the names of the rows."""
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
     rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
     sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]
-    names = tuple(RowLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side, joint in sides)
+    names = tuple(ConstraintLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side, joint in sides)
     return read_only(np.vstack([rows, -rows])), read_only(np.tile(bound, 2)), names

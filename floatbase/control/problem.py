@@ -10,15 +10,15 @@ from typing import TypeAlias, cast
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, function, of_kind, positive, said
+from floatbase._validation import Array, Value, as_callable, as_instance, as_positive, short_repr
 from floatbase.affine import Affine
 from floatbase.control.belief import TRUTH, Belief
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
-from floatbase.dynamics import MOTION_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_motion
+from floatbase.dynamics import CONSTRAINT_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_constraint
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
-from floatbase.qp import QP, RowLabel
-from floatbase.robots import Robot, State, torque_limits_of
+from floatbase.qp import QP, ConstraintLabel
+from floatbase.robots import Robot, State, as_torque_limits
 
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
 _PARTS_OF_A_TASK = ("block", "name", "weight", "residual")
@@ -40,9 +40,9 @@ class Problem(Value):
 
     def __post_init__(self) -> None:
         for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits), ("belief", Belief)):
-            of_kind(name, getattr(self, name), kind)
+            as_instance(name, getattr(self, name), kind)
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
-        torque_limits_of(self.robot.d, self.limits.torque_limits)
+        as_torque_limits(self.robot.d, self.limits.torque_limits)
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The QP at a state and a time t in s."""
@@ -78,13 +78,13 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
 
     Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a measured velocity that the
     contacts do not quite allow makes them inconsistent. The rows therefore count along the directions that A resolves well
-    (`floatbase.dynamics.resolved_motion`). Raises `InfeasibleError` where they are inconsistent beyond that.
+    (`floatbase.dynamics.resolved_constraint`). Raises `InfeasibleError` where they are inconsistent beyond that.
     """
-    of_kind("eom", eom, EquationsOfMotion)
-    of_kind("limits", limits, Limits)
-    of_kind("belief", belief, Belief)
+    as_instance("eom", eom, EquationsOfMotion)
+    as_instance("limits", limits, Limits)
+    as_instance("belief", belief, Belief)
     if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
-        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
+        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {short_repr(tasks)}.")
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
     rows = [each.at(eom, t) for each in limits.rows]
     qp = assemble_qp(belief.equations(eom), costs, limits, limits.normal_forces(eom.contacts, t), rows)
@@ -152,7 +152,7 @@ def _standing(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
     """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or torques."""
     if hasattr(tasks, "residual") or not isinstance(tasks, Sequence):
-        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {said(tasks)}.")
+        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {short_repr(tasks)}.")
     tasks = tuple(tasks)
     for task in tasks:
         lacks = [part for part in _PARTS_OF_A_TASK if not hasattr(task, part)]
@@ -160,10 +160,10 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
             has = "a task has block, name, weight and residual(eom, t), as floatbase.objectives.Task says"
             raise InputError(f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; {has}.")
         if lacks or isinstance(task, type) or not callable(task.residual):
-            raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {said(task)} is none.")
+            raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {short_repr(task)} is none.")
         if task.block not in BLOCKS:
             raise InputError(f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".')
-        positive(f"weight of {task.name}", task.weight, allow_zero=True)
+        as_positive(f"weight of {task.name}", task.weight, allow_zero=True)
     missing = [kind() for kind in (ForceTask, TorqueTask) if not any(task.block == kind.block for task in tasks)]
     return tasks + tuple(cast("list[Task]", missing))
 
@@ -175,7 +175,7 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     except InputError as error:  # such as an `Affine` that holds NaN: say whose it is
         raise error if f"of {task.name}" in str(error) else InputError(f"task {task.name!r}: {error}") from None
     except TypeError:
-        function(f"the residual of {task.name!r}", task.residual, "residual(eom, t)")
+        as_callable(f"the residual of {task.name!r}", task.residual, "residual(eom, t)")
         raise
     if not isinstance(residual, Affine):
         form = f"A x + b of its block x as fb.Affine(A, b), not {type(residual).__name__}"
@@ -191,10 +191,10 @@ def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
     Raises `InfeasibleError` with the rows where they are inconsistent by more than the contacts' own motion explains.
     """
-    A, b = resolved_motion(eom)
+    A, b = resolved_constraint(eom)
     gap = np.abs(eom.b - b)
     motion = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
-    if np.max(gap, initial=0.0) > INCONSISTENT + MOTION_NOISE * motion:
+    if np.max(gap, initial=0.0) > INCONSISTENT + CONSTRAINT_NOISE * motion:
         rows = [_equality_names(eom.robot, eom.contacts)[eom.nv + i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
         raise InfeasibleError(
             f"these motions are inconsistent: {', '.join(rows)}. At least one of their constraints has to go.", rows
@@ -203,9 +203,9 @@ def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def _equality_names(robot: Robot, contacts: Contacts) -> tuple[RowLabel, ...]:
+def _equality_names(robot: Robot, contacts: Contacts) -> tuple[ConstraintLabel, ...]:
     """Names of the rows of (7)."""
     axes = [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"] if robot.is_floating else []
-    dynamics = [RowLabel(f"dynamics {owner}", "dynamics", owner) for owner in (*axes, *robot.joint_names)]
+    dynamics = [ConstraintLabel(f"dynamics {owner}", "dynamics", owner) for owner in (*axes, *robot.joint_names)]
     motion = [(contact.name, i, row) for contact in contacts for i, row in enumerate(contact.row_names)]
-    return *dynamics, *(RowLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion)
+    return *dynamics, *(ConstraintLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, positive, read_only
+from floatbase._validation import Array, Value, as_positive, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, Contact, Contacts, EquationsOfMotion
 from floatbase.objectives import Task
@@ -85,7 +85,7 @@ def softened(contacts: Contacts, tasks: Sequence[Task], weight: float) -> tuple[
     """Contacts and tasks, soft or not, as those of a controller whose contacts give way at this weight."""
     held = Contacts([contact.held if isinstance(contact, SoftContact) else contact for contact in contacts])
     kept = [task for task in tasks if not isinstance(task, ContactTask)]
-    soft = ContactTask(held, positive("contact_weight", weight))
+    soft = ContactTask(held, as_positive("contact_weight", weight))
     return Contacts([SoftContact(contact) for contact in held]), (*kept, soft)
 
 

@@ -9,13 +9,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, checked, cross, function, positive, said, text, unit_vector, whole
-from floatbase.dynamics.contact import DEFAULT_MU, UP, OnePoint, check_ground
+from floatbase._validation import Array, Value, as_array, cross, as_callable, as_positive, short_repr, as_string, unit_vector, as_integer
+from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact, check_contact
 from floatbase.errors import InputError
 from floatbase.robots import State
 
-_MOST_ROWS = 1000  # of one constraint
-_FLAT_WHEEL = 1e-6  # sine of the angle between axle and normal; below it rounding alone chooses the lowest point
+_MAX_ROWS = 1000  # of one constraint
+_MIN_TILT = 1e-6  # sine of the angle between axle and normal; below it rounding alone chooses the lowest point
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,20 +31,20 @@ class LinearConstraint(Value):
 
     name: in messages and as the contact's name.
     m: number of rows.
-    rows: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,).
+    function: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,).
     """
 
     name: str
     m: int
-    rows: Callable[[State, float], tuple[Array, Array]]
+    function: Callable[[State, float], tuple[Array, Array]]
     mu: ClassVar[float] = np.inf  # there is no friction to run out of
     normal: ClassVar[Array] = UP  # plays no part
     point_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
-        text("name of a constraint", self.name)
-        object.__setattr__(self, "m", whole(f"m of {self.name}, its number of rows,", self.m, 1, _MOST_ROWS))
-        function(f"rows of {self.name}", self.rows, "rows(state, t)")
+        as_string("name of a constraint", self.name)
+        object.__setattr__(self, "m", as_integer(f"m of {self.name}, its number of rows,", self.m, 1, _MAX_ROWS))
+        as_callable(f"function of {self.name}", self.function, "function(state, t)")
 
     @property
     def k(self) -> int:
@@ -66,15 +66,15 @@ class LinearConstraint(Value):
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), checked."""
-        answer = self.rows(state, t)
-        if not isinstance(answer, tuple | list) or len(answer) != 2:
-            raise InputError(f"rows of {self.name} must give A and b of A q̈ = b, not {said(answer)}.")
-        A, b = answer
-        return checked(f"A of {self.name}", A, (self.m, state.robot.nv)), checked(f"b of {self.name}", b, (self.m,))
+        result = self.function(state, t)
+        if not isinstance(result, tuple | list) or len(result) != 2:
+            raise InputError(f"function of {self.name} must give A and b of A q̈ = b, not {short_repr(result)}.")
+        A, b = result
+        return as_array(f"A of {self.name}", A, (self.m, state.robot.nv)), as_array(f"b of {self.name}", b, (self.m,))
 
 
 @dataclass(frozen=True, eq=False)
-class RollingWheel(OnePoint):
+class RollingWheel(SinglePointContact):
     """(6) A wheel or disc that rolls on a plane without slipping: the nonholonomic case.
 
     g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest, where c is the wheel's centre
@@ -97,9 +97,9 @@ class RollingWheel(OnePoint):
     mu: float = DEFAULT_MU
 
     def __post_init__(self) -> None:
-        check_ground(self)
+        check_contact(self)
         object.__setattr__(self, "axis", unit_vector(f"axis of {self.frame}", self.axis))
-        object.__setattr__(self, "radius", positive(f"radius of {self.frame}", self.radius, "m"))
+        object.__setattr__(self, "radius", as_positive(f"radius of {self.frame}", self.radius, "m"))
 
     def slip(self, state: State) -> Array:
         """g(q, q̇), shape (3,), m/s, world: the velocity of the touching point, zero when the wheel rolls."""
@@ -111,7 +111,7 @@ class RollingWheel(OnePoint):
         axle_rate = cross(state.frame_velocity(self.frame)[3:], axle)
         w = n - (n @ axle) * axle
         length = float(np.linalg.norm(w))
-        if length < _FLAT_WHEEL:
+        if length < _MIN_TILT:
             raise InputError(f"wheel {self.frame} lies flat on its side; it has no single lowest point to roll on.")
         u, w_rate = w / length, -(n @ axle_rate) * axle - (n @ axle) * axle_rate
         return -self.radius * u, -self.radius / length * (w_rate - u * (u @ w_rate))
@@ -122,19 +122,19 @@ def fixed_frame(frame: str) -> LinearConstraint:
 
     With a floating base bolted by it, λ is what the document's Figure 1 (left) calls the reaction of the ground.
     """
-    return LinearConstraint(f"bolts of {text('frame', frame)}", 6, partial(_bolted, frame))
+    return LinearConstraint(f"bolts of {as_string('frame', frame)}", 6, partial(_fixed_frame_rows, frame))
 
 
 def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
     """A frame's origin driven with a given acceleration (3,), m/s², world, as a function of t: A q̈ = b(q, q̇, t) (note 6)."""
-    function("acceleration", acceleration, "acceleration(t)")
-    return LinearConstraint(f"drive of {text('frame', frame)}", 3, partial(_driven, frame, acceleration))
+    as_callable("acceleration", acceleration, "acceleration(t)")
+    return LinearConstraint(f"drive of {as_string('frame', frame)}", 3, partial(_moving_frame_rows, frame, acceleration))
 
 
 # with names, so that they can be pickled
-def _bolted(frame: str, state: State, t: float) -> tuple[Array, Array]:
+def _fixed_frame_rows(frame: str, state: State, t: float) -> tuple[Array, Array]:
     return state.frame_jacobian(frame), -state.frame_drift(frame)
 
 
-def _driven(frame: str, acceleration: Callable[[float], Array], state: State, t: float) -> tuple[Array, Array]:
-    return state.frame_jacobian(frame)[:3], checked("acceleration", acceleration(t), (3,)) - state.frame_drift(frame)[:3]
+def _moving_frame_rows(frame: str, acceleration: Callable[[float], Array], state: State, t: float) -> tuple[Array, Array]:
+    return state.frame_jacobian(frame)[:3], as_array("acceleration", acceleration(t), (3,)) - state.frame_drift(frame)[:3]

@@ -8,8 +8,8 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, cross, positive, read_only, text, unit_vector
-from floatbase.robots import State, checked_corners
+from floatbase._validation import Array, Value, as_array, cross, as_positive, read_only, as_string, unit_vector
+from floatbase.robots import State, as_corners
 
 UP = read_only([0.0, 0.0, 1.0])
 DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry concrete
@@ -53,7 +53,7 @@ class Contact(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class OnePoint(Value):
+class SinglePointContact(Value):
     """What contacts at one point of a frame's body share; `_arm` says where the point is and how it moves on the body."""
 
     frame: str
@@ -95,7 +95,7 @@ class OnePoint(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class PointContact(OnePoint):
+class PointContact(SinglePointContact):
     """A point of the robot that does not move on the ground: A = J, b = -J̇ q̇ (5).
 
     The contact point is the lowest point of a ball: centre - radius · normal. As the ball rolls, that point moves on the
@@ -114,9 +114,9 @@ class PointContact(OnePoint):
     centre: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        check_ground(self)
-        object.__setattr__(self, "radius", positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True))
-        object.__setattr__(self, "centre", checked(f"centre of {self.frame}", self.centre, (3,), "m"))
+        check_contact(self)
+        object.__setattr__(self, "radius", as_positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True))
+        object.__setattr__(self, "centre", as_array(f"centre of {self.frame}", self.centre, (3,), "m"))
 
     def _arm(self, state: State) -> tuple[Array, Array]:
         """R c - r n. Only R c turns with the foot, the contact point stays below the centre."""
@@ -144,8 +144,8 @@ class FlatFootContact(Value):
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z", "angular x", "angular y", "angular z")  # world-aligned
 
     def __post_init__(self) -> None:
-        check_ground(self)
-        object.__setattr__(self, "corners", checked_corners(self.frame, self.corners))
+        check_contact(self)
+        object.__setattr__(self, "corners", as_corners(self.frame, self.corners))
 
     @property
     def name(self) -> str:
@@ -166,31 +166,31 @@ class FlatFootContact(Value):
         """World positions of the corners, shape (n, 3), m."""
         return read_only([state.point(self.frame, corner) for corner in self.corners])
 
-    def generators(self, state: State) -> Array:
-        """Corner forces to their wrench at the frame's origin, shape (6, k), N and N·m, world-aligned: J = generatorsᵀ A."""
+    def force_generator_matrix(self, state: State) -> Array:
+        """Corner forces to their wrench at the frame's origin, (6, k), N, N·m, world axes: J = force_generator_matrixᵀ A."""
         return grasp_matrix(self.corners @ state.frame_pose(self.frame).rotation.T, np.zeros(3))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """Jacobian of the corners, shape (k, nv), world-aligned; its rank is at most 6."""
-        return read_only(self.generators(state).T @ state.frame_jacobian(self.frame))
+        return read_only(self.force_generator_matrix(state).T @ state.frame_jacobian(self.frame))
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) The frame's six rows and -J̇ q̇, shapes (6, nv) and (6,), m/s² and rad/s²."""
         return state.frame_jacobian(self.frame), read_only(-state.frame_drift(self.frame))
 
 
-def grasp_matrix(points: Array, about: Array) -> Array:
+def grasp_matrix(points: Array, reference_point: Array) -> Array:
     """(20)(21) G_f above G_τ, shape (6, 3n): forces at points, shape (n, 3), m, to their wrench about a point, shape (3,).
 
     Known as the grasp matrix in manipulation. N and N·m, world.
     """
-    points, about = checked("points", points, (None, 3), "m"), checked("about", about, (3,), "m")
-    blocks = [np.vstack([np.eye(3), pin.skew(point - about)]) for point in points]
+    points, reference_point = as_array("points", points, (None, 3), "m"), as_array("reference_point", reference_point, (3,), "m")
+    blocks = [np.vstack([np.eye(3), pin.skew(point - reference_point)]) for point in points]
     return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
 
 
-def check_ground(contact: Contact) -> None:
+def check_contact(contact: Contact) -> None:
     """Check a new contact's friction coefficient and normal, and scale the normal to unit length."""
-    text("frame of a contact", contact.name)
+    as_string("frame of a contact", contact.name)
     object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))
-    object.__setattr__(contact, "mu", positive(f"friction coefficient mu of {contact.name}", contact.mu))
+    object.__setattr__(contact, "mu", as_positive(f"friction coefficient mu of {contact.name}", contact.mu))

@@ -9,14 +9,14 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, cached_property, checked, number, of_kind, plain_numbers, read_only, said, texts
+from floatbase._validation import Array, Value, cached_property, as_array, as_number, as_instance, numeric_copy, read_only, short_repr, as_strings
 from floatbase.dynamics.constraints import LinearConstraint
-from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, OnePoint, PointContact
+from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, SinglePointContact, PointContact
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 
 PerFoot: TypeAlias = float | Sequence[float] | Array | Mapping[str, float]
-_FROM_NAMES = "fb.Contacts.points(robot, frames=[…]) makes them from names"
+_HINT = "fb.Contacts.points(robot, frames=[…]) makes them from names"
 Normals: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike] | None
 
 
@@ -31,14 +31,14 @@ class Contacts(Value):
 
     def __post_init__(self) -> None:
         if not isinstance(self.items, Sequence) or isinstance(self.items, str):
-            raise InputError(f"Contacts takes a list of contacts, not {said(self.items)}; {_FROM_NAMES}.")
+            raise InputError(f"Contacts takes a list of contacts, not {short_repr(self.items)}; {_HINT}.")
         object.__setattr__(self, "items", tuple(self.items))
         for contact in self.items:
             if isinstance(contact, type) or not isinstance(contact, Contact):
-                raise InputError(f"{said(contact)} is no contact; {_FROM_NAMES}.")
-        twice = sorted({name for name in self.names if self.names.count(name) > 1})
-        if twice:
-            raise InputError(f"contact {twice[0]!r} stands twice in the list; each name may stand once.")
+                raise InputError(f"{short_repr(contact)} is no contact; {_HINT}.")
+        duplicates = sorted({name for name in self.names if self.names.count(name) > 1})
+        if duplicates:
+            raise InputError(f"contact {duplicates[0]!r} stands twice in the list; each name may stand once.")
 
     @staticmethod
     def none() -> Contacts:
@@ -58,19 +58,19 @@ class Contacts(Value):
         normals: world, out of the ground: (3,) for all, (n, 3) in the order of the frames, or a mapping from frame to (3,);
             straight up by default.
         """
-        return Contacts([_contact(*each, flat=False) for each in _feet(robot, frames, mu, normals)])
+        return Contacts([_make_contact(*foot_data, flat=False) for foot_data in _selected_feet(robot, frames, mu, normals)])
 
     @staticmethod
     def flat_feet(
         robot: Robot, mu: PerFoot = DEFAULT_MU, frames: Sequence[str] | None = None, normals: Normals = None
     ) -> Contacts:
         """Flat-foot contacts at the robot's feet with area; arguments as for `points`."""
-        each = _feet(robot, frames, mu, normals)
-        for foot, *_ in each:
+        feet = _selected_feet(robot, frames, mu, normals)
+        for foot, *_ in feet:
             if not foot.is_flat:
-                instead = "use fb.Contacts.points, or load the robot with feet=[floatbase.robots.Foot(frame, corners=…)]"
-                raise InputError(f"{foot.frame} of {robot.name} is not a flat foot; {instead}.")
-        return Contacts([_contact(*one) for one in each])
+                hint = "use fb.Contacts.points, or load the robot with feet=[floatbase.robots.Foot(frame, corners=…)]"
+                raise InputError(f"{foot.frame} of {robot.name} is not a flat foot; {hint}.")
+        return Contacts([_make_contact(*foot_data) for foot_data in feet])
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
@@ -79,7 +79,7 @@ class Contacts(Value):
         mu, normals: as for `points`.
         """
         return Contacts(
-            [_contact(*each) for each in _feet(robot, None, mu, normals)] if of_kind("robot", robot, Robot).feet else []
+            [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)] if as_instance("robot", robot, Robot).feet else []
         )
 
     @cached_property
@@ -113,7 +113,7 @@ class Contacts(Value):
         return read_only([contact.mu for contact in self.items for _ in contact.point_names])
 
     @cached_property
-    def point_entries(self) -> npt.NDArray[np.intp]:
+    def point_force_indices(self) -> npt.NDArray[np.intp]:
         """Which entries of λ are forces at points, shape (3 n,): all but those of a `LinearConstraint`."""
         entries = np.flatnonzero([bool(contact.point_names) for contact in self.items for _ in range(contact.k)])
         entries.flags.writeable = False
@@ -121,28 +121,28 @@ class Contacts(Value):
 
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one radius below its centre."""
-        of_kind("state", state, State)
+        as_instance("state", state, State)
         return read_only(np.vstack([np.zeros((0, 3)), *(contact.positions(state) for contact in self.items)]))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """J of (4), shape (k, nv), at time t, s."""
-        of_kind("state", state, State)
-        t = number("t", t, "s")
+        as_instance("state", state, State)
+        t = as_number("t", t, "s")
         return self._stacked(state, [read_only(contact.jacobian(state, t)) for contact in self.items])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
-        of_kind("state", state, State)
-        t = number("t", t, "s")
+        as_instance("state", state, State)
+        t = as_number("t", t, "s")
         parts = [tuple(map(read_only, contact.constraint(state, t))) for contact in self.items]
         b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
     def _jacobian_and_constraint(self, state: State, t: float) -> tuple[Array, Array, Array]:
         """J of (4) with A and b of (5)."""
-        of_kind("state", state, State)
-        t = number("t", t, "s")
-        parts = [motion_of(contact, state, t) for contact in self.items]
+        as_instance("state", state, State)
+        t = as_number("t", t, "s")
+        parts = [constraint_and_jacobian(contact, state, t) for contact in self.items]
         A, b = self._stacked(state, [part[0] for part in parts]), np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return A if all(J is A for A, _, J in parts) else self._stacked(state, [part[2] for part in parts]), A, read_only(b)
 
@@ -164,9 +164,9 @@ class Contacts(Value):
         part, contact = self.force_slice(name), self[name]
         if contact.k != 3 * len(contact.point_names):
             raise InputError(f"the forces of {name} do not act at points, so they add up to no force; see force_slice.")
-        stacked = plain_numbers(forces)
+        stacked = numeric_copy(forces)
         if stacked is None or stacked.ndim not in (1, 2) or stacked.shape[-1] != self.k:
-            got = f"is {said(forces)}" if stacked is None else f"has shape {stacked.shape}"
+            got = f"is {short_repr(forces)}" if stacked is None else f"has shape {stacked.shape}"
             raise InputError(f"forces {got}; {self!r} takes ({self.k},) or (n, {self.k}) (N).")
         return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
 
@@ -186,7 +186,7 @@ class Contacts(Value):
         return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
-        return Contacts([*self.items, *of_kind("what is added to Contacts", other, Contacts, "fb.Contacts([contact])").items])
+        return Contacts([*self.items, *as_instance("what is added to Contacts", other, Contacts, "fb.Contacts([contact])").items])
 
     def __iter__(self) -> Iterator[Contact]:
         return iter(self.items)
@@ -198,16 +198,16 @@ class Contacts(Value):
         return f"Contacts({', '.join(self.names)}; k={self.k})"
 
 
-def motion_of(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
+def constraint_and_jacobian(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
     """A, shape (m, nv), and b, shape (m,), of (5) and J, shape (k, nv), of (4) of one contact; read-only, at time t in s.
 
     J is A where that is so by definition, as for a point: such a contact is asked once. Raises `InputError` for other shapes.
     """
     A, b = map(read_only, contact.constraint(state, t))  # one's own may write to its arrays again
-    kind: Any = type(contact)  # one derived from ours may have another Jacobian
-    held = isinstance(contact, OnePoint) and (kind.jacobian, kind.constraint) == (OnePoint.jacobian, OnePoint.constraint)
-    is_linear = getattr(kind, "jacobian", None) is LinearConstraint.jacobian
-    J = A if held or is_linear else read_only(contact.jacobian(state, t))
+    cls: Any = type(contact)  # one derived from ours may have another Jacobian
+    is_point = isinstance(contact, SinglePointContact) and (cls.jacobian, cls.constraint) == (SinglePointContact.jacobian, SinglePointContact.constraint)
+    is_linear = getattr(cls, "jacobian", None) is LinearConstraint.jacobian
+    J = A if is_point or is_linear else read_only(contact.jacobian(state, t))
     m, nv = len(contact.row_names), state.robot.nv
     if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
         required = f"they must have ({m}, {nv}), ({m},) and ({contact.k}, {nv})"
@@ -215,32 +215,32 @@ def motion_of(contact: Contact, state: State, t: float) -> tuple[Array, Array, A
     return A, b, J
 
 
-def _contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:
+def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:
     if flat and foot.corners is not None:
         return FlatFootContact(foot.frame, foot.corners, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
 
 
-def _feet(robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals) -> list[tuple[Foot, float, Array]]:
+def _selected_feet(robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals) -> list[tuple[Foot, float, Array]]:
     """The feet that touch, each with its coefficient of friction and its normal."""
-    of_kind("robot", robot, Robot)
-    feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in texts("frames", frames))
+    as_instance("robot", robot, Robot)
+    feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in as_strings("frames", frames))
     if not feet:
         raise InputError(f'{robot.name} has no feet; name the frames that touch: frames=["…"] (robot.frames lists them).')
     names = [foot.frame for foot in feet]
     normals = UP if normals is None else normals
-    return list(zip(feet, _each("mu", mu, names, DEFAULT_MU), _each("normals", normals, names, UP, (3,)), strict=True))
+    return list(zip(feet, _per_name("mu", mu, names, DEFAULT_MU), _per_name("normals", normals, names, UP, (3,)), strict=True))
 
 
-def _each(argument: str, value: Any, names: Sequence[str], default: Any, shape: tuple[int, ...] = ()) -> list[Any]:
+def _per_name(argument: str, value: Any, names: Sequence[str], default: Any, shape: tuple[int, ...] = ()) -> list[Any]:
     """One value of this shape for each name: the same for all, one after the other, or by name with a default."""
     if isinstance(value, Mapping):
         for name in set(value) - set(names):
             raise unknown_name(f"contact frame in {argument}", name, names)
         return [value.get(name, default) for name in names]
     if isinstance(value, Sequence) and value and all(isinstance(entry, str) for entry in value):
-        raise InputError(f"{argument} must be numbers, not {said(value)}; names of frames go to frames=[…].")
-    found = plain_numbers(value)
-    if not isinstance(value, Sequence | np.ndarray) if found is None else found.ndim == len(shape):
+        raise InputError(f"{argument} must be numbers, not {short_repr(value)}; names of frames go to frames=[…].")
+    numeric = numeric_copy(value)
+    if not isinstance(value, Sequence | np.ndarray) if numeric is None else numeric.ndim == len(shape):
         return [value] * len(names)
-    return list(checked(argument, value, (len(names), *shape)))
+    return list(as_array(argument, value, (len(names), *shape)))

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, flat_forces, of_kind
+from floatbase._validation import Array, Value, as_array, as_forces, as_instance
 from floatbase.dynamics.contacts import Contacts
 from floatbase.robots import Robot, State
 
@@ -60,15 +60,15 @@ class EquationsOfMotion(Value):
 
     def acceleration(self, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
         """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,), for torques (d,), N·m, and forces (k,), N, whatever A q̈ = b asks for."""
-        tau = checked("tau", tau, (self.d,), "N·m")
-        forces = flat_forces(forces, self.k)
+        tau = as_array("tau", tau, (self.d,), "N·m")
+        forces = as_forces(forces, self.k)
         return np.linalg.solve(self.M, self.S @ tau + self.J.T @ forces - self.h)
 
     def residual(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> tuple[Array, Array]:
         """How far (q̈, τ, λ) is from satisfying (7): M q̈ + h - S τ - Jᵀ λ, shape (nv,), and A q̈ - b, shape (m,)."""
-        qdd = checked("qdd", qdd, (self.nv,))
-        tau = checked("tau", tau, (self.d,), "N·m")
-        forces = flat_forces(forces, self.k)
+        qdd = as_array("qdd", qdd, (self.nv,))
+        tau = as_array("tau", tau, (self.d,), "N·m")
+        forces = as_forces(forces, self.k)
         return self.M @ qdd + self.h - self.S @ tau - self.J.T @ forces, self.A @ qdd - self.b
 
 
@@ -77,7 +77,7 @@ def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> Equ
 
     Raises `InputError` for values of another kind and `UnknownNameError` for a contact on a frame the robot lacks.
     """
-    of_kind("state", state, State)
-    of_kind("contacts", contacts, Contacts)
+    as_instance("state", state, State)
+    as_instance("contacts", contacts, Contacts)
     J, A, b = contacts._jacobian_and_constraint(state, t)
     return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, function, of_kind, read_only
+from floatbase._validation import Array, Value, as_array, as_callable, as_instance, read_only
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import State
 
-Turning: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
-_LARGEST_TURN = 0.01  # rad between two points of the grid on which the frame's turning is added up: 1e-10 rad off after a turn
-_MOST_STEPS = 100_000  # between two times: 160 turns, and some seconds of computing
+VectorOrFunction: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
+_MAX_ROTATION_STEP = 0.01  # rad between two points of the grid on which the turning is added up: 1e-10 rad off after a turn
+_MAX_STEPS = 100_000  # between two times: 160 turns, and some seconds of computing
 _STEP = 1e-5  # m and rad to each side for central differences: curvature and rounding both leave about 1e-10 of M
 
 
@@ -51,12 +51,12 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
 
     Raises `InputError` for other axes.
     """
-    of_kind("state", state, State)
+    as_instance("state", state, State)
     if not isinstance(axes, str) or axes not in ("base", "world"):
         raise unknown_name("axes", axes, ("base", "world"))
     model = state.robot.model
     data = model.createData()
-    T = _to_base_axes(state) if axes == "world" else np.eye(model.nv)
+    T = _world_to_base_axes(state) if axes == "world" else np.eye(model.nv)
     g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
 
     def moving(v: Array) -> Array:
@@ -69,7 +69,7 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
     return BiasForces(read_only(T.T @ g), read_only(centrifugal), read_only(moving(state.v) - centrifugal))
 
 
-def _to_base_axes(state: State) -> Array:
+def _world_to_base_axes(state: State) -> Array:
     """T with v = T u, shape (nv, nv), orthogonal: u has the base's velocities in the world's axes."""
     T = np.eye(state.robot.nv)
     if state.robot.is_floating:
@@ -82,7 +82,7 @@ def coriolis_matrix(state: State) -> Array:
 
     Many matrices satisfy the first; this one, Pinocchio's, satisfies both.
     """
-    of_kind("state", state, State)
+    as_instance("state", state, State)
     model = state.robot.model
     return read_only(pin.computeCoriolisMatrix(model, model.createData(), state.q, state.v))
 
@@ -100,24 +100,24 @@ def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
     comes from central differences of M along the motion, which know nothing of C; their error is about 1e-10 of the two terms.
     C: shape (nv, nv), `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
     """
-    of_kind("state", state, State)
-    C = coriolis_matrix(state) if C is None else checked("C", C, (state.robot.nv, state.robot.nv))
+    as_instance("state", state, State)
+    C = coriolis_matrix(state) if C is None else as_array("C", C, (state.robot.nv, state.robot.nv))
     dt = _STEP / max(1.0, float(np.max(np.abs(state.v), initial=0.0)))
     after, before = (state.replace(q=state.integrate(t * state.v)).M for t in (dt, -dt))
     return float(state.v @ ((after - before) / (2.0 * dt) - 2.0 * C) @ state.v)
 
 
-def inward_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
+def centripetal_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
     """App. A, the one-link robot: ω × (ω × r), shape (3,), m/s², of a point on a link that turns at constant rate.
 
     omega: (3,) rad/s; r: (3,) m, from a point of the axis to the link's, both in the answer's frame. It points at the axis.
     """
-    omega = checked("omega", omega, (3,), "rad/s")
-    return read_only(np.cross(omega, np.cross(omega, checked("r", r, (3,), "m"))))
+    omega = as_array("omega", omega, (3,), "rad/s")
+    return read_only(np.cross(omega, np.cross(omega, as_array("r", r, (3,), "m"))))
 
 
 @dataclass(frozen=True, eq=False)
-class TurningView(Value):
+class RotatingFrameView(Value):
     """A free particle as one who rides on a turning frame sees it; a row for each time.
 
     All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: the document, Appendix A.
@@ -142,13 +142,13 @@ class TurningView(Value):
         return read_only(self.centrifugal + self.coriolis + self.euler)
 
 
-def seen_from_turning_frame(
+def view_from_rotating_frame(
     time: npt.ArrayLike,
-    omega: Turning,
+    omega: VectorOrFunction,
     position: npt.ArrayLike,
     velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    omega_rate: Turning | None = None,
-) -> TurningView:
+    omega_rate: VectorOrFunction | None = None,
+) -> RotatingFrameView:
     """App. A: a particle that no force acts on, moving straight in the world, seen from a frame that turns.
 
     time: (n,) s, rising; the frame's axes are the world's at time[0], its origin stays at the world's.
@@ -159,17 +159,17 @@ def seen_from_turning_frame(
 
     Raises `InputError` for times that do not rise, wrong shapes and an ω(t) without its rate.
     """
-    time = checked("time", time, (None,), "s")
+    time = as_array("time", time, (None,), "s")
     if time.size < 1 or np.any(np.diff(time) <= 0.0):
         raise InputError("time must hold at least one instant, and each must come after the one before.")
     if callable(omega) and omega_rate is None:
         raise InputError("omega is a function of time; give its derivative too, omega_rate=lambda t: …, rad/s².")
-    turn, rate = _as_function("omega", omega), _as_function("omega_rate", np.zeros(3) if omega_rate is None else omega_rate)
-    R, start, v = _rotations(time, turn), checked("position", position, (3,), "m"), checked("velocity", velocity, (3,), "m/s")
-    world = [[start + (t - time[0]) * v, v, turn(t), rate(t)] for t in time]
-    p, v_turned, w, w_rate = np.einsum("nji,nkj->kni", R, world)  # Rᵀ x: in the frame's axes
-    p_rate = v_turned - np.cross(w, p)
-    return TurningView(
+    omega_at, omega_rate_at = _as_function("omega", omega), _as_function("omega_rate", np.zeros(3) if omega_rate is None else omega_rate)
+    R, start, v = _rotations(time, omega_at), as_array("position", position, (3,), "m"), as_array("velocity", velocity, (3,), "m/s")
+    world = [[start + (t - time[0]) * v, v, omega_at(t), omega_rate_at(t)] for t in time]
+    p, v_rotated, w, w_rate = np.einsum("nji,nkj->kni", R, world)  # Rᵀ x: in the frame's axes
+    p_rate = v_rotated - np.cross(w, p)
+    return RotatingFrameView(
         time=time,
         rotation=read_only(R),
         position=read_only(p),
@@ -180,12 +180,12 @@ def seen_from_turning_frame(
     )
 
 
-def _as_function(name: str, value: Turning) -> Callable[[float], Array]:
+def _as_function(name: str, value: VectorOrFunction) -> Callable[[float], Array]:
     """The value as a checked function of time."""
     if callable(value):
-        function(name, value, f"{name}(t)")
-        return lambda t: checked(f"{name} at {t:g} s", value(t), (3,))
-    constant = checked(name, value, (3,))
+        as_callable(name, value, f"{name}(t)")
+        return lambda t: as_array(f"{name} at {t:g} s", value(t), (3,))
+    constant = as_array(name, value, (3,))
     return lambda t: constant
 
 
@@ -197,16 +197,16 @@ def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
     R = np.empty((time.size, 3, 3))
     R[0] = np.eye(3)
     for i, (begin, end) in enumerate(pairwise(time)):
-        fastest = max(float(np.linalg.norm(omega(t))) for t in np.linspace(begin, end, 3))
-        steps = int(np.ceil(fastest * (end - begin) / _LARGEST_TURN)) + 1
-        if steps > _MOST_STEPS:
+        max_speed = max(float(np.linalg.norm(omega(t))) for t in np.linspace(begin, end, 3))
+        steps = int(np.ceil(max_speed * (end - begin) / _MAX_ROTATION_STEP)) + 1
+        if steps > _MAX_STEPS:
             raise InputError(
-                f"from {begin:g} s to {end:g} s the frame turns by {steps * _LARGEST_TURN:g} rad; use a shorter time."
+                f"from {begin:g} s to {end:g} s the frame turns by {steps * _MAX_ROTATION_STEP:g} rad; use a shorter time."
             )
         dt = (end - begin) / steps
         R[i + 1] = R[i]
         for t in begin + dt * np.arange(steps):
             first, second = (omega(float(t + (0.5 + side * np.sqrt(3.0) / 6.0) * dt)) for side in (-1.0, 1.0))
-            bend = np.sqrt(3.0) / 12.0 * dt**2 * np.cross(second, first)
-            R[i + 1] = pin.exp3(0.5 * dt * (first + second) + bend) @ R[i + 1]
+            commutator = np.sqrt(3.0) / 12.0 * dt**2 * np.cross(second, first)
+            R[i + 1] = pin.exp3(0.5 * dt * (first + second) + commutator) @ R[i + 1]
     return R

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, cached_property, checked, flat_forces, of_kind, read_only
+from floatbase._validation import Array, Value, cached_property, as_array, as_forces, as_instance, read_only
 from floatbase.affine import Affine
 from floatbase.dynamics.equations import EquationsOfMotion
-from floatbase.dynamics.resolve import contact_space
+from floatbase.dynamics.constraint_rank import contact_space
 from floatbase.linear_algebra import null_space, rank
 
 
-def contact_inertia_inverse(eom: EquationsOfMotion) -> Array:
+def delassus_matrix(eom: EquationsOfMotion) -> Array:
     """(8) A M⁻¹ Jᵀ, shape (m, k): how the contacts' accelerations answer to their forces.
 
     For points J M⁻¹ Jᵀ, known as the Delassus matrix; its inverse, where there is one, is the inertia that contacts feel.
     """
-    of_kind("eom", eom, EquationsOfMotion)
+    as_instance("eom", eom, EquationsOfMotion)
     return read_only(eom.A @ np.linalg.solve(eom.M, eom.J.T))
 
 
@@ -28,36 +28,36 @@ def forces_from_torques(eom: EquationsOfMotion) -> Affine:
 
     Maps shape (d,), N·m, to (k,), N, world. λ is unique where J has full row rank k; elsewhere (solo8 on four feet, corners
     of a flat foot) this is the smallest λ, as the pseudo-inverse has it. Directions of motion that the contacts resolve worse
-    than `MOTION_TOLERANCE` count as not held, see `contact_space`. Source: the document, §2.2.1.
+    than `CONSTRAINT_RANK_TOLERANCE` count as not held, see `contact_space`. Source: the document, §2.2.1.
     """
     space = contact_space(eom)
-    # what forces must add to q̈ along the resolved rows: b - rows M⁻¹ (S τ - h)
-    missing = Affine(-space.rows @ np.linalg.solve(eom.M, eom.S), space.b + space.rows @ np.linalg.solve(eom.M, eom.h))
-    return Affine.linear(space.lift) @ missing
+    # what forces must add to q̈ along the resolved rows: b - A M⁻¹ (S τ - h)
+    required_acceleration = Affine(-space.A @ np.linalg.solve(eom.M, eom.S), space.b + space.A @ np.linalg.solve(eom.M, eom.h))
+    return Affine.linear(space.force_map) @ required_acceleration
 
 
 def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
     """(14) η: τ -> q̈ = M⁻¹ (S τ + Jᵀ ζ(τ) - h), shape (d,) to (nv,). Right whether or not λ is unique. Source: §3."""
-    of_kind("eom", eom, EquationsOfMotion)
-    return _motion_of(eom, Affine.identity(eom.d), forces_from_torques(eom))
+    as_instance("eom", eom, EquationsOfMotion)
+    return _acceleration_map(eom, Affine.identity(eom.d), forces_from_torques(eom))
 
 
 def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """(10) C, shape (m, d + k), and its right-hand side b + A M⁻¹ h, shape (m,): C (τ, λ) = b + A M⁻¹ h."""
-    of_kind("eom", eom, EquationsOfMotion)
-    C = np.hstack([eom.A @ np.linalg.solve(eom.M, eom.S), contact_inertia_inverse(eom)])
+    as_instance("eom", eom, EquationsOfMotion)
+    C = np.hstack([eom.A @ np.linalg.solve(eom.M, eom.S), delassus_matrix(eom)])
     return read_only(C), read_only(eom.b + eom.A @ np.linalg.solve(eom.M, eom.h))
 
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
     """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
-    of_kind("eom", eom, EquationsOfMotion)
-    return _orthonormal(_pairs(eom))
+    as_instance("eom", eom, EquationsOfMotion)
+    return _orthonormalised(_torque_force_map(eom))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """(12) B, shape (nv + m, nv + d + k), and its right-hand side (-h, b): B (q̈, τ, λ) = (-h, b)."""
-    of_kind("eom", eom, EquationsOfMotion)
+    as_instance("eom", eom, EquationsOfMotion)
     B = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.d + eom.k))]])
     return read_only(B), read_only(np.concatenate([-eom.h, eom.b]))
 
@@ -95,12 +95,12 @@ class FeasibleSpace(Value):
     def coordinates(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
         """The β of a feasible (q̈, τ, λ), or of the feasible point nearest to one that is not; shape (dimension,)."""
         eom = self.eom
-        parts = [checked("qdd", qdd, (eom.nv,)), checked("tau", tau, (eom.d,)), flat_forces(forces, eom.k)]
+        parts = [as_array("qdd", qdd, (eom.nv,)), as_array("tau", tau, (eom.d,)), as_forces(forces, eom.k)]
         return self.map.A.T @ (np.concatenate(parts) - self.map.b)
 
     def __call__(self, beta: npt.ArrayLike) -> tuple[Array, Array, Array]:
         """(q̈, τ, λ) at β, shape (dimension,)."""
-        beta = checked("beta", beta, (self.dimension,))
+        beta = as_array("beta", beta, (self.dimension,))
         return self.qdd(beta), self.tau(beta), self.forces(beta)
 
 
@@ -110,10 +110,10 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the resolved part
     of the contacts (`contact_space`): the same space as by the SVD of B, and one of bounded numbers where J nearly loses rank.
     """
-    of_kind("eom", eom, EquationsOfMotion)
-    pairs = _pairs(eom)
-    qdd = _motion_of(eom, pairs["tau"], pairs["forces"])
-    return FeasibleSpace(eom, _orthonormal(Affine.stack(qdd=qdd, tau=pairs["tau"], forces=pairs["forces"])))
+    as_instance("eom", eom, EquationsOfMotion)
+    torque_force = _torque_force_map(eom)
+    qdd = _acceleration_map(eom, torque_force["tau"], torque_force["forces"])
+    return FeasibleSpace(eom, _orthonormalised(Affine.stack(qdd=qdd, tau=torque_force["tau"], forces=torque_force["forces"])))
 
 
 def internal_forces(eom: EquationsOfMotion) -> Array:
@@ -124,13 +124,13 @@ def internal_forces(eom: EquationsOfMotion) -> Array:
     all of them about without moving anything: ζ answers -J_jᵀ λ with λ. Where J loses rank (solo8 on four feet) the k - r
     directions of null(Jᵀ) are among them; no torques can bring those about, which leaves rank J - rank J_b to torques.
     """
-    of_kind("eom", eom, EquationsOfMotion)
+    as_instance("eom", eom, EquationsOfMotion)
     return null_space(eom.J[:, : eom.nv - eom.d].T)
 
 
 def undetermined_forces(eom: EquationsOfMotion) -> Array:
     """Forces that change nothing at all, orthonormal columns of null(Jᵀ), shape (k, k - rank J): why λ may not be unique."""
-    return contact_space(eom).free
+    return contact_space(eom).null_forces
 
 
 @dataclass(frozen=True)
@@ -163,40 +163,40 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     `contact_space` decides the rank of J. B and C are counted by their own singular values, with the resolved rows and their
     forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
-    of_kind("eom", eom, EquationsOfMotion)
+    as_instance("eom", eom, EquationsOfMotion)
     space = contact_space(eom)
-    reactions = np.linalg.qr(eom.J.T @ space.lift)[0]
-    B = np.block([[eom.M, -eom.S, -reactions], [space.rows, np.zeros((space.r, eom.d + space.r))]])
-    C = space.rows @ np.linalg.solve(eom.M, np.hstack([eom.S, reactions]))
-    internal, free = internal_forces(eom).shape[1], eom.k - space.r
+    reactions = np.linalg.qr(eom.J.T @ space.force_map)[0]
+    B = np.block([[eom.M, -eom.S, -reactions], [space.A, np.zeros((space.r, eom.d + space.r))]])
+    C = space.A @ np.linalg.solve(eom.M, np.hstack([eom.S, reactions]))
+    internal, undetermined = internal_forces(eom).shape[1], eom.k - space.r
     return Dimensions(
         nv=eom.nv,
         d=eom.d,
         k=eom.k,
         rank_J=space.r,
         rank_J_base=eom.k - internal,
-        null_B=B.shape[1] - rank(B) + free,
-        null_C=C.shape[1] - rank(C) + free,
+        null_B=B.shape[1] - rank(B) + undetermined,
+        null_C=C.shape[1] - rank(C) + undetermined,
         internal=internal,
-        undetermined=free,
+        undetermined=undetermined,
         rank_V_qdd=rank(null_space(B)[: eom.nv], absolute=True),
     )
 
 
-def _pairs(eom: EquationsOfMotion) -> Affine:
+def _torque_force_map(eom: EquationsOfMotion) -> Affine:
     """(τ, z) -> (τ, λ): the smallest λ for τ, and any of the undetermined ones with it."""
-    smallest, free = forces_from_torques(eom), undetermined_forces(eom)
-    tau = Affine.linear(np.eye(eom.d, eom.d + free.shape[1]))
-    return Affine.stack(tau=tau, forces=Affine(np.hstack([smallest.A, free]), smallest.b))
+    minimum_norm, null_forces = forces_from_torques(eom), undetermined_forces(eom)
+    tau = Affine.linear(np.eye(eom.d, eom.d + null_forces.shape[1]))
+    return Affine.stack(tau=tau, forces=Affine(np.hstack([minimum_norm.A, null_forces]), minimum_norm.b))
 
 
-def _motion_of(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Affine:
+def _acceleration_map(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Affine:
     """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h) of τ and λ that depend on something."""
     A = np.linalg.solve(eom.M, eom.S @ tau.A + eom.J.T @ forces.A)
     return Affine(A, np.linalg.solve(eom.M, eom.S @ tau.b + eom.J.T @ forces.b - eom.h))
 
 
-def _orthonormal(f: Affine) -> Affine:
+def _orthonormalised(f: Affine) -> Affine:
     """The values of f as v + V⊥ β: V⊥ orthonormal, v the smallest of them."""
     V = np.linalg.qr(f.A)[0]
     return Affine(V, f.b - V @ (V.T @ f.b), f.blocks)

@@ -1,11 +1,11 @@
 """Friction cones, polyhedra and the wrenches that a stance can produce (§4.2 of the document)."""
 
 from floatbase.friction.cones import Decomposition, FrictionCone, FrictionPolyhedron, Status, decompose, tangents
-from floatbase.friction.polytopes import cone_rows, vertices
+from floatbase.friction.polytopes import cone_face_matrix, polytope_vertices
 from floatbase.friction.pressure import centre_of_pressure, contact_wrench
 from floatbase.friction.wrenches import WrenchSet, wrench_set
 
 __all__ = [
-    "Decomposition", "FrictionCone", "FrictionPolyhedron", "Status", "WrenchSet", "centre_of_pressure", "cone_rows",
-    "contact_wrench", "decompose", "tangents", "vertices", "wrench_set",
+    "Decomposition", "FrictionCone", "FrictionPolyhedron", "Status", "WrenchSet", "centre_of_pressure", "cone_face_matrix",
+    "contact_wrench", "decompose", "polytope_vertices", "tangents", "wrench_set",
 ]  # fmt: skip

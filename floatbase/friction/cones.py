@@ -11,11 +11,11 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, cached_property, checked, flag, number, positive, read_only, unit_vector, whole
+from floatbase._validation import Array, Value, cached_property, as_array, as_bool, as_number, as_positive, read_only, unit_vector, as_integer
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
-MOST_FACETS = 1000  # they miss the cone by 5e-6 of μ, which nobody knows as well
-NEAR = 0.02  # part of the friction limit μ α_⊥ within which a force counts as on the surface: measured ones scatter
+MAX_FACETS = 1000  # they miss the cone by 5e-6 of μ, which nobody knows as well
+ACTIVE_TOLERANCE = 0.02  # part of the friction limit μ α_⊥ within which a force counts as on the surface: measured ones scatter
 
 Status: TypeAlias = Literal["inside", "active", "outside"]
 
@@ -53,7 +53,7 @@ def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
 
     force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source: the document, Figure 3.
     """
-    f, n = checked("force", force, (3,), "N"), unit_vector("normal", normal)
+    f, n = as_array("force", force, (3,), "N"), unit_vector("normal", normal)
     alpha = float(n @ f)
     f_par = f - alpha * n
     return Decomposition(read_only(alpha * n), read_only(f_par), alpha, float(np.linalg.norm(f_par)))
@@ -71,7 +71,7 @@ class FrictionCone(Value):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("normal", self.normal))
-        object.__setattr__(self, "mu", positive("friction coefficient mu", self.mu))
+        object.__setattr__(self, "mu", as_positive("friction coefficient mu", self.mu))
 
     @property
     def angle(self) -> float:
@@ -89,11 +89,11 @@ class FrictionCone(Value):
 
     def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
         """(28) Whether friction can make this force: margin ≥ -tolerance, N."""
-        return self.margin(force) >= -positive("tolerance", tolerance, "N", allow_zero=True)
+        return self.margin(force) >= -as_positive("tolerance", tolerance, "N", allow_zero=True)
 
     def status(self, force: npt.ArrayLike) -> Status:
-        """(28) "inside", "active" (on the surface, within `NEAR` of the limit μ α_⊥) or "outside"; force: shape (3,), N."""
-        f = checked("force", force, (3,), "N")
+        """(28) "inside", "active" (on the surface, within `ACTIVE_TOLERANCE` of μ α_⊥) or "outside"; force: (3,), N."""
+        f = as_array("force", force, (3,), "N")
         alpha = float(self.normal @ f)  # as `decompose` has it, for pictures that ask for many
         return _status(float(np.linalg.norm(f - alpha * self.normal)), self.mu * alpha)
 
@@ -105,9 +105,9 @@ class FrictionCone(Value):
         """
         parts = decompose(force, self.normal)
         if parts.alpha_par <= self.mu * parts.alpha_perp:
-            return checked("force", force, (3,), "N")
-        along = max(0.0, parts.alpha_perp + self.mu * parts.alpha_par) / (1.0 + self.mu**2)
-        return read_only(along * (self.normal + self.mu * parts.f_par / parts.alpha_par)) if along else read_only(np.zeros(3))
+            return as_array("force", force, (3,), "N")
+        scale = max(0.0, parts.alpha_perp + self.mu * parts.alpha_par) / (1.0 + self.mu**2)
+        return read_only(scale * (self.normal + self.mu * parts.f_par / parts.alpha_par)) if scale else read_only(np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,38 +117,38 @@ class FrictionPolyhedron(Value):
     normal: shape (3,), world, out of the ground, made unit.
     mu: coefficient of friction, > 0.
     facets: n ≥ 3.
-    inside: whether the polyhedron lies inside the cone (safe: it allows no force that slips) or outside it, touching it
-        (optimistic). Inside, the middle of a facet allows μ cos(π/n) and only the edges reach μ.
-    turn: rad, by which all facets are turned about the normal: facet 0 faces t1 of `tangents` without it.
+    inner_approximation: whether the polyhedron lies inside the cone (safe: it allows no force that slips) or outside it,
+        touching it (optimistic). Inside, the middle of a facet allows μ cos(π/n) and only the edges reach μ.
+    facet_rotation: rad, by which all facets are turned about the normal: facet 0 faces t1 of `tangents` without it.
     """
 
     normal: Array
     mu: float
     facets: int = 4
-    inside: bool = True
-    turn: float = 0.0
+    inner_approximation: bool = True
+    facet_rotation: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("normal", self.normal))
-        object.__setattr__(self, "mu", positive("friction coefficient mu", self.mu))
-        object.__setattr__(self, "turn", number("turn of the facets", self.turn, "rad"))
-        object.__setattr__(self, "facets", whole("facets", self.facets, 3, MOST_FACETS, "μ is not known better"))
-        object.__setattr__(self, "inside", flag("inside", self.inside))
+        object.__setattr__(self, "mu", as_positive("friction coefficient mu", self.mu))
+        object.__setattr__(self, "facet_rotation", as_number("facet_rotation", self.facet_rotation, "rad"))
+        object.__setattr__(self, "facets", as_integer("facets", self.facets, 3, MAX_FACETS, "μ is not known better"))
+        object.__setattr__(self, "inner_approximation", as_bool("inner_approximation", self.inner_approximation))
 
     @property
     def mu_facet(self) -> float:
         """The friction that the middle of a facet allows: μ cos(π/n) inside, μ outside."""
-        return self.mu * float(np.cos(np.pi / self.facets)) if self.inside else self.mu
+        return self.mu * float(np.cos(np.pi / self.facets)) if self.inner_approximation else self.mu
 
     @property
     def area_ratio(self) -> float:
         """Area of the polyhedron's cross-section over the cone's: sin(2π/n) / (2π/n) inside, tan(π/n) / (π/n) outside."""
         half = np.pi / self.facets
-        return float(np.sin(2.0 * half) / (2.0 * half) if self.inside else np.tan(half) / half)
+        return float(np.sin(2.0 * half) / (2.0 * half) if self.inner_approximation else np.tan(half) / half)
 
     @cached_property
-    def rows(self) -> Array:
-        """Rows, shape (n, 3), with rows @ f ≤ 0 for f in the polyhedron; each is d_i - μ_facet · normal.
+    def face_matrix(self) -> Array:
+        """Face matrix, shape (n, 3): face_matrix @ f ≤ 0 for f in the polyhedron; each row is d_i - μ_facet · normal.
 
         d_i is the unit tangent that facet i faces. Together they imply normal · f ≥ 0.
         """
@@ -160,48 +160,48 @@ class FrictionPolyhedron(Value):
         return read_only(self.normal + self.mu_facet / np.cos(np.pi / self.facets) * self._directions(0.5))
 
     def margin(self, force: npt.ArrayLike) -> float:
-        """The tangential force that may be added before a facet is reached, N: the smallest of -rows @ f; negative outside."""
-        return float(np.min(-self.rows @ checked("force", force, (3,), "N")))
+        """The tangential force, N, that may be added before a facet is reached: the least of -face_matrix @ f; < 0 outside."""
+        return float(np.min(-self.face_matrix @ as_array("force", force, (3,), "N")))
 
     def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
         """Whether a force lies in the polyhedron: margin ≥ -tolerance, N."""
-        return self.margin(force) >= -positive("tolerance", tolerance, "N", allow_zero=True)
+        return self.margin(force) >= -as_positive("tolerance", tolerance, "N", allow_zero=True)
 
     def status(self, force: npt.ArrayLike) -> Status:
         """As `FrictionCone.status`, against the facets: the limit is μ_facet α_⊥."""
-        slides, limit = self._slides(force)
-        return _status(float(slides.max()), limit)
+        tangential, limit = self._tangential_forces(force)
+        return _status(float(tangential.max()), limit)
 
     def active_facets(self, force: npt.ArrayLike) -> tuple[int, ...]:
-        """Numbers of the facets that a force has reached (within `NEAR` of their limit) or passed; none where it pulls."""
-        slides, limit = self._slides(force)
-        return tuple(np.flatnonzero(slides > (1.0 - NEAR) * limit).tolist()) if limit > 0.0 else ()
+        """Numbers of the facets that a force has reached (within `ACTIVE_TOLERANCE`) or passed; none where it pulls."""
+        tangential, limit = self._tangential_forces(force)
+        return tuple(np.flatnonzero(tangential > (1.0 - ACTIVE_TOLERANCE) * limit).tolist()) if limit > 0.0 else ()
 
     def project(self, force: npt.ArrayLike) -> Array:
         """The force of the polyhedron nearest to the one given, shape (3,), N: min ‖raysᵀ w - f‖ over weights w ≥ 0."""
         from scipy.optimize import nnls  # slow to load, and seldom needed
 
-        f = checked("force", force, (3,), "N")
+        f = as_array("force", force, (3,), "N")
         if self.margin(f) >= 0.0:
             return f
         size = np.linalg.norm(f)
         return read_only(size * (self.rays.T @ nnls(self.rays.T, f / size)[0]))
 
-    def _slides(self, force: npt.ArrayLike) -> tuple[Array, float]:
+    def _tangential_forces(self, force: npt.ArrayLike) -> tuple[Array, float]:
         """The force along each facet's d_i, shape (n,), N, and what they all may be at most, μ_facet α_⊥, N."""
-        f = checked("force", force, (3,), "N")
+        f = as_array("force", force, (3,), "N")
         limit = self.mu_facet * float(self.normal @ f)
-        return self.rows @ f + limit, limit
+        return self.face_matrix @ f + limit, limit
 
     def _directions(self, shift: float) -> Array:
         """Unit tangents, shape (n, 3), turned by `shift` of a facet's angle."""
-        angles = self.turn + 2.0 * np.pi * (np.arange(self.facets) + shift) / self.facets
+        angles = self.facet_rotation + 2.0 * np.pi * (np.arange(self.facets) + shift) / self.facets
         t1, t2 = tangents(self.normal)
         return np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
 
 
-def _status(slide: float, limit: float) -> Status:
+def _status(tangential: float, limit: float) -> Status:
     """Of a tangential force and the largest that friction allows, N; that is negative where the force pulls."""
-    if slide > (1.0 + NEAR) * limit:
+    if tangential > (1.0 + ACTIVE_TOLERANCE) * limit:
         return "outside"
-    return "active" if slide > (1.0 - NEAR) * limit else "inside"
+    return "active" if tangential > (1.0 - ACTIVE_TOLERANCE) * limit else "inside"

@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.errors import SolverError
-from floatbase.linear_algebra import ranked_svd
+from floatbase.linear_algebra import svd_with_rank
 from floatbase.qp import linear_program
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-_FLAT = 1e-9  # part of the size below which a set counts as flat, a point as on a facet: above a linear program's rounding
-_ROUNDS = 200  # of looking for farther points; each adds one at least, and the stances of the course need about ten
-_QHULL = 1e-8  # part of the size by which qhull's facets may miss the points on them
-_SLIVER = 1e-7  # singular value, of the largest, below which rays are too nearly dependent to fix a facet
+_FLATNESS_TOLERANCE = 1e-9  # part of the size below which a set is flat, a point on a facet: above a linear program's rounding
+_MAX_ROUNDS = 200  # of looking for farther points; each adds one at least, and the stances of the course need about ten
+_QHULL_TOLERANCE = 1e-8  # part of the size by which qhull's facets may miss the points on them
+_SLIVER_TOLERANCE = 1e-7  # singular value, of the largest, below which rays are too nearly dependent to fix a facet
 _SAME_DIRECTION = 1e-6  # rad, normals nearer than this are one: qhull's triangles of one facet
 _DIGITS = 9  # to which the equations of qhull's triangles of one facet agree
 
 
-def cone_rows(rays: Array) -> tuple[Array, Array]:
+def cone_face_matrix(rays: Array) -> tuple[Array, Array]:
     """The cone {Σ w_j ray_j, w ≥ 0} as rows: (G, E) with G x ≤ 0 and E x = 0, each row of unit length.
 
     rays: shape (n, N), one ray a column. E, shape (n - r, n), spans the directions that no ray reaches, r being the rays'
@@ -36,44 +36,45 @@ def cone_rows(rays: Array) -> tuple[Array, Array]:
     """
     rays = rays / np.linalg.norm(rays, axis=0)  # length does not matter in a cone
     span, E = _span(rays)
-    inside = span.T @ rays
-    c, on_lines = _supporting_direction(inside)
-    across = _span(inside[:, on_lines])[1] if np.any(on_lines) else np.eye(len(inside))
-    G = _pointed_rows(across @ inside[:, ~on_lines], across @ c)
-    return G @ across @ span.T, E
+    coordinates = span.T @ rays
+    c, on_lines = _supporting_direction(coordinates)
+    transverse = _span(coordinates[:, on_lines])[1] if np.any(on_lines) else np.eye(len(coordinates))
+    G = _pointed_face_matrix(transverse @ coordinates[:, ~on_lines], transverse @ c)
+    return G @ transverse @ span.T, E
 
 
-def vertices(farthest: Callable[[Array], Array], n: int, size: float) -> Array:
+def polytope_vertices(support_point: Callable[[Array], Array], n: int, size: float) -> Array:
     """The vertices of a bounded convex polytope in R^n, n ≤ 3, shape (k, n), from its farthest points.
 
-    farthest: direction (n,) -> a point of the set with the largest direction · x. size: a length of the set; 1e-9 of it counts
-    as zero. The hull of the known points grows at each of its facets until no point lies beyond any: the answer is exact. In
-    the plane the vertices come counter-clockwise. A flat set gives one point, the two ends of a segment, or a polygon in space.
+    support_point: direction (n,) -> a point of the set with the largest direction · x. size: a length of the set; 1e-9 of it
+    counts as zero. The hull of the known points grows at each of its facets until no point lies beyond any: the answer is
+    exact. In the plane the vertices come counter-clockwise. A flat set gives one point, the two ends of a segment, or a polygon
+    in space.
     Source: Bretl and Lall, Testing static equilibrium for legged robots, IEEE Transactions on Robotics, 2008.
     """
-    tolerance = _FLAT * size
-    basis, points = _affine_hull(farthest, n, tolerance)
+    tolerance = _FLATNESS_TOLERANCE * size
+    basis, points = _affine_hull(support_point, n, tolerance)
     origin = points[0]
     if basis.shape[1] == 0:
         return origin[None]
     flat = (points - origin) @ basis
     if basis.shape[1] == 1:
         return points[[int(np.argmin(flat)), int(np.argmax(flat))]]
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         hull = _hull(flat)
         _, first = np.unique(np.round(hull.equations, _DIGITS), axis=0, return_index=True)
         normals, offsets = hull.equations[first, :-1], hull.equations[first, -1]
-        found = np.array([(farthest(basis @ normal) - origin) @ basis for normal in normals])
-        beyond = np.einsum("ij,ij->i", normals, found) + offsets > tolerance
+        candidates = np.array([(support_point(basis @ normal) - origin) @ basis for normal in normals])
+        beyond = np.einsum("ij,ij->i", normals, candidates) + offsets > tolerance
         if not np.any(beyond):
-            return origin + flat[_corners(hull, flat, normals, offsets, tolerance)] @ basis.T
-        flat = np.vstack([flat[hull.vertices], found[beyond]])
-    raise SolverError(f"the vertices of a polytope were not all found in {_ROUNDS} rounds; {len(flat)} are known.")
+            return origin + flat[_hull_vertices(hull, flat, normals, offsets, tolerance)] @ basis.T
+        flat = np.vstack([flat[hull.vertices], candidates[beyond]])
+    raise SolverError(f"the vertices of a polytope were not all found in {_MAX_ROUNDS} rounds; {len(flat)} are known.")
 
 
 def _span(rays: Array) -> tuple[Array, Array]:
     """Orthonormal bases of what the rays span, shape (n, r), and of the rest, as rows, shape (n - r, n)."""
-    U, _, _, rank = ranked_svd(rays)
+    U, _, _, rank = svd_with_rank(rays)
     return U[:, :rank], U[:, rank:].T
 
 
@@ -88,7 +89,7 @@ def _supporting_direction(rays: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
     return result.x[:n], result.x[n:] < 0.5
 
 
-def _pointed_rows(rays: Array, c: Array) -> Array:
+def _pointed_face_matrix(rays: Array, c: Array) -> Array:
     """Rows of a pointed cone of full dimension, shape (facets, n); c · ray > 0 for all rays."""
     n = len(rays)
     if n == 0:
@@ -98,30 +99,30 @@ def _pointed_rows(rays: Array, c: Array) -> Array:
     _, plane = _span(c[:, None])
     section = ((plane @ rays) / (c @ rays)).T
     if n == 2:
-        on_facets = {frozenset([int(np.argmin(section))]), frozenset([int(np.argmax(section))])}
+        facet_rays = {frozenset([int(np.argmin(section))]), frozenset([int(np.argmax(section))])}
     else:  # all points on each facet of their convex hull
         equations = _hull(section).equations
-        near = np.abs(section @ equations[:, :-1].T + equations[:, -1]) < _QHULL * float(np.max(np.abs(section)))
-        on_facets = {frozenset(np.flatnonzero(column).tolist()) for column in near.T}
-    rows = [_row_through(rays, sorted(chosen)) for chosen in sorted(on_facets, key=sorted)]
+        on_facet = np.abs(section @ equations[:, :-1].T + equations[:, -1]) < _QHULL_TOLERANCE * float(np.max(np.abs(section)))
+        facet_rays = {frozenset(np.flatnonzero(column).tolist()) for column in on_facet.T}
+    rows = [_facet_through(rays, sorted(chosen)) for chosen in sorted(facet_rays, key=sorted)]
     return np.array([row for row in rows if row is not None])
 
 
-def _row_through(rays: Array, chosen: list[int]) -> Array | None:
+def _facet_through(rays: Array, chosen: list[int]) -> Array | None:
     """The unit row that is 0 on the rays chosen and ≤ 0 on the others; None where they do not fix it (a sliver)."""
     U, s, _ = np.linalg.svd(rays[:, chosen])
-    if np.sum(s > _SLIVER * s[0]) != len(rays) - 1:
+    if np.sum(s > _SLIVER_TOLERANCE * s[0]) != len(rays) - 1:
         return None
     row = U[:, -1]
     return -np.sign(row @ rays.sum(axis=1)) * row
 
 
-def _affine_hull(farthest: Callable[[Array], Array], n: int, tolerance: float) -> tuple[Array, Array]:
+def _affine_hull(support_point: Callable[[Array], Array], n: int, tolerance: float) -> tuple[Array, Array]:
     """An orthonormal basis of the directions in which the set extends, shape (n, r), and points that show it."""
     basis, flat, points = np.zeros((n, 0)), np.zeros((n, 0)), []
     while basis.shape[1] + flat.shape[1] < n:
         direction = np.linalg.svd(np.hstack([basis, flat]))[0][:, -1] if basis.size + flat.size else np.eye(n)[0]
-        ends = [farthest(direction), farthest(-direction)]
+        ends = [support_point(direction), support_point(-direction)]
         points += ends
         step = ends[0] - ends[1]
         if direction @ step <= tolerance:
@@ -142,13 +143,13 @@ def _hull(points: Array) -> ConvexHull:
         raise SolverError(f"qhull found no hull of {len(points)} points in R^{points.shape[1]}: {error}") from None
 
 
-def _corners(hull: ConvexHull, points: Array, normals: Array, offsets: Array, tolerance: float) -> list[int]:
+def _hull_vertices(hull: ConvexHull, points: Array, normals: Array, offsets: Array, tolerance: float) -> list[int]:
     """Which points are vertices: those where facets of enough different directions meet."""
-    corners: list[int] = []
+    indices: list[int] = []
     for i in hull.vertices:
-        on = normals[np.abs(normals @ points[i] + offsets) <= tolerance]
-        met = int(np.sum(np.linalg.svd(on, compute_uv=False) > _SAME_DIRECTION)) if len(on) else 0
-        doubled = any(np.linalg.norm(points[i] - points[j]) <= tolerance for j in corners)
-        if met == points.shape[1] and not doubled:
-            corners.append(int(i))
-    return corners
+        facet_normals = normals[np.abs(normals @ points[i] + offsets) <= tolerance]
+        rank = int(np.sum(np.linalg.svd(facet_normals, compute_uv=False) > _SAME_DIRECTION)) if len(facet_normals) else 0
+        duplicate = any(np.linalg.norm(points[i] - points[j]) <= tolerance for j in indices)
+        if rank == points.shape[1] and not duplicate:
+            indices.append(int(i))
+    return indices

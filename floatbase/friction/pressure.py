@@ -5,25 +5,25 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, flat_forces, of_kind, read_only
+from floatbase._validation import Array, as_forces, as_instance, read_only
 from floatbase.dynamics import Contacts, grasp_matrix
 from floatbase.errors import InputError
 from floatbase.robots import State
 
 
-def contact_wrench(state: State, contacts: Contacts, forces: npt.ArrayLike, about: npt.ArrayLike) -> Array:
-    """Σ f_i and Σ (x_i - about) × f_i of contact forces, shape (6,), N and N·m, world: (20) and (21) about any point.
+def contact_wrench(state: State, contacts: Contacts, forces: npt.ArrayLike, reference_point: npt.ArrayLike) -> Array:
+    """Σ f_i and Σ (x_i - reference_point) × f_i of contact forces, shape (6,), N and N·m, world: (20) and (21) about any point.
 
     state: where the robot is.
     contacts: those whose forces are summed; `contacts.only("left_sole_link")` for one sole.
     forces: λ of these contacts, shape (k,) or (k / 3, 3), N, world.
-    about: shape (3,), m, world, such as the middle of a sole, `state.point("left_sole_link")`.
+    reference_point: shape (3,), m, world, such as the middle of a sole, `state.point("left_sole_link")`.
 
     Four corners have twelve numbers and make six: what is left of their forces, null of this map, nobody can measure by the
     motion of a rigid sole. Raises `InputError` for contacts whose forces do not act at points.
     """
-    points, flat = _points(state, contacts, forces)
-    return read_only(grasp_matrix(points, about) @ flat)  # type: ignore[arg-type]  # it is checked there
+    points, flat = _points_and_forces(state, contacts, forces)
+    return read_only(grasp_matrix(points, reference_point) @ flat)  # type: ignore[arg-type]  # it is checked there
 
 
 def centre_of_pressure(state: State, contacts: Contacts, forces: npt.ArrayLike) -> Array:
@@ -38,20 +38,20 @@ def centre_of_pressure(state: State, contacts: Contacts, forces: npt.ArrayLike) 
     Raises `InputError` where the normal forces add up to none. Source: Sardain and Bessonnet, Forces acting on a biped robot:
     center of pressure - zero moment point, 2004.
     """
-    points, flat = _points(state, contacts, forces)
+    points, flat = _points_and_forces(state, contacts, forces)
     normal = np.sum(contacts.normals * flat.reshape(-1, 3), axis=1)
     total = float(normal.sum())
-    if not total > _NOTHING:
+    if not total > _MIN_TOTAL_FORCE:
         raise InputError(f"the normal forces add up to {total:g} N; without pressure there is no centre of pressure.")
     return read_only(normal @ points / total)
 
 
-_NOTHING = 1e-9  # N: rounding of forces that carry nothing
+_MIN_TOTAL_FORCE = 1e-9  # N: rounding of forces that carry nothing
 
 
-def _points(state: State, contacts: Contacts, forces: npt.ArrayLike) -> tuple[Array, Array]:
+def _points_and_forces(state: State, contacts: Contacts, forces: npt.ArrayLike) -> tuple[Array, Array]:
     """Where the forces act, (n, 3), and the forces, (3 n,)."""
-    of_kind("contacts", contacts, Contacts)
+    as_instance("contacts", contacts, Contacts)
     if contacts.k != 3 * contacts.n_points:
         raise InputError(f"the forces of {contacts!r} do not all act at points: choose those that do, contacts.only(…).")
-    return contacts.positions(of_kind("state", state, State)), flat_forces(forces, contacts.k)
+    return contacts.positions(as_instance("state", state, State)), as_forces(forces, contacts.k)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, function, of_kind, positive
+from floatbase._validation import Array, as_array, as_callable, as_instance, as_positive
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
 
@@ -42,9 +42,9 @@ class ConstantTorques:
         contacts: Contacts | None = None,
         predict: Callable[[Array, Array], Array] | None = None,
     ):
-        self.tau = checked("tau", tau, (None,), "N·m")
-        self.contacts = None if contacts is None else of_kind("contacts", contacts, Contacts)
-        self._predict = None if predict is None else function("predict", predict, "predict(q, v)")
+        self.tau = as_array("tau", tau, (None,), "N·m")
+        self.contacts = None if contacts is None else as_instance("contacts", contacts, Contacts)
+        self._predict = None if predict is None else as_callable("predict", predict, "predict(q, v)")
 
     def __call__(self, q: Array, v: Array, t: float) -> Torques:
         """The torques, and the prediction for configuration q and velocity v."""
@@ -66,11 +66,11 @@ def joint_servo(
     stiffness: N·m/rad.
     damping: N·m·s/rad.
     """
-    d = of_kind("state", state, State).robot.d
+    d = as_instance("state", state, State).robot.d
     joints = slice(state.robot.nv - d, None)
-    steady = np.zeros(d) if tau is None else checked("tau", tau, (d,), "N·m")
-    stiffness, damping = positive("stiffness", stiffness, allow_zero=True), positive("damping", damping, allow_zero=True)
-    offset = function("path", path, "path(t)") if path is not None else lambda t: np.zeros(d)
+    steady = np.zeros(d) if tau is None else as_array("tau", tau, (d,), "N·m")
+    stiffness, damping = as_positive("stiffness", stiffness, allow_zero=True), as_positive("damping", damping, allow_zero=True)
+    offset = as_callable("path", path, "path(t)") if path is not None else lambda t: np.zeros(d)
 
     def controller(q: Array, v: Array, t: float) -> Torques:
         rate = (offset(t + _STEP) - offset(t - _STEP)) / (2.0 * _STEP)

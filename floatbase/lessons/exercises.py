@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import LARGEST, Array
+from floatbase._validation import MAX_MAGNITUDE, Array
 from floatbase.affine import Quadratic
 from floatbase.errors import FloatbaseError, unknown_name
 from floatbase.lessons import progress
@@ -80,7 +80,7 @@ def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
         return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.", "not_numbers")
     if given.shape not in shapes:
         return Verdict(False, _wrong_shape(given.shape, shapes[0]), "shape")
-    if not np.all(np.abs(given) <= LARGEST):
+    if not np.all(np.abs(given) <= MAX_MAGNITUDE):
         return Verdict(False, "The answer holds numbers that are not finite, or far too large.", "not_finite")
     return given
 

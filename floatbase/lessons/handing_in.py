@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 import floatbase as fb
-from floatbase._arrays import text
+from floatbase._validation import as_string
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.exercises import all_exercises
@@ -23,7 +23,7 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
     A file that the same learner has handed in before is replaced. Raises `InputError` where there is nothing to hand in yet,
     or where no file can be written.
     """
-    if not re.search(r"\w", text("name", name)) or not name.isprintable():
+    if not re.search(r"\w", as_string("name", name)) or not name.isprintable():
         raise InputError('name must be the name that your teacher knows you by, as in hand_in("Ada Lovelace").')
     tried, answers, predicted = progress.load(), progress.answers(), progress.predictions()
     if not tried and not predicted:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import LARGEST, plain_numbers, text
+from floatbase._validation import MAX_MAGNITUDE, numeric_copy, as_string
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.rounding import about
@@ -31,7 +31,7 @@ def predict(name: str, *answer: Any, unit: str = "", choices: Sequence[str] = ()
     choices: the texts to choose from; without them the answer is a number.
     count: how many numbers.
     """
-    _units[text("name of a prediction", name)] = unit
+    _units[as_string("name of a prediction", name)] = unit
     stored = progress.predictions().get(name, {})
     given = answer[0] if len(answer) == 1 else list(answer) or ...
     if given is None or given is Ellipsis:
@@ -55,7 +55,7 @@ def compare(name: str, value: Any) -> None:
     name: as in `predict`. value: a number, several, or a text: what the cell has computed. A whole number is printed whole, any
     other with two significant digits. Raises `InputError` for anything else.
     """
-    text("name of a prediction", name)
+    as_string("name of a prediction", name)
     result: Any = value if isinstance(value, str) else _rounded(value)
     stored = progress.predictions().get(name, {})
     known = stored | _unkept.get(name, {})
@@ -76,7 +76,7 @@ def review(lesson: str = "") -> None:
 
     The name of one prediction, such as "02.c", prints that one.
     """
-    lesson = text("lesson", lesson)
+    lesson = as_string("lesson", lesson)
     if len(lesson) == 1:  # 2 is lesson 02, and c is lesson C
         lesson = f"0{lesson}" if lesson.isdigit() else lesson.upper()
     stored = progress.predictions()
@@ -145,7 +145,7 @@ def _chosen(answer: Any, choices: Sequence[str]) -> str:
 
 def _numbers(answer: Any, unit: str, count: int) -> Any:
     """A learner's number, or list of numbers."""
-    given = plain_numbers(answer)
+    given = numeric_copy(answer)
     wanted = "one number" if count == 1 else f"a list of {count} numbers"
     form = "12.5" if count == 1 else f"[{', '.join(['12.5'] * count)}]"
     right = f"write {wanted}{f', in {unit}' if unit else ''}, as {form}."
@@ -153,7 +153,7 @@ def _numbers(answer: Any, unit: str, count: int) -> Any:
         raise InputError(f"{'a text' if isinstance(answer, str) else 'this'} is no prediction here: {right}")
     if given.ndim > 1 or given.size != count:
         raise InputError(f"{given.size} {'number is' if given.size == 1 else 'numbers are'} no prediction here: {right}")
-    if not np.all(np.abs(given) <= LARGEST):
+    if not np.all(np.abs(given) <= MAX_MAGNITUDE):
         raise InputError(f"this is not finite, or far too large: {right}")
     said = [int(x) if x.is_integer() else x for x in given.ravel().tolist()]
     return said if count > 1 else said[0]
@@ -161,7 +161,7 @@ def _numbers(answer: Any, unit: str, count: int) -> Any:
 
 def _rounded(value: Any) -> Any:
     """A result as it is kept: whole numbers whole, others to six digits, which are the same on every processor; lists flat."""
-    given = plain_numbers(value)
+    given = numeric_copy(value)
     if given is None:
         raise InputError(f"value must be a number, several, or a text, not of the kind {type(value).__name__}.")
     whole = np.asarray(value).dtype.kind in "iu"

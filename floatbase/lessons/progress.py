@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from floatbase._arrays import LARGEST, plain_numbers
+from floatbase._validation import MAX_MAGNITUDE, numeric_copy
 from floatbase.affine import Quadratic
 
 _NAME = "progress.jsonl"
@@ -108,7 +108,7 @@ def _as_json(answer: Any) -> Any:
         return answer
     if isinstance(answer, tuple):
         return {"tuple": [_as_json(part) for part in answer]}
-    if (array := plain_numbers(answer)) is not None:
+    if (array := numeric_copy(answer)) is not None:
         return array.tolist()
     if isinstance(answer, list):
         return [_as_json(part) for part in answer]
@@ -124,7 +124,7 @@ def _code(function: Any) -> str:
 
 def from_json(kept: Any) -> Any:
     """The answer that `as_json` kept. Raises `ValueError` or another error of Python where it is damaged."""
-    if isinstance(kept, list) and (array := plain_numbers(kept)) is not None:
+    if isinstance(kept, list) and (array := numeric_copy(kept)) is not None:
         return array
     if isinstance(kept, list):
         return [from_json(part) for part in kept]
@@ -185,7 +185,7 @@ def _counts(text: bytes) -> Iterator[tuple[str, int, int]]:
 
 def _is_answer(value: Any) -> bool:
     numbers = value if isinstance(value, list) else [value]
-    return _is_text(value) or (bool(numbers) and all(type(x) in (int, float) and abs(x) <= LARGEST for x in numbers))
+    return _is_text(value) or (bool(numbers) and all(type(x) in (int, float) and abs(x) <= MAX_MAGNITUDE for x in numbers))
 
 
 def _is_text(value: Any) -> bool:

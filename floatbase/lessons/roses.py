@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from floatbase._arrays import text
+from floatbase._validation import as_string
 from floatbase.errors import InputError
 from floatbase.simulation import PushRose, Simulation, push_rose
 from floatbase.viewer import Picture, roses
@@ -35,7 +35,7 @@ def measured_rose(lesson: str) -> PushRose:
     Raises `InputError` for a lesson without one.
     """
     kept = _kept()
-    if text("lesson", lesson) not in kept:
+    if as_string("lesson", lesson) not in kept:
         raise InputError(f"lesson {lesson!r} has no push rose; these have: {', '.join(kept)}.")
     controller = rose_controller(lesson)()
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
@@ -61,7 +61,7 @@ def rose_controller(lesson: str) -> Callable[[], Any]:
 
     Raises `InputError` where there is none.
     """
-    second = text("lesson", lesson).partition(" ")[2]
+    second = as_string("lesson", lesson).partition(" ")[2]
     try:
         make: Callable[[], Any] = getattr(_package(lesson), f"{second}_rose_controller" if second else "rose_controller")
     except (ModuleNotFoundError, AttributeError) as error:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import plain_numbers, positive, said, text, whole
+from floatbase._validation import numeric_copy, as_positive, short_repr, as_string, as_integer
 from floatbase.errors import InputError
 
 _PLAIN = range(-4, 6)  # exponents of ten that are written out; larger and smaller numbers are written as 1.6e7
@@ -28,11 +28,11 @@ def about(x: Any, unit: str = "", digits: int = 2, floor: float = 1e-6) -> str:
 
     Raises `InputError` for what holds no numbers, such as truth values: say what the number is that decides.
     """
-    numbers = plain_numbers(x)
+    numbers = numeric_copy(x)
     if numbers is None:
-        raise InputError(f"x must be a number or an array of numbers, not {said(x)}.")
-    unit, digits = text("unit", unit), whole("digits", digits, 1, 12)
-    floor = positive("floor", floor, allow_zero=True)
+        raise InputError(f"x must be a number or an array of numbers, not {short_repr(x)}.")
+    unit, digits = as_string("unit", unit), as_integer("digits", digits, 1, 12)
+    floor = as_positive("floor", floor, allow_zero=True)
     finite = np.abs(numbers[np.isfinite(numbers)])
     if numbers.ndim == 0 and not finite.size:
         return _one(float(numbers), digits, 0.0)

@@ -1,27 +1,27 @@
 """Costs: moved between spaces, on the centre of mass, and as tasks (§3 of the document)."""
 
 from floatbase.objectives.centroidal import (
-    TorqueForForces,
-    com_wrench,
+    TorquesFromForces,
+    com_wrench_map,
     desired_wrench,
     force_bias,
-    force_sum,
-    moment_sum,
-    momentum,
-    momentum_rate,
+    net_force_matrix,
+    net_moment_matrix,
+    centroidal_momentum,
+    centroidal_momentum_rate,
     normal_bias,
-    rotational_inertia,
+    centroidal_inertia,
     tangential_bias,
-    torque_for_forces,
+    torques_from_forces,
     wrench_objective,
 )
 from floatbase.objectives.pullback import (
-    best_coordinates,
+    argmin_coordinates,
     cost_on_space,
     cost_on_torques,
-    seen_from_best,
-    seen_from_smallest,
-    smallest_coordinates,
+    partial_minimum,
+    minimum_norm_pullback,
+    minimum_norm_coordinates,
 )
 from floatbase.objectives.tasks import (
     CoMTask,
@@ -38,9 +38,9 @@ from floatbase.objectives.tasks import (
 
 # fmt: off
 __all__ = [
-    "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask", "Task", "TorqueForForces", "TorqueTask",
-    "best_coordinates", "com_wrench", "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "force_sum",
-    "moment_sum", "momentum", "momentum_rate", "normal_bias", "rotational_inertia", "seen_from_best", "seen_from_smallest",
-    "smallest_coordinates", "standing_tasks", "tangential_bias", "target_shapes", "targets_at", "torque_for_forces",
-    "wrench_objective",
+    "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask", "Task", "TorqueTask", "TorquesFromForces",
+    "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate", "com_wrench_map",
+    "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "minimum_norm_coordinates", "minimum_norm_pullback",
+    "net_force_matrix", "net_moment_matrix", "normal_bias", "partial_minimum", "standing_tasks", "tangential_bias",
+    "target_shapes", "targets_at", "torques_from_forces", "wrench_objective",
 ]

@@ -8,60 +8,60 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, checked, flat_forces, of_kind, plain_numbers, positive, read_only
+from floatbase._validation import Array, Value, as_array, as_forces, as_instance, numeric_copy, as_positive, read_only
 from floatbase.affine import Affine, Quadratic
-from floatbase.dynamics import Contacts, EquationsOfMotion, grasp_matrix, resolved_motion, torque_force_space
+from floatbase.dynamics import Contacts, EquationsOfMotion, grasp_matrix, resolved_constraint, torque_force_space
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space, rank
 from floatbase.robots import State
 
 
-def momentum(state: State) -> Array:
+def centroidal_momentum(state: State) -> Array:
     """Momentum of the whole robot, shape (6,), world: linear, kg·m/s, then angular about the centre of mass, kg·m²/s.
 
     Linear m ẋ_c, angular Σ (x_i - x_c) × m_i ẋ_i over all particles: what (20)(21) say that outside forces change.
     """
-    of_kind("state", state, State)
+    as_instance("state", state, State)
     model = state.robot.model
     return read_only(pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v).vector)
 
 
-def momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
-    """Time derivative of `momentum` under the acceleration q̈, shape (nv,), as v of `State`; shape (6,), N and N·m, world.
+def centroidal_momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
+    """Time derivative of `centroidal_momentum` under q̈, shape (nv,), as v of `State`; shape (6,), N and N·m, world.
 
     Newton and Euler: (f_c + m g, τ_c), with the wrench (f_c, τ_c) of (20)(21) that the contact forces have about the centre of
     mass. Torques of the joints are internal and do not show up.
     """
-    of_kind("state", state, State)
+    as_instance("state", state, State)
     model = state.robot.model
-    qdd = checked("qdd", qdd, (state.robot.nv,))
+    qdd = as_array("qdd", qdd, (state.robot.nv,))
     return read_only(pin.computeCentroidalMomentumTimeVariation(model, model.createData(), state.q, state.v, qdd).vector)
 
 
-def force_sum(contacts: Contacts) -> Array:
+def net_force_matrix(contacts: Contacts) -> Array:
     """(20) G_f, shape (3, 3n): f_c = G_f λ, one identity block for each point (four for four feet). N, world."""
-    of_kind("contacts", contacts, Contacts)
+    as_instance("contacts", contacts, Contacts)
     return grasp_matrix(np.zeros((contacts.n_points, 3)), np.zeros(3))[:3]
 
 
-def moment_sum(state: State, contacts: Contacts) -> Array:
+def net_moment_matrix(state: State, contacts: Contacts) -> Array:
     """(21) G_τ, shape (3, 3n), m: τ_c = G_τ λ = Σ (x_i - x_c) × f_i, the moment about the centre of mass x_c. World.
 
     The order matters: footnote 10 of the document prints x_c - x_i, which would give the opposite moment.
     """
-    of_kind("state", state, State)
-    of_kind("contacts", contacts, Contacts)
+    as_instance("state", state, State)
+    as_instance("contacts", contacts, Contacts)
     return grasp_matrix(contacts.positions(state), state.com)[3:]
 
 
-def com_wrench(state: State, contacts: Contacts) -> Affine:
+def com_wrench_map(state: State, contacts: Contacts) -> Affine:
     """(20)(21) λ -> (f_c, τ_c), with blocks "force" (3,), N, and "moment" (3,), N·m, both world, about the centre of mass.
 
     Only contacts whose forces act at points count. Raises `InputError` for others (`LinearConstraint`).
     """
-    of_kind("state", state, State)
-    _only_points(contacts)
-    return Affine.stack(force=Affine.linear(force_sum(contacts)), moment=Affine.linear(moment_sum(state, contacts)))
+    as_instance("state", state, State)
+    _require_point_forces(contacts)
+    return Affine.stack(force=Affine.linear(net_force_matrix(contacts)), moment=Affine.linear(net_moment_matrix(state, contacts)))
 
 
 def wrench_objective(
@@ -84,11 +84,11 @@ def wrench_objective(
     moment: τ̃_c, shape (3,), N·m, world, about the centre of mass.
     force_weight, moment_weight: w_f and w_τ, ≥ 0.
     """
-    sizes = {"force_weight": force_weight, "moment_weight": moment_weight}
-    weights = np.repeat([positive(name, value, allow_zero=True) for name, value in sizes.items()], 3)
-    desired = np.concatenate([checked("force", force, (3,), "N"), checked("moment", moment, (3,), "N·m")])
-    missed = com_wrench(state, contacts) - desired
-    return Quadratic.of(Affine.linear(np.diag(np.sqrt(weights))) @ missed)
+    named_weights = {"force_weight": force_weight, "moment_weight": moment_weight}
+    weights = np.repeat([as_positive(name, value, allow_zero=True) for name, value in named_weights.items()], 3)
+    desired = np.concatenate([as_array("force", force, (3,), "N"), as_array("moment", moment, (3,), "N·m")])
+    residual = com_wrench_map(state, contacts) - desired
+    return Quadratic.from_affine(Affine.linear(np.diag(np.sqrt(weights))) @ residual)
 
 
 def desired_wrench(
@@ -98,14 +98,14 @@ def desired_wrench(
 
     com_acceleration: a, shape (3,), m/s². angular_momentum_rate: L̇ about the centre of mass, shape (3,), N·m.
     """
-    of_kind("state", state, State)
-    free = checked("com_acceleration", com_acceleration, (3,), "m/s²") - state.robot.model.gravity.linear
-    return read_only(state.robot.mass * free), checked("angular_momentum_rate", angular_momentum_rate, (3,))
+    as_instance("state", state, State)
+    specific_force = as_array("com_acceleration", com_acceleration, (3,), "m/s²") - state.robot.model.gravity.linear
+    return read_only(state.robot.mass * specific_force), as_array("angular_momentum_rate", angular_momentum_rate, (3,))
 
 
-def rotational_inertia(state: State) -> Array:
+def centroidal_inertia(state: State) -> Array:
     """Inertia of the whole robot about its centre of mass, joints locked, shape (3, 3), kg·m², world."""
-    of_kind("state", state, State)
+    as_instance("state", state, State)
     data = state.robot.model.createData()
     pin.ccrba(state.robot.model, data, state.q, state.v)
     return read_only(data.Ig.inertia)
@@ -116,7 +116,7 @@ def tangential_bias(contacts: Contacts) -> Quadratic:
 
     The document prints the norm without its square; only squared is it quadratic.
     """
-    N = _normals(contacts)
+    N = _normal_matrix(contacts)
     return Quadratic.from_residual(np.eye(len(N)) - N @ N.T, np.zeros(len(N)))
 
 
@@ -125,11 +125,11 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
 
     a: one number for all points or shape (n,).
     """
-    N = _normals(contacts)
-    found = plain_numbers(a)
-    each = [a] * N.shape[1] if found is not None and found.ndim == 0 else a
-    each = checked("the nominal normal force a", each, (N.shape[1],), "N")
-    return Quadratic.from_residual(N @ N.T, N @ each)
+    N = _normal_matrix(contacts)
+    numeric = numeric_copy(a)
+    targets = [a] * N.shape[1] if numeric is not None and numeric.ndim == 0 else a
+    targets = as_array("the nominal normal force a", targets, (N.shape[1],), "N")
+    return Quadratic.from_residual(N @ N.T, N @ targets)
 
 
 def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
@@ -141,61 +141,61 @@ def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
     alpha: α ≥ 0, weight of the normal part beside the tangential one.
     a: the normal force that each contact should carry, N; one number for all points or shape (n,).
     """
-    return tangential_bias(contacts) + positive("alpha", alpha, allow_zero=True) * normal_bias(contacts, a)
+    return tangential_bias(contacts) + as_positive("alpha", alpha, allow_zero=True) * normal_bias(contacts, a)
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueForForces(Value):
+class TorquesFromForces(Value):
     """(25) The smallest torques that give desired forces, in closed form.
 
     With fewer torques than forces not every λ is reachable: `torque` then answers for the nearest reachable accelerations.
 
     torque: `Affine` λ -> τ, the pseudo-inverse solution, shape (k,) N to (d,) N·m.
     reachable: the forces that any torques can give, as an `Affine` β̂ -> λ with orthonormal columns.
-    free_torques: (d, f), torques that change no force: the redundancy.
+    null_torques: (d, f), torques that change no force: the redundancy.
     """
 
     torque: Affine
     reachable: Affine
-    free_torques: Array
+    null_torques: Array
 
-    def gap(self, forces: npt.ArrayLike) -> float:
+    def distance(self, forces: npt.ArrayLike) -> float:
         """Distance, N, of desired forces (k,) from those that torques can give; 0 when reachable."""
-        return float(np.linalg.norm(flat_forces(forces, self.reachable.n_out) - self.nearest(forces)))
+        return float(np.linalg.norm(as_forces(forces, self.reachable.n_out) - self.nearest(forces)))
 
     def nearest(self, forces: npt.ArrayLike) -> Array:
         """The reachable forces nearest to desired ones, shape (k,), N."""
-        forces = flat_forces(forces, self.reachable.n_out)
+        forces = as_forces(forces, self.reachable.n_out)
         return self.reachable(self.reachable.A.T @ (forces - self.reachable.b))
 
 
-def torque_for_forces(eom: EquationsOfMotion) -> TorqueForForces:
+def torques_from_forces(eom: EquationsOfMotion) -> TorquesFromForces:
     """(24)(25) min ½ ‖f^τ(β)‖² subject to λ = f^λ(β), for every λ at once.
 
     f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k: forces out of reach,
     one τ for each λ, and a choice among many. Source: the document, §3.1.2.
     """
-    of_kind("eom", eom, EquationsOfMotion)
-    A, b = resolved_motion(eom)
+    as_instance("eom", eom, EquationsOfMotion)
+    A, b = resolved_constraint(eom)
     C_tau, C_forces = A @ np.linalg.solve(eom.M, eom.S), A @ np.linalg.solve(eom.M, eom.J.T)
     inverse, a = np.linalg.pinv(C_tau, rcond=RANK_TOLERANCE), b + A @ np.linalg.solve(eom.M, eom.h)
     forces = torque_force_space(eom)["forces"]
     U = np.linalg.svd(forces.A, full_matrices=False)[0]
-    return TorqueForForces(
+    return TorquesFromForces(
         torque=Affine(-inverse @ C_forces, inverse @ a),
         reachable=Affine(U[:, : rank(forces.A, absolute=True)], forces.b),
-        free_torques=null_space(C_tau),
+        null_torques=null_space(C_tau),
     )
 
 
-def _normals(contacts: Contacts) -> Array:
+def _normal_matrix(contacts: Contacts) -> Array:
     """The normal of each point as a column, shape (k, n): the normal parts of λ are Nᵀ λ, and N Nᵀ λ as forces."""
-    _only_points(contacts)
+    _require_point_forces(contacts)
     return (np.eye(contacts.n_points)[:, None] * contacts.normals[:, :, None]).reshape(contacts.k, contacts.n_points)
 
 
-def _only_points(contacts: Contacts) -> None:
-    of_kind("contacts", contacts, Contacts)
+def _require_point_forces(contacts: Contacts) -> None:
+    as_instance("contacts", contacts, Contacts)
     names = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
     if names:
         raise InputError(f"{', '.join(names)} has forces that do not act at points; leave it out: contacts.without(…).")

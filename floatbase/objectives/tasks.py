@@ -18,31 +18,31 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import (
+from floatbase._validation import (
     Array,
     Value,
-    checked,
+    as_array,
     cross,
-    flat_forces,
-    function,
-    number,
-    of_kind,
-    plain_numbers,
-    positive,
+    as_forces,
+    as_callable,
+    as_number,
+    as_instance,
+    numeric_copy,
+    as_positive,
     read_only,
-    sealed,
-    text,
+    frozen,
+    as_string,
 )
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
-from floatbase.robots import Robot, State, check_unit_lengths
+from floatbase.robots import Robot, State, check_unit_norms
 
 Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]]
 _ZERO3 = (0.0, 0.0, 0.0)
-_ALL_THREE = "all three together, as in lambda t: (position, velocity, acceleration)"
+_TRIPLE_HINT = "all three together, as in lambda t: (position, velocity, acceleration)"
 _ROTATION_TOLERANCE = 1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
-_IDENTITY = sealed(np.eye(3))
+_IDENTITY = frozen(np.eye(3))
 _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 
 
@@ -77,10 +77,10 @@ class Task(Protocol):
         """The residual as an `Affine` of the task's block at time t."""
 
 
-def _at(eom: EquationsOfMotion, t: float) -> None:
+def _check_arguments(eom: EquationsOfMotion, t: float) -> None:
     """Check what a residual is asked for."""
-    of_kind("eom", eom, EquationsOfMotion)
-    number("t", t, "s")
+    as_instance("eom", eom, EquationsOfMotion)
+    as_number("t", t, "s")
 
 
 def target_shapes(task: Task, robot: Robot, k: int) -> dict[str, tuple[int, ...]]:
@@ -101,68 +101,68 @@ def targets_at(task: Task, robot: Robot, k: int, t: float) -> list[Array]:
     """
     shapes = target_shapes(task, robot, k)
     values = [getattr(task, name) for name in shapes]
-    moves = callable(values[0])
-    if moves:
-        values = _together(task.name, values[0](t), *shapes.values())
+    time_varying = callable(values[0])
+    if time_varying:
+        values = _split_target(task.name, values[0](t), *shapes.values())
     else:
         values = [_zeros(shape) if value is None else value for value, shape in zip(values, shapes.values(), strict=True)]
-    found = [_value(f"{name} of {task.name}", value, shapes[name]) for name, value in zip(shapes, values, strict=True)]
-    if isinstance(task, OrientationTask) and moves:
-        found[0] = nearest_rotation(task.name, found[0])
+    targets = [_as_target(f"{name} of {task.name}", value, shapes[name]) for name, value in zip(shapes, values, strict=True)]
+    if isinstance(task, OrientationTask) and time_varying:
+        targets[0] = nearest_rotation(task.name, targets[0])
     if isinstance(task, PostureTask):
-        check_unit_lengths(robot.model, f"q of {task.name}", found[0], first=2 if robot.is_floating else 1)
-    return found
+        check_unit_norms(robot.model, f"q of {task.name}", targets[0], first_joint=2 if robot.is_floating else 1)
+    return targets
 
 
-def _together(name: str, value: Any, shape: tuple[int, ...], *others: tuple[int, ...]) -> list[Any]:
+def _split_target(name: str, value: Any, shape: tuple[int, ...], *derivative_shapes: tuple[int, ...]) -> list[Any]:
     """What a function of time gave, with zeros for velocity and acceleration unless it gave all three."""
-    several = others and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim)) and len(value) > 1
-    first = plain_numbers(value[0]) if several else None
+    is_sequence = derivative_shapes and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim)) and len(value) > 1
+    first = numeric_copy(value[0]) if is_sequence else None
     if first is None or first.ndim != len(shape):
-        return [value, *map(_zeros, others)]
+        return [value, *map(_zeros, derivative_shapes)]
     if len(value) == 3:
         return list(value)
-    raise InputError(f"the function of {name} gave {len(value)} targets; it must give one, or {_ALL_THREE}.")
+    raise InputError(f"the function of {name} gave {len(value)} targets; it must give one, or {_TRIPLE_HINT}.")
 
 
-def _value(name: str, target: Any, shape: tuple[int, ...]) -> Array:
+def _as_target(name: str, target: Any, shape: tuple[int, ...]) -> Array:
     """A target. One that does not move was checked when its task was made, but for a robot's own shape."""
     if type(target) is np.ndarray and target.shape == shape and not target.flags.writeable:
         return target
-    return checked(name, target, shape)
+    return as_array(name, target, shape)
 
 
 @lru_cache(maxsize=64)
 def _zeros(shape: tuple[int, ...]) -> Array:
-    return sealed(np.zeros(shape))
+    return frozen(np.zeros(shape))
 
 
-def _keep(task: Task, **shapes: tuple[int | None, ...]) -> None:
+def _set_validated_fields(task: Task, **shapes: tuple[int | None, ...]) -> None:
     """Check gains and weight, and copy the targets that do not move; kd is critically damped, 2 √kp, by default.
 
     shapes: of each target as far as the task knows it, the one that may be a function of time first.
     """
-    text("name of a task", task.name)
+    as_string("name of a task", task.name)
     if isinstance(task, OrientationTask | FrameTask):
-        text("frame of a task", task.frame)
-    kept: dict[str, object] = {"weight": positive(f"weight of {task.name}", task.weight, allow_zero=True)}
+        as_string("frame of a task", task.frame)
+    fields: dict[str, object] = {"weight": as_positive(f"weight of {task.name}", task.weight, allow_zero=True)}
     if isinstance(task, CoMTask | OrientationTask | FrameTask | PostureTask):
-        kp = kept["kp"] = positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
+        kp = fields["kp"] = as_positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
         kd = 2.0 * kp**0.5 if task.kd is None else task.kd
-        kept["kd"] = positive(f"kd of {task.name}", kd, "1/s", allow_zero=True)
-    first, moves = next(iter(shapes)), False
+        fields["kd"] = as_positive(f"kd of {task.name}", kd, "1/s", allow_zero=True)
+    first, time_varying = next(iter(shapes)), False
     for name, shape in shapes.items():
-        target, what = getattr(task, name), f"{name} of {task.name}"
+        target, label = getattr(task, name), f"{name} of {task.name}"
         if name == first and callable(target) and not isinstance(target, type):
-            moves, _ = True, function(what, target, f"{name}(t)")
+            time_varying, _ = True, as_callable(label, target, f"{name}(t)")
         elif name != first and callable(target):
-            raise InputError(f"{what} cannot be a function: let {first} be one, and give {_ALL_THREE}.")
+            raise InputError(f"{label} cannot be a function: let {first} be one, and give {_TRIPLE_HINT}.")
         elif target is not None or getattr(type(task), name, ...) is not None:  # None counts where it is the default
-            found = flat_forces(target, None, what) if task.block == "forces" else checked(what, target, shape)
-            kept[name] = nearest_rotation(task.name, found) if name == "rotation" else found
-            if moves and np.any(found):
-                raise InputError(f"{what} must be left out, for {first} is a function: let it give {_ALL_THREE}.")
-    for name, value in kept.items():
+            array = as_forces(target, None, label) if task.block == "forces" else as_array(label, target, shape)
+            fields[name] = nearest_rotation(task.name, array) if name == "rotation" else array
+            if time_varying and np.any(array):
+                raise InputError(f"{label} must be left out, for {first} is a function: let it give {_TRIPLE_HINT}.")
+    for name, value in fields.items():
         object.__setattr__(task, name, value)
 
 
@@ -187,11 +187,11 @@ class CoMTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, position=(3,), velocity=(3,), acceleration=(3,))
+        _set_validated_fields(self, position=(3,), velocity=(3,), acceleration=(3,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_com q̈ + J̇_com q̇ - a, shape (3,), m/s²."""
-        _at(eom, t)
+        _check_arguments(eom, t)
         state, (x, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
         return _motion_residual(self, state.com_jacobian, state.com_drift, a, state.com - x, state.com_velocity - v)
 
@@ -216,7 +216,7 @@ class OrientationTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, rotation=(3, 3), angular_velocity=(3,), angular_acceleration=(3,))
+        _set_validated_fields(self, rotation=(3, 3), angular_velocity=(3,), angular_acceleration=(3,))
 
     @property
     def name(self) -> str:
@@ -225,7 +225,7 @@ class OrientationTask(Value):
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J_ω q̈ + J̇_ω q̇ - α, shape (3,), rad/s², world-aligned."""
-        _at(eom, t)
+        _check_arguments(eom, t)
         state, (R, omega, alpha) = eom.state, targets_at(self, eom.robot, eom.k, t)
         e = pin.log3(state.frame_pose(self.frame).rotation @ R.T)
         J, drift = state.frame_jacobian(self.frame)[3:], state.frame_drift(self.frame)[3:]
@@ -255,7 +255,7 @@ class FrameTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, position=(3,), velocity=(3,), acceleration=(3,))
+        _set_validated_fields(self, position=(3,), velocity=(3,), acceleration=(3,))
 
     @property
     def name(self) -> str:
@@ -264,7 +264,7 @@ class FrameTask(Value):
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """J q̈ + J̇ q̇ - a, shape (3,), m/s², world-aligned."""
-        _at(eom, t)
+        _check_arguments(eom, t)
         state, (x, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
         J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
         return _motion_residual(self, J, drift, a, state.point(self.frame) - x, state.frame_velocity(self.frame)[:3] - v)
@@ -291,11 +291,11 @@ class PostureTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _keep(self, q=(None,), velocity=(None,), acceleration=(None,))
+        _set_validated_fields(self, q=(None,), velocity=(None,), acceleration=(None,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """q̈_joints - a, shape (d,), rad/s²."""
-        _at(eom, t)
+        _check_arguments(eom, t)
         state, (q, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
         joints = slice(eom.nv - eom.d, None)
         return _motion_residual(self, eom.S.T, np.zeros(eom.d), a, state.difference(q)[joints], state.v[joints] - v)
@@ -314,11 +314,11 @@ class ForceTask(Value):
     block: ClassVar[Block] = "forces"
 
     def __post_init__(self) -> None:
-        _keep(self, target=(None,))
+        _set_validated_fields(self, target=(None,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """λ - target, shape (k,), N."""
-        _at(eom, t)
+        _check_arguments(eom, t)
         return Affine.identity(eom.k) - targets_at(self, eom.robot, eom.k, t)[0]
 
 
@@ -332,11 +332,11 @@ class TorqueTask(Value):
     block: ClassVar[Block] = "tau"
 
     def __post_init__(self) -> None:
-        _keep(self, target=(None,))
+        _set_validated_fields(self, target=(None,))
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """τ - target, shape (d,), N·m."""
-        _at(eom, t)
+        _check_arguments(eom, t)
         return Affine.identity(eom.d) - targets_at(self, eom.robot, eom.k, t)[0]
 
 
@@ -345,16 +345,16 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
 
     To go elsewhere, replace the centre of mass's target: posture gives way, and settles only what the others leave open.
     """
-    of_kind("state", state, State)
+    as_instance("state", state, State)
     return CoMTask(state.com), OrientationTask("base", state.frame_pose("base").rotation), PostureTask(state.q)
 
 
 def _motion_residual(
-    task: CoMTask | OrientationTask | FrameTask | PostureTask, J: Array, drift: Array, feed: Array, e: Array, e_dot: Array
+    task: CoMTask | OrientationTask | FrameTask | PostureTask, J: Array, drift: Array, feedforward: Array, e: Array, e_dot: Array
 ) -> Affine:
     """J q̈ + J̇ q̇ - (a_ff - kp e - kd ė)."""
     assert task.kd is not None  # set when the task was made
-    return Affine(J, drift - feed + task.kp * e + task.kd * e_dot)
+    return Affine(J, drift - feedforward + task.kp * e + task.kd * e_dot)
 
 
 def nearest_rotation(name: str, R: Array) -> Array:
@@ -362,7 +362,7 @@ def nearest_rotation(name: str, R: Array) -> Array:
 
     Raises `InputError` where R Rᵀ is off by more than 1e-6 of the identity, or R mirrors.
     """
-    R = checked(f"rotation of {name}", R, (3, 3))
+    R = as_array(f"rotation of {name}", R, (3, 3))
     error = np.max(np.abs(R @ R.T - _IDENTITY))
     if not error <= _ROTATION_TOLERANCE or cross(R[0], R[1]) @ R[2] < 0:
         raise InputError(f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, determinant +1.")

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.friction import FrictionPolyhedron
 from floatbase.playground.session import Session
 from floatbase.playground.settings import Settings
@@ -152,7 +152,7 @@ def _edge(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], session.settings.facets)
         force = record.force(name, "planned")[-1]
         if np.isfinite(force).all() and force @ contacts.normals[i] > _LOADED:
-            found[name] = int(np.sum(cone.rows @ force > -_ON_FACET * float(force @ contacts.normals[i])))
+            found[name] = int(np.sum(cone.face_matrix @ force > -_ON_FACET * float(force @ contacts.normals[i])))
     most = max(found.values(), default=0)
     return most >= 2 or f"{most} active facet{'s' if most != 1 else ''} at a foot."
 

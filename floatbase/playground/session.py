@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.actuators import FirstOrderLag
 from floatbase.behaviours import Gait, Stand, Walk, pitch_and_yaw
 from floatbase.control import Belief, Command
@@ -30,7 +30,8 @@ _GROWING = 1.5  # s in which the ellipse grows from nothing
 class BaseMotors:
     """A controller around another one that drives motors of the base which no robot has: S without its zeros.
 
-    At each tick `sim.base_wrench` becomes the base's rows of (7), M q̈ + h - Jᵀ λ, of what the controller plans, with M, h and J
+    At each tick `sim.base_wrench` becomes the base's rows of (7), M q̈ + h - Jᵀ λ, of what the controller plans, with M, h and
+    J
     as it believes them: zero, but for rounding, unless it believes in such motors.
 
     belief: the controller's; the truth by default.

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 
-from floatbase._arrays import Value
+from floatbase._validation import Value
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError
 from floatbase.playground.equation import EQUATION

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.viewer import COM, MEASURED, Picture, below, marks, shapes
 

@@ -38,48 +38,48 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, of_kind, read_only, texts, whole
+from floatbase._validation import Array, Value, as_array, as_instance, read_only, as_strings, as_integer
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
-from floatbase.qp.conflicts import SHARE, infeasible, not_convex, unbounded, violation_allowed
-from floatbase.qp.labels import RowLabel
+from floatbase.qp.conflicts import MULTIPLIER_TOLERANCE, infeasible, not_convex, unbounded, violation_tolerance
+from floatbase.qp.labels import ConstraintLabel
 from floatbase.qp.problem import QP, InequalityQP
 from floatbase.qp.solution import Solution
 
 _ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60 terms
-_COUNTS = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
-_MANY = 10**6  # iterations, beyond any count that the method would take
-_VIOLATION = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
+_SIGNIFICANT = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
+_UNLIMITED = 10**6  # iterations, beyond any count that the method would take
+_SLACK_CONSTRAINT = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 
 
 @dataclass(frozen=True, eq=False)
 class Iteration(Value):
-    """One round of the method, for a lesson to draw: from x along direction, as far as length.
+    """One round of the method, for a lesson to draw: from x along direction, as far as step_length.
 
-    working: names of the rows in W.
+    working_set: names of the rows in W.
     x: (n,), the point it starts from.
     direction: (n,), p.
-    length: α.
+    step_length: α.
     blocking: name of the row that forbade a longer step and joins W, or None.
     multipliers: μ of the rows of W, by name, where the step arrived; empty when a row blocked.
     dropped: name of the row that leaves W, or None.
     objective: ½ xᵀ H x + gᵀ x at x; in phase 1 the largest violation at x, in units of the rows' length.
     """
 
-    working: tuple[str, ...]
+    working_set: tuple[str, ...]
     x: Array
     direction: Array
-    length: float
+    step_length: float
     blocking: str | None
     multipliers: Mapping[str, float]
     dropped: str | None
     objective: float
 
     @property
-    def arrival(self) -> Array:
+    def x_next(self) -> Array:
         """The point that the step leads to, shape (n,)."""
-        return read_only(self.x + self.length * self.direction)
+        return read_only(self.x + self.step_length * self.direction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,59 +89,59 @@ class ActiveSetRun(Value):
     solution: the optimum, with its multipliers; where the run was stopped, the point it had come to, all multipliers 0.
     iterations: from a feasible point to the optimum, objective never rising.
     phase_one: from the start to that feasible point, violation never rising; empty when the start was feasible.
-    working: names of the rows in W at the end, which the next problem can start from.
-    finished: whether the end is the optimum. A run that was stopped has a point that satisfies all rows once `iterations` holds
-        any; before, in phase 1, it may violate some.
+    working_set: names of the rows in W at the end, which the next problem can start from.
+    converged: whether the end is the optimum. A run that was stopped has a point that satisfies all rows once `iterations`
+        holds any; before, in phase 1, it may violate some.
     """
 
     solution: Solution
     iterations: tuple[Iteration, ...]
     phase_one: tuple[Iteration, ...]
-    working: tuple[str, ...]
-    finished: bool = True
+    working_set: tuple[str, ...]
+    converged: bool = True
 
 
 def active_set(
     qp: QP,
     start: npt.ArrayLike | None = None,
-    working: Sequence[str] = (),
-    most: int | None = None,
+    working_set: Sequence[str] = (),
+    max_iterations: int | None = None,
 ) -> ActiveSetRun:
     """App. C: solve a convex QP by the active-set method of this module, keeping a record of every iteration.
 
     qp: the problem.
     start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. By default the minimiser on the rows
-        of `working`, as if there were no others.
-    working: names of inequality rows to start with in W, such as the last run's `working`; those that depend on earlier
+        of `working_set`, as if there were no others.
+    working_set: names of inequality rows to start with in W, such as the last run's `working_set`; those that depend on earlier
         ones are left out.
-    most: iterations after which to stop, those of phase 1 included, as a program in real time must; None does not stop. A
-        run that is stopped raises no error: `ActiveSetRun.finished` says so.
+    max_iterations: iterations after which to stop, those of phase 1 included, as a program in real time must; None does not
+        stop. A run that is stopped raises no error: `ActiveSetRun.converged` says so.
 
     Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum, is not
     convex or does not let the method end on its rows, `UnknownNameError` for a row that does not exist, `InputError` for a
-    start of another shape or a `most` below 1.
+    start of another shape or a `max_iterations` below 1.
     """
-    space, problem = of_kind("qp", qp, QP).equality_space, qp.reduced
-    rows = _independent_rows(problem, [_index(qp, name) for name in texts("working", working)])
-    y = None if start is None else space.A.T @ (checked("start", start, (qp.n,)) - space.b)
-    left = _MANY if most is None else whole("most", most, 1, _MANY)
-    search = _feasible_start(problem, _starting_point(problem, y, rows), rows, left)
-    walk = (
-        _walk(problem, search.x, search.rows, left - len(search.iterations))
-        if search.finished
-        else replace(search, iterations=[])
+    space, problem = as_instance("qp", qp, QP).equality_space, qp.reduced
+    rows = _independent_rows(problem, [_index(qp, name) for name in as_strings("working_set", working_set)])
+    initial = None if start is None else space.A.T @ (as_array("start", start, (qp.n,)) - space.b)
+    budget = _UNLIMITED if max_iterations is None else as_integer("max_iterations", max_iterations, 1, _UNLIMITED)
+    phase_one = _feasible_start(problem, _starting_point(problem, initial, rows), rows, budget)
+    result = (
+        _iterate(problem, phase_one.x, phase_one.rows, budget - len(phase_one.iterations))
+        if phase_one.converged
+        else replace(phase_one, iterations=[])
     )
-    if walk.finished and np.any(_violated(problem, walk.x)):  # rows so nearly parallel that the method takes them for one
+    if result.converged and np.any(_violated(problem, result.x)):  # rows so nearly parallel that the method takes them for one
         raise SolverError(f"active_set ends beyond rows of {qp!r} that nearly repeat each other. Check their scaling.")
     mu = np.zeros(len(qp.G))
-    mu[walk.rows] = np.maximum(walk.multipliers, 0.0)
-    taken = len(search.iterations) + len(walk.iterations)
+    mu[result.rows] = np.maximum(result.multipliers, 0.0)
+    count = len(phase_one.iterations) + len(result.iterations)
     return ActiveSetRun(
-        solution=Solution(qp, space(walk.x), mu, "active_set", taken),
-        iterations=tuple(_in_x(step, space, qp.objective(space.b)) for step in walk.iterations),
-        phase_one=tuple(_in_x(step, space, 0.0) for step in search.iterations),
-        working=tuple(qp.inequality_names[i] for i in walk.rows),
-        finished=walk.finished,
+        solution=Solution(qp, space(result.x), mu, "active_set", count),
+        iterations=tuple(_in_original_variables(step, space, qp.objective(space.b)) for step in result.iterations),
+        phase_one=tuple(_in_original_variables(step, space, 0.0) for step in phase_one.iterations),
+        working_set=tuple(qp.inequality_names[i] for i in result.rows),
+        converged=result.converged,
     )
 
 
@@ -151,44 +151,44 @@ def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (
     With the minimum above the table the row "table" is inactive and might not be there; with the minimum below it the
     row is active and might be an equality.
     """
-    centre, H = checked("minimum", minimum, (2,), "m"), np.diag(checked("curvature", curvature, (2,)))
+    centre, H = as_array("minimum", minimum, (2,), "m"), np.diag(as_array("curvature", curvature, (2,)))
     G, h = np.array([[0.0, -1.0]]), np.zeros(1)  # -up ≤ 0
     return QP(H, -H @ centre, np.zeros((0, 2)), np.zeros(0), G, h, inequality_names=("table",))
 
 
 @dataclass(frozen=True, eq=False)
-class _Walk:
+class _Result:
     """Where a walk ended: point, rows of W and their multipliers, the iterations that led there, and whether it was done."""
 
     x: Array
     rows: list[int]
     multipliers: Array
     iterations: list[Iteration]
-    finished: bool = True
+    converged: bool = True
 
 
-def _walk(problem: QP, x: Array, rows: list[int], most: int, last: int | None = None) -> _Walk:
+def _iterate(problem: QP, x: Array, rows: list[int], max_iterations: int, last: int | None = None) -> _Result:
     """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W, at most so often; row `last` ends it."""
-    rows, stuck = list(rows), False
+    rows, degenerate = list(rows), False
     iterations: list[Iteration] = []
-    enough = 100 + 20 * (problem.n + len(problem.G))
-    for _ in range(min(enough, most)):
-        p, reach = _direction(problem, x, rows)
-        length, blocking = _longest_step(problem, x, p, reach, rows)
-        arrival = x + length * p
-        mu = _multipliers(problem, arrival, rows) if blocking is None else np.zeros(0)
-        drop = _row_to_drop(problem, arrival, rows, mu, stuck) if blocking is None else None
-        iterations.append(_record(problem, x, rows, p, length, blocking, mu, drop))
+    iteration_limit = 100 + 20 * (problem.n + len(problem.G))
+    for _ in range(min(iteration_limit, max_iterations)):
+        p, max_length = _direction(problem, x, rows)
+        length, blocking = _longest_step(problem, x, p, max_length, rows)
+        x_next = x + length * p
+        mu = _multipliers(problem, x_next, rows) if blocking is None else np.zeros(0)
+        drop = _row_to_drop(problem, x_next, rows, mu, degenerate) if blocking is None else None
+        iterations.append(_iteration_record(problem, x, rows, p, length, blocking, mu, drop))
         if blocking is not None:
             rows.append(blocking)
         if drop is None and blocking in (None, last):
-            return _Walk(arrival, rows, mu, iterations)
+            return _Result(x_next, rows, mu, iterations)
         if drop is not None:
             rows.remove(drop)
-        stuck = length * np.linalg.norm(p) <= _ROUNDING * (1.0 + np.linalg.norm(x))
-        x = arrival
-    if most <= enough:
-        return _Walk(x, rows, np.zeros(len(rows)), iterations, finished=False)
+        degenerate = length * np.linalg.norm(p) <= _ROUNDING * (1.0 + np.linalg.norm(x))
+        x = x_next
+    if max_iterations <= iteration_limit:
+        return _Result(x, rows, np.zeros(len(rows)), iterations, converged=False)
     raise SolverError(
         f"active_set did not converge: its rows still change after {len(iterations)} iterations on {problem!r}. "
         "Check the scaling of the problem."
@@ -200,46 +200,46 @@ def _starting_point(problem: QP, y: Array | None, rows: list[int]) -> Array:
     W = problem.G[rows]
     origin = np.zeros(problem.n) if y is None else y
     point = origin + np.linalg.pinv(W) @ (problem.h[rows] - W @ origin)
-    p, reach = _direction(problem, point, rows)
-    return point + p if y is None and np.isfinite(reach) else point
+    p, max_length = _direction(problem, point, rows)
+    return point + p if y is None and np.isfinite(max_length) else point
 
 
-def _feasible_start(problem: QP, y: Array, rows: list[int], most: int) -> _Walk:
+def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int) -> _Result:
     """Phase 1: a point that satisfies all rows, with rows of W that it lies on, in at most so many iterations.
 
     Minimises s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h on the others, by the
     same method. s = 0 is reached exactly if all rows can hold; otherwise the rows that stop s above 0 are in conflict.
     """
-    n, size = problem.n, problem.row_lengths
-    violation = (problem.G @ y - problem.h) / size
+    n, norms = problem.n, problem.row_norms
+    violation = (problem.G @ y - problem.h) / norms
     violation[rows] = 0.0
-    violated = violation > violation_allowed(problem.h / size, y)
+    violated = violation > violation_tolerance(problem.h / norms, y)
     if not np.any(violated):
-        return _Walk(y, rows, np.zeros(0), [])
+        return _Result(y, rows, np.zeros(0), [])
     s_row = len(problem.G)
-    elastic = InequalityQP(
+    relaxed = InequalityQP(
         H=np.zeros((n + 1, n + 1)),
         g=np.eye(n + 1)[-1],
         A=np.zeros((0, n + 1)),
         b=np.zeros(0),
-        G=np.block([[problem.G, -(size * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]),
+        G=np.block([[problem.G, -(norms * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]),
         h=np.append(problem.h, 0.0),
-        row_lengths=np.append(size, 1.0),
-        inequality_names=(*problem.inequality_names, RowLabel(_VIOLATION)),
+        row_norms=np.append(norms, 1.0),
+        inequality_names=(*problem.inequality_names, ConstraintLabel(_SLACK_CONSTRAINT)),
     )
     worst = int(np.argmax(violation))
-    walk = _walk(elastic, np.append(y, violation[worst]), [*rows, worst], most, last=s_row)
-    if walk.finished and walk.rows[-1] != s_row and np.any(_violated(problem, walk.x[:-1])):
-        share = walk.multipliers * elastic.row_lengths[walk.rows]  # those of the violated rows add up to 1
-        raise infeasible(problem.inequality_names[i] for i in sorted(np.array(walk.rows)[share > SHARE]))
-    found = _independent_rows(problem, [i for i in walk.rows if i != s_row])
-    return _Walk(walk.x[:-1], found, np.zeros(len(found)), walk.iterations, walk.finished)
+    result = _iterate(relaxed, np.append(y, violation[worst]), [*rows, worst], max_iterations, last=s_row)
+    if result.converged and result.rows[-1] != s_row and np.any(_violated(problem, result.x[:-1])):
+        share = result.multipliers * relaxed.row_norms[result.rows]  # those of the violated rows add up to 1
+        raise infeasible(problem.inequality_names[i] for i in sorted(np.array(result.rows)[share > MULTIPLIER_TOLERANCE]))
+    working = _independent_rows(problem, [i for i in result.rows if i != s_row])
+    return _Result(result.x[:-1], working, np.zeros(len(working)), result.iterations, result.converged)
 
 
 def _violated(problem: QP, x: Array) -> npt.NDArray[np.bool_]:
     """Which rows a point does not satisfy, shape (l,)."""
-    size = problem.row_lengths
-    return (problem.G @ x - problem.h) / size > violation_allowed(problem.h / size, x)
+    norms = problem.row_norms
+    return (problem.G @ x - problem.h) / norms > violation_tolerance(problem.h / norms, x)
 
 
 def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
@@ -248,34 +248,34 @@ def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
     With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u,
     whose curvatures are the eigenvalues of Zᵀ H Z.
     """
-    Z = null_space(problem.G[rows] / problem.row_lengths[rows, None])
+    Z = null_space(problem.G[rows] / problem.row_norms[rows, None])
     curvature, modes = np.linalg.eigh(Z.T @ problem.H @ Z)
-    flat_below = _ROUNDING * float(np.max(np.abs(problem.H), initial=0.0))
-    if np.any(curvature < -_COUNTS * flat_below):
+    curvature_rounding = _ROUNDING * float(np.max(np.abs(problem.H), initial=0.0))
+    if np.any(curvature < -_SIGNIFICANT * curvature_rounding):
         raise not_convex(problem, problem.H)
-    modes, curved = Z @ modes, curvature > flat_below
+    modes, curved = Z @ modes, curvature > curvature_rounding
     slope = modes.T @ (problem.H @ x + problem.g)
-    falling = ~curved & (np.abs(slope) > _COUNTS * _slope_rounding(problem, x))
-    if np.any(falling):
-        return -modes[:, falling] @ slope[falling], np.inf
+    unbounded_modes = ~curved & (np.abs(slope) > _SIGNIFICANT * _slope_rounding(problem, x))
+    if np.any(unbounded_modes):
+        return -modes[:, unbounded_modes] @ slope[unbounded_modes], np.inf
     return -modes[:, curved] @ (slope[curved] / curvature[curved]), 1.0
 
 
-def _longest_step(problem: QP, x: Array, p: Array, reach: float, rows: list[int]) -> tuple[float, int | None]:
-    """How far from x along p, at most `reach`, all rows hold: the length α, and the (first) row that forbids more."""
-    size = problem.row_lengths
-    speed, slack = problem.G @ p, problem.h - problem.G @ x
-    closing = speed > _ROUNDING * size * np.linalg.norm(p)
-    closing[rows] = False
-    if np.isfinite(reach):
-        closing &= _violated(problem, x + reach * p)
-    blocking = np.flatnonzero(closing)
+def _longest_step(problem: QP, x: Array, p: Array, max_length: float, rows: list[int]) -> tuple[float, int | None]:
+    """How far from x along p, at most `max_length`, all rows hold: the length α, and the (first) row that forbids more."""
+    norms = problem.row_norms
+    rate, slack = problem.G @ p, problem.h - problem.G @ x
+    approaching = rate > _ROUNDING * norms * np.linalg.norm(p)
+    approaching[rows] = False
+    if np.isfinite(max_length):
+        approaching &= _violated(problem, x + max_length * p)
+    blocking = np.flatnonzero(approaching)
     if not blocking.size:
-        if reach == np.inf:
+        if max_length == np.inf:
             raise unbounded(problem)
-        return reach, None
-    touching = slack < _ROUNDING * size * (1.0 + np.linalg.norm(x))
-    lengths = np.where(touching, 0.0, slack)[blocking] / speed[blocking]
+        return max_length, None
+    touching = slack < _ROUNDING * norms * (1.0 + np.linalg.norm(x))
+    lengths = np.where(touching, 0.0, slack)[blocking] / rate[blocking]
     first = int(np.argmin(lengths))
     return float(lengths[first]), int(blocking[first])
 
@@ -285,13 +285,13 @@ def _multipliers(problem: QP, x: Array, rows: list[int]) -> Array:
     return np.linalg.lstsq(problem.G[rows].T, -(problem.H @ x + problem.g), rcond=None)[0]
 
 
-def _row_to_drop(problem: QP, x: Array, rows: list[int], mu: Array, stuck: bool) -> int | None:
+def _row_to_drop(problem: QP, x: Array, rows: list[int], mu: Array, degenerate: bool) -> int | None:
     """The row of W with the most negative multiplier, rows at equal size, or None; when stuck, the first of wrong sign."""
-    force = mu * problem.row_lengths[rows]
-    wrong = [row for row, f in zip(rows, force, strict=True) if f < -_slope_rounding(problem, x)]
-    if not wrong:
+    force = mu * problem.row_norms[rows]
+    negative = [row for row, f in zip(rows, force, strict=True) if f < -_slope_rounding(problem, x)]
+    if not negative:
         return None
-    return min(wrong) if stuck else rows[int(np.argmin(force))]
+    return min(negative) if degenerate else rows[int(np.argmin(force))]
 
 
 def _independent_rows(problem: QP, rows: Sequence[int]) -> list[int]:
@@ -299,13 +299,13 @@ def _independent_rows(problem: QP, rows: Sequence[int]) -> list[int]:
     independent: list[int] = []
     basis = np.zeros((0, problem.n))
     for row in rows:
-        rest = problem.G[row] / problem.row_lengths[row]
+        residual = problem.G[row] / problem.row_norms[row]
         for _ in range(2):  # twice: the first pass leaves rounding
-            rest = rest - basis.T @ (basis @ rest)
-        length = float(np.linalg.norm(rest))
+            residual = residual - basis.T @ (basis @ residual)
+        length = float(np.linalg.norm(residual))
         if length > RANK_TOLERANCE:
             independent.append(row)
-            basis = np.vstack([basis, rest / length])
+            basis = np.vstack([basis, residual / length])
     return independent
 
 
@@ -317,19 +317,19 @@ def _slope_rounding(problem: QP, x: Array) -> float:
 
 def _index(qp: QP, name: str) -> int:
     if name not in qp.inequality_names:
-        raise unknown_name("inequality row", name, qp.inequality_names)
+        raise unknown_name("inequality constraint", name, qp.inequality_names)
     return qp.inequality_names.index(name)
 
 
-def _record(
+def _iteration_record(
     problem: QP, x: Array, rows: list[int], p: Array, length: float, blocking: int | None, mu: Array, drop: int | None
 ) -> Iteration:
     names = problem.inequality_names
     return Iteration(
-        working=tuple(names[i] for i in rows),
+        working_set=tuple(names[i] for i in rows),
         x=read_only(x),
         direction=read_only(p),
-        length=length,
+        step_length=length,
         blocking=None if blocking is None else names[blocking],
         multipliers=MappingProxyType({names[i]: float(m) for i, m in zip(rows, mu, strict=False)}),
         dropped=None if drop is None else names[drop],
@@ -337,7 +337,7 @@ def _record(
     )
 
 
-def _in_x(step: Iteration, space: Affine, offset: float) -> Iteration:
+def _in_original_variables(step: Iteration, space: Affine, offset: float) -> Iteration:
     """The same iteration in the problem's own variables, objective raised by `offset`; phase 1's s falls away."""
     n = space.n_in
     return replace(

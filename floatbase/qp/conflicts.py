@@ -10,32 +10,32 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.errors import InfeasibleError, SolverError
-from floatbase.qp.labels import RowLabel
+from floatbase.qp.labels import ConstraintLabel
 
 FEASIBILITY_TOLERANCE = 1e-9  # how far a solver may violate an inequality of unit length: N, N·m; well above rounding
-SHARE = 1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
+MULTIPLIER_TOLERANCE = 1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
 _ROUNDING = 1e-12  # part of a row, of its |h| and of the largest |x| that may be rounding
-_STEPS = 100  # for each row, before the search for a conflict gives up; it takes about one
-_FEW = 4  # rows that are listed in one line
+_STEPS_PER_CONSTRAINT = 100  # for each row, before the search for a conflict gives up; it takes about one
+_MAX_LISTED = 4  # rows that are listed in one line
 
 
-def infeasible(rows: Iterable[str]) -> InfeasibleError:
+def infeasible(constraints: Iterable[str]) -> InfeasibleError:
     """The error that names the inequality rows in conflict.
 
     More than a few are grouped by kind and counted, each by its owner, or by its whole name where its owner has several.
     """
-    labels = [row if isinstance(row, RowLabel) else RowLabel(row) for row in rows]
+    labels = [row if isinstance(row, ConstraintLabel) else ConstraintLabel(row) for row in constraints]
     text = f" {', '.join(labels)}. "
-    if len(labels) > _FEW:
+    if len(labels) > _MAX_LISTED:
         kinds: dict[str, list[str]] = {}
         for label in labels:
             kinds.setdefault(label.kind, []).append(label.owner if label.number is None else label)
         text = "".join(f"\n  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()) + "\n"
     return InfeasibleError(
-        f"no point satisfies all rows. Given the equalities, these are in conflict:{text}"
-        "At least one of these rows has to be loosened or dropped; other rows may be in conflict too.",
+        f"no point satisfies all constraints. Given the equalities, these are in conflict:{text}"
+        "At least one of these constraints has to be loosened or dropped; others may be in conflict too.",
         labels,
     )
 
@@ -56,20 +56,20 @@ def not_convex(problem: object, H: Array) -> SolverError:
     )
 
 
-def violation_allowed(h: Array, x: Array | None = None) -> Array:
+def violation_tolerance(h: Array, x: Array | None = None) -> Array:
     """How far rows of unit length may be violated, shape (l,): `FEASIBILITY_TOLERANCE`, and rounding.
 
     h: (l,), their right-hand sides. x: (n,), the point that is tried, or None where there is none.
     """
-    size = 0.0 if x is None else float(np.max(np.abs(x), initial=0.0))
-    return FEASIBILITY_TOLERANCE + _ROUNDING * (np.abs(h) + size)
+    magnitude = 0.0 if x is None else float(np.max(np.abs(x), initial=0.0))
+    return FEASIBILITY_TOLERANCE + _ROUNDING * (np.abs(h) + magnitude)
 
 
-def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:
+def conflicting_constraints(G: Array, h: Array) -> tuple[int, ...]:
     """Indices of rows of G y ≤ h that cannot hold together, while any of them dropped leaves the others satisfiable.
 
     G: (l, n), h: (l,), in units that make violations of different rows comparable. Empty when a point satisfies all rows
-    but for `violation_allowed`. Otherwise, by Farkas' lemma, multipliers m ≥ 0 of the rows prove that there is none: Gᵀ m = 0
+    but for `violation_tolerance`. Otherwise, by Farkas' lemma, multipliers m ≥ 0 of the rows prove that there is none: Gᵀ m = 0
     and hᵀ m < 0. They minimise ‖Gᵀ m‖² + (hᵀ m + 1)²; the active-set method for m ≥ 0 ends with columns (G, h) of independent
     rows, so that no row of the proof can be spared. Source: Lawson and Hanson, Solving Least Squares Problems (1974), ch. 23.
     """
@@ -77,13 +77,13 @@ def conflicting_rows(G: Array, h: Array) -> tuple[int, ...]:
 
     if not len(G):
         return ()
-    length, size = float(np.max(np.abs(G), initial=0.0)) or 1.0, float(np.max(np.abs(h))) or 1.0
-    loosened = h + violation_allowed(h)
-    aim = np.append(np.zeros(G.shape[1]), -1.0)
+    norm_G, norm_h = float(np.max(np.abs(G), initial=0.0)) or 1.0, float(np.max(np.abs(h))) or 1.0
+    relaxed = h + violation_tolerance(h)
+    target = np.append(np.zeros(G.shape[1]), -1.0)
     try:
-        m, _ = nnls(np.vstack([G.T / length, loosened / size]), aim, maxiter=_STEPS * len(G))
+        m, _ = nnls(np.vstack([G.T / norm_G, relaxed / norm_h]), target, maxiter=_STEPS_PER_CONSTRAINT * len(G))
     except RuntimeError as error:
         raise SolverError(f"the search for conflicting rows among {len(G)} did not end: {error}") from None
     m /= np.sum(m) or 1.0
-    proof = np.max(np.abs(G.T @ m), initial=0.0) <= _ROUNDING * length and loosened @ m < 0.0
-    return tuple(int(row) for row in np.flatnonzero(m > SHARE)) if proof else ()
+    infeasible_certificate = np.max(np.abs(G.T @ m), initial=0.0) <= _ROUNDING * norm_G and relaxed @ m < 0.0
+    return tuple(int(row) for row in np.flatnonzero(m > MULTIPLIER_TOLERANCE)) if infeasible_certificate else ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.errors import SolverError
 
 if TYPE_CHECKING:

@@ -24,12 +24,12 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property, checked, read_only, texts
-from floatbase.affine import Affine, block_slices
+from floatbase._validation import Array, Value, cached_property, as_array, read_only, as_strings
+from floatbase.affine import Affine, as_blocks
 from floatbase.errors import InfeasibleError, unknown_name
-from floatbase.linear_algebra import ranked_svd, row_lengths
-from floatbase.qp.conflicts import conflicting_rows
-from floatbase.qp.labels import row_labels
+from floatbase.linear_algebra import svd_with_rank, row_norms
+from floatbase.qp.conflicts import conflicting_constraints
+from floatbase.qp.labels import constraint_labels
 
 _CONSISTENCY_TOLERANCE = 1e-7  # part of the largest |b| by which equalities of unit length may miss each other: measured b
 _ROUNDING = 1e-14  # part of a sum's terms that may be rounding: some 50 units in the last place
@@ -43,7 +43,7 @@ class QP(Value):
     g: (n,).
     A, b: (m, n) and (m,), the equalities.
     G, h: (l, n) and (l,), the inequalities.
-    equality_names, inequality_names: one for each row, plain texts or `RowLabel`s; both are kept as `RowLabel`s.
+    equality_names, inequality_names: one for each row, plain texts or `ConstraintLabel`s; both are kept as `ConstraintLabel`s.
     blocks: names of slices of x.
 
     Raises `InputError` when shapes or names do not fit.
@@ -60,27 +60,27 @@ class QP(Value):
     blocks: Mapping[str, slice] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        g = checked("g", self.g, (None,))
-        A, G = checked("A", self.A, (None, g.size)), checked("G", self.G, (None, g.size))
-        H = checked("H", self.H, (g.size, g.size))
+        g = as_array("g", self.g, (None,))
+        A, G = as_array("A", self.A, (None, g.size)), as_array("G", self.G, (None, g.size))
+        H = as_array("H", self.H, (g.size, g.size))
         values: dict[str, object] = {"H": read_only(0.5 * (H + H.T)), "g": g, "A": A, "G": G}
-        values["b"], values["h"] = checked("b", self.b, (len(A),)), checked("h", self.h, (len(G),))
-        values["blocks"] = block_slices(self.blocks)
-        values["equality_names"] = row_labels(self.equality_names, len(A), "equality")
-        values["inequality_names"] = row_labels(self.inequality_names, len(G), "inequality")
+        values["b"], values["h"] = as_array("b", self.b, (len(A),)), as_array("h", self.h, (len(G),))
+        values["blocks"] = as_blocks(self.blocks)
+        values["equality_names"] = constraint_labels(self.equality_names, len(A), "equality")
+        values["inequality_names"] = constraint_labels(self.inequality_names, len(G), "inequality")
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def without(self, *kinds: str) -> QP:
         """The same problem without the inequality rows of these kinds, such as "friction" or "normal force".
 
-        The kind of a row is `RowLabel.kind`, "other rows" where its name is a plain text. Raises `UnknownNameError` for a kind
-        that no row has.
+        The kind of a row is `ConstraintLabel.kind`, "other constraints" where its name is a plain text. Raises
+        `UnknownNameError` for a kind that no row has.
         """
-        labels = row_labels(self.inequality_names, len(self.G), "inequality")
-        for kind in texts("kinds", kinds):
-            if kind not in (there := {label.kind: None for label in labels}):
-                raise unknown_name("kind of rows", kind, there)
+        labels = constraint_labels(self.inequality_names, len(self.G), "inequality")
+        for kind in as_strings("kinds", kinds):
+            if kind not in (known := {label.kind: None for label in labels}):
+                raise unknown_name("kind of constraint", kind, known)
         kept = [i for i, label in enumerate(labels) if label.kind not in kinds]
         names = tuple(labels[i] for i in kept)
         return QP(self.H, self.g, self.A, self.b, self.G[kept], self.h[kept], self.equality_names, names, self.blocks)
@@ -101,15 +101,15 @@ class QP(Value):
         Rows count at unit length, so that multiplying an equation changes nothing. Raises `InfeasibleError` naming rows
         when the equalities are inconsistent.
         """
-        size = row_lengths(self.A)
+        size = row_norms(self.A)
         A, b = self.A / size[:, None], self.b / size
-        U, s, Vt, rank = ranked_svd(A)
+        U, s, Vt, rank = svd_with_rank(A)
         residual = np.max(np.abs(U[:, rank:].T @ b), initial=0.0)
         if residual > _CONSISTENCY_TOLERANCE * (1.0 + np.max(np.abs(b), initial=0.0)):
             resolved = (U[:, :rank] * s[:rank]) @ Vt[:rank]  # rows that nearly repeat each other would meet far away
-            sides = conflicting_rows(np.vstack([resolved, -resolved]), np.append(b, -b))  # A x ≤ b and A x ≥ b
+            sides = conflicting_constraints(np.vstack([resolved, -resolved]), np.append(b, -b))  # A x ≤ b and A x ≥ b
             rows = [self.equality_names[i] for i in sorted(side % len(A) for side in sides)]
-            raise InfeasibleError(f"these equality rows are inconsistent: {', '.join(rows)}. Drop one of them.", rows)
+            raise InfeasibleError(f"these equality constraints are inconsistent: {', '.join(rows)}. Drop one of them.", rows)
         return Affine(Vt[rank:].T, Vt[:rank].T @ ((U[:, :rank].T @ b) / s[:rank]))
 
     @cached_property
@@ -119,23 +119,23 @@ class QP(Value):
             return self
         Z, x0 = self.equality_space
         # what vanishes on the space must come out as zero: its rounding would pass for a curvature, a slope or a row
-        H = _without_rounding(Z.T @ self.H @ Z, np.max(np.abs(self.H), initial=0.0))
-        g = _without_rounding(Z.T @ (self.H @ x0 + self.g), np.max(np.abs(self.H) @ np.abs(x0) + np.abs(self.g), initial=0.0))
+        H = _zero_if_rounding(Z.T @ self.H @ Z, np.max(np.abs(self.H), initial=0.0))
+        g = _zero_if_rounding(Z.T @ (self.H @ x0 + self.g), np.max(np.abs(self.H) @ np.abs(x0) + np.abs(self.g), initial=0.0))
         G, h = self.G @ Z, self.h - self.G @ x0
-        G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_lengths] = 0.0
+        G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_norms] = 0.0
         h[np.abs(h) <= _ROUNDING * (np.abs(self.G) @ np.abs(x0) + np.abs(self.h))] = 0.0
-        return InequalityQP._of_known(
-            H=0.5 * (H + H.T), g=g, A=np.zeros((0, g.size)), b=self.b[:0], G=G, h=h, row_lengths=self.row_lengths,
+        return InequalityQP._unchecked(
+            H=0.5 * (H + H.T), g=g, A=np.zeros((0, g.size)), b=self.b[:0], G=G, h=h, row_norms=self.row_norms,
             equality_names=(), inequality_names=self.inequality_names, blocks=MappingProxyType({}),
         )  # fmt: skip
 
     @cached_property
-    def row_lengths(self) -> Array:
+    def row_norms(self) -> Array:
         """The unit to compare violations of rows in, shape (l,): the length of each row of G, 1 for a row of zeros.
 
         `reduced` keeps the lengths that the rows have in x.
         """
-        return read_only(row_lengths(self.G))
+        return read_only(row_norms(self.G))
 
     def __repr__(self) -> str:
         return f"QP({self.n} variables, {len(self.A)} equalities, {len(self.G)} inequalities)"
@@ -143,16 +143,16 @@ class QP(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InequalityQP(QP):
-    """A `QP` without equalities, made from another one, whose `row_lengths` (l,) are given rather than measured."""
+    """A `QP` without equalities, made from another one, whose `row_norms` (l,) are given rather than measured."""
 
-    row_lengths: Array = field(kw_only=True)
+    row_norms: Array = field(kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "row_lengths", checked("row_lengths", self.row_lengths, (len(self.G),)))
+        object.__setattr__(self, "row_norms", as_array("row_norms", self.row_norms, (len(self.G),)))
 
     @classmethod
-    def _of_known(cls, **values: Any) -> InequalityQP:
+    def _unchecked(cls, **values: Any) -> InequalityQP:
         """One whose values are known to fit, and are not checked again."""
         qp = object.__new__(cls)
         for name, value in values.items():
@@ -160,6 +160,6 @@ class InequalityQP(QP):
         return qp
 
 
-def _without_rounding(value: Array, terms: float) -> Array:
+def _zero_if_rounding(value: Array, terms: float) -> Array:
     """`value`, or zeros when all of it is no more than the rounding of sums of terms of that size."""
     return value if np.max(np.abs(value), initial=0.0) > _ROUNDING * terms else np.zeros_like(value)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property, read_only
+from floatbase._validation import Array, Value, cached_property, read_only
 from floatbase.errors import InputError
-from floatbase.linear_algebra import RANK_TOLERANCE, row_lengths
+from floatbase.linear_algebra import RANK_TOLERANCE, row_norms
 from floatbase.qp.problem import QP
 
-_ACTIVE = 1e-9  # part of the largest slope above which a multiplier counts: what solvers leave on rows that only touch
+_ACTIVE_TOLERANCE = 1e-9  # part of the largest slope above which a multiplier counts: what solvers leave on rows that touch
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Solution(Value):
     def equality_multipliers(self) -> Array:
         """ν, shape (m,): follows from stationarity, by least squares."""
         qp = self.qp
-        slope, size = qp.H @ self.x + qp.g + qp.G.T @ self.inequality_multipliers, row_lengths(qp.A)
+        slope, size = qp.H @ self.x + qp.g + qp.G.T @ self.inequality_multipliers, row_norms(qp.A)
         return read_only(np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size)
 
     @cached_property
@@ -77,10 +77,10 @@ class Solution(Value):
     @cached_property
     def active(self) -> tuple[str, ...]:
         """Names of the active inequality rows: those whose multiplier counts beside the slopes that it balances."""
-        qp, force = self.qp, self.inequality_multipliers * self.qp.row_lengths
-        slopes = np.concatenate([qp.g, qp.H @ self.x, force])
-        counts = force > _ACTIVE * np.max(np.abs(slopes), initial=0.0)
-        return tuple(qp.inequality_names[i] for i in np.flatnonzero(counts))
+        qp, scaled = self.qp, self.inequality_multipliers * self.qp.row_norms
+        slopes = np.concatenate([qp.g, qp.H @ self.x, scaled])
+        is_active = scaled > _ACTIVE_TOLERANCE * np.max(np.abs(slopes), initial=0.0)
+        return tuple(qp.inequality_names[i] for i in np.flatnonzero(is_active))
 
     @property
     def multipliers(self) -> dict[str, float]:

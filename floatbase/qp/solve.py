@@ -8,23 +8,23 @@ from contextlib import suppress
 
 import numpy as np
 
-from floatbase._arrays import Array, of_kind
+from floatbase._validation import Array, as_instance
 from floatbase.errors import SolverError, unknown_name
 from floatbase.qp.active_set import active_set
 from floatbase.qp.conflicts import (
     FEASIBILITY_TOLERANCE,
-    conflicting_rows,
+    conflicting_constraints,
     infeasible,
     not_convex,
     unbounded,
-    violation_allowed,
+    violation_tolerance,
 )
 from floatbase.qp.problem import QP
 from floatbase.qp.solution import Solution
 
-_CLARABEL = (1e-12, 1e-10, 1e-8)  # tolerances to ask Clarabel for; now and then it makes no progress on the way to the first
-_CONVEX = 1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
-_POLISHABLE = 1e-4  # part of the largest variable that polishing may move any: beyond it, it mends no last digits
+_CLARABEL_TOLERANCES = (1e-12, 1e-10, 1e-8)  # asked for in turn; now and then it makes no progress on the way to the first
+_CONVEXITY_TOLERANCE = 1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
+_MAX_POLISHING_STEP = 1e-4  # part of the largest variable that polishing may move any: beyond it, it mends no last digits
 
 
 def solve(qp: QP, solver: str = "daqp") -> Solution:
@@ -38,13 +38,13 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     not exist.
     """
     check_solver(solver)
-    of_kind("qp", qp, QP)
-    found = _BACK_ENDS[solver](qp)
-    if found is not None:
-        return found
-    rows = conflicting_rows(qp.reduced.G / qp.row_lengths[:, None], qp.reduced.h / qp.row_lengths)
-    if rows:
-        raise infeasible(qp.inequality_names[i] for i in rows)
+    as_instance("qp", qp, QP)
+    solution = _BACK_ENDS[solver](qp)
+    if solution is not None:
+        return solution
+    conflict = conflicting_constraints(qp.reduced.G / qp.row_norms[:, None], qp.reduced.h / qp.row_norms)
+    if conflict:
+        raise infeasible(qp.inequality_names[i] for i in conflict)
     return _active_set(qp)
 
 
@@ -67,55 +67,56 @@ def _daqp(qp: QP) -> Solution | None:
     """
     import daqp
 
-    inner, size, rows = qp.reduced, qp.row_lengths, len(qp.G)
-    if inner.n == 0:
+    reduced, norms, rows = qp.reduced, qp.row_norms, len(qp.G)
+    if reduced.n == 0:
         return None
-    scale = _objective_size(inner)
-    y, _, flag, info = daqp.solve(
-        inner.H / scale,
-        inner.g / scale,
-        inner.G / size[:, None],
-        inner.h / size,
+    scale = _objective_scale(reduced)
+    y, _, exit_flag, info = daqp.solve(
+        reduced.H / scale,
+        reduced.g / scale,
+        reduced.G / norms[:, None],
+        reduced.h / norms,
         np.full(rows, -1e30),  # what DAQP takes for no bound
         np.zeros(rows, dtype=np.int32),
         primal_tol=FEASIBILITY_TOLERANCE,
         eps_prox=-1.0,
     )
-    if flag == -3:
+    if exit_flag == -3:
         raise unbounded(qp)
-    if flag == -5:
-        raise not_convex(qp, inner.H)
-    if flag not in (1, 2):  # infeasible, it says, or it cycled or took too many iterations; its numbers may be of any size
+    if exit_flag == -5:
+        raise not_convex(qp, reduced.H)
+    if exit_flag not in (1, 2):  # infeasible, it says, or it cycled or took too many iterations; its numbers may be of any size
         return None
-    polished = _polished(qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / size)
+    polished = _polished(qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms)
     return None if polished is None else Solution(qp, *polished, "daqp", int(info["iterations"]))
 
 
 def _active_set(qp: QP) -> Solution:
     """The method of `active_set.py` from a cold start, its answer polished."""
-    found, space = active_set(qp).solution, qp.equality_space
-    polished = _polished(qp, space.A.T @ (found.x - space.b), found.inequality_multipliers)
-    return found if polished is None else Solution(qp, *polished, found.solver, found.iterations)
+    solution, space = active_set(qp).solution, qp.equality_space
+    polished = _polished(qp, space.A.T @ (solution.x - space.b), solution.inequality_multipliers)
+    return solution if polished is None else Solution(qp, *polished, solution.solver, solution.iterations)
 
 
 def _cvxpy(qp: QP) -> Solution | None:
     """The whole problem, equalities included, by cvxpy and Clarabel at tight tolerances: slow and independent."""
     import cvxpy as cp
 
-    inner = qp.reduced
-    if np.any(np.linalg.eigvalsh(inner.H) < -_CONVEX * np.max(np.abs(inner.H), initial=0.0)):  # Clarabel does not check
-        raise not_convex(qp, inner.H)
+    reduced = qp.reduced
+    # Clarabel does not check
+    if np.any(np.linalg.eigvalsh(reduced.H) < -_CONVEXITY_TOLERANCE * np.max(np.abs(reduced.H), initial=0.0)):
+        raise not_convex(qp, reduced.H)
     # written around the optimum without inequalities: Clarabel's gap is relative to an objective that is then small,
     # which is what lets it see weights of 1e-6 beside weights of 10
-    origin = qp.equality_space(np.linalg.lstsq(inner.H, -inner.g, rcond=None)[0])
-    scale = min(_objective_size(qp), 1.0)  # a small objective is blown up, or Clarabel's absolute tolerance hides it
+    origin = qp.equality_space(np.linalg.lstsq(reduced.H, -reduced.g, rcond=None)[0])
+    scale = min(_objective_scale(qp), 1.0)  # a small objective is blown up, or Clarabel's absolute tolerance hides it
     H, slope = qp.H / scale, (qp.H @ origin + qp.g) / scale
     step = cp.Variable(qp.n)
     equalities = [qp.A @ step == qp.b - qp.A @ origin] if len(qp.A) else []
     inequalities = [qp.G @ step <= qp.h - qp.G @ origin] if len(qp.G) else []
     objective = 0.5 * cp.quad_form(step, cp.psd_wrap(H)) + slope @ step
     problem = cp.Problem(cp.Minimize(objective), equalities + inequalities)
-    for tolerance in _CLARABEL:
+    for tolerance in _CLARABEL_TOLERANCES:
         with suppress(cp.error.SolverError), warnings.catch_warnings():
             # at its last digits Clarabel calls itself inaccurate; how accurate it was, Solution.residuals says
             warnings.filterwarnings("ignore", message="Solution may be inaccurate")
@@ -144,32 +145,32 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
 
     y: (p,), the minimiser of `qp.reduced`; mu: (l,), the multipliers of the inequalities.
     """
-    inner, space, n = qp.reduced, qp.equality_space, len(y)
+    reduced, space, n = qp.reduced, qp.equality_space, len(y)
     active = np.flatnonzero(mu > 0.0)
-    G = inner.G[active]
+    G = reduced.G[active]
     K = np.zeros((n + len(G), n + len(G)))
-    K[:n, :n], K[:n, n:], K[n:, :n] = inner.H, G.T, G
-    Z, H, rows = (np.asarray(part, dtype=np.longdouble) for part in (space.A, qp.H, qp.G[active]))
-    found = np.concatenate([y, mu[active]]).astype(np.longdouble)
+    K[:n, :n], K[:n, n:], K[n:, :n] = reduced.H, G.T, G
+    Z, H, rows = (np.asarray(array, dtype=np.longdouble) for array in (space.A, qp.H, qp.G[active]))
+    values = np.concatenate([y, mu[active]]).astype(np.longdouble)
     for _ in range(2):
-        x = Z @ found[:n] + space.b
-        slope = Z.T @ (H @ x + qp.g + rows.T @ found[n:])
+        x = Z @ values[:n] + space.b
+        slope = Z.T @ (H @ x + qp.g + rows.T @ values[n:])
         residual = np.concatenate([slope, rows @ x - qp.h[active]]).astype(np.float64)
         try:
             step = np.linalg.solve(K, residual)
         except np.linalg.LinAlgError:  # an optimum that is not unique
             return space(y), mu
-        if not np.max(np.abs(step[:n]), initial=0.0) < _POLISHABLE * (1.0 + np.max(np.abs(y), initial=0.0)):
+        if not np.max(np.abs(step[:n]), initial=0.0) < _MAX_POLISHING_STEP * (1.0 + np.max(np.abs(y), initial=0.0)):
             return None
-        found -= step
+        values -= step
     polished = np.zeros_like(mu)
-    polished[active] = np.maximum(found[n:].astype(np.float64), 0.0)
-    point, size = space(found[:n].astype(np.float64)), qp.row_lengths
-    if np.any((qp.G @ point - qp.h) / size > violation_allowed(qp.h / size, point)):
+    polished[active] = np.maximum(values[n:].astype(np.float64), 0.0)
+    point, size = space(values[:n].astype(np.float64)), qp.row_norms
+    if np.any((qp.G @ point - qp.h) / size > violation_tolerance(qp.h / size, point)):
         return None
     return point, polished
 
 
-def _objective_size(qp: QP) -> float:
+def _objective_scale(qp: QP) -> float:
     """What to divide the objective by so that tolerances mean the same for every problem."""
     return float(np.max(np.abs(qp.H), initial=0.0) or np.max(np.abs(qp.g), initial=0.0) or 1.0)

@@ -1,11 +1,11 @@
 """Robots, and the states they can be in (§1, §2 of the document)."""
 
-from floatbase.robots.loading import PLATE, catalogue, load, load_urdf, unbolted
-from floatbase.robots.robot import UNIT_LENGTH_TOLERANCE, Foot, Robot, check_unit_lengths, checked_corners, torque_limits_of
+from floatbase.robots.loading import PLATE_SIZE, catalogue, load, load_urdf, with_floating_base
+from floatbase.robots.robot import UNIT_NORM_TOLERANCE, Foot, Robot, check_unit_norms, as_corners, as_torque_limits
 from floatbase.robots.state import State
 
 # fmt: off
 __all__ = [
-    "PLATE", "UNIT_LENGTH_TOLERANCE", "Foot", "Robot", "State", "catalogue", "check_unit_lengths", "checked_corners", "load",
-    "load_urdf", "torque_limits_of", "unbolted",
+    "PLATE_SIZE", "UNIT_NORM_TOLERANCE", "Foot", "Robot", "State", "as_corners", "as_torque_limits", "catalogue",
+    "check_unit_norms", "load", "load_urdf", "with_floating_base",
 ]

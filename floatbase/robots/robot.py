@@ -14,29 +14,29 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import (
-    LARGEST,
+from floatbase._validation import (
+    MAX_MAGNITUDE,
     Array,
     Value,
     cached_property,
-    checked,
-    plain_numbers,
-    positive,
+    as_array,
+    numeric_copy,
+    as_positive,
     read_only,
-    said,
-    text,
-    whole,
+    short_repr,
+    as_string,
+    as_integer,
 )
 from floatbase.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
     from floatbase.robots.state import State
 
-UNIT_LENGTH_TOLERANCE = 1e-6  # quaternions printed with seven digits pass; normalising what is further off could hide a fault
-_SPARE = 4  # as many results as threads are likely to ask for at once
-_LIMIT_ERROR = 1e-6  # rad or m: angles printed with seven digits pass
-_SINGULAR = 1e-10  # least eigenvalue of M scaled to a diagonal of ones: robots have 1e-3 and more, rounding leaves 1e-15
-_SHARE = 0.05  # part in a motion without inertia from which a joint is named
+UNIT_NORM_TOLERANCE = 1e-6  # quaternions printed with seven digits pass; normalising what is further off could hide a fault
+_DATA_POOL_SIZE = 4  # as many results as threads are likely to ask for at once
+_LIMIT_TOLERANCE = 1e-6  # rad or m: angles printed with seven digits pass
+_SINGULAR_M = 1e-10  # least eigenvalue of M scaled to a diagonal of ones: robots have 1e-3 and more, rounding leaves 1e-15
+_PARTICIPATION_TOLERANCE = 0.05  # part in a motion without inertia from which a joint is named
 _AREA_TOLERANCE = 1e-6  # m: corners nearer to one line than this span no area; feet are measured to 0.1 mm
 
 
@@ -56,11 +56,11 @@ class Foot(Value):
     corners: Array | None = None
 
     def __post_init__(self) -> None:
-        text("frame of a foot", self.frame)
-        object.__setattr__(self, "radius", positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
-        object.__setattr__(self, "centre", checked(f"centre of foot {self.frame}", self.centre, (3,), "m"))
+        as_string("frame of a foot", self.frame)
+        object.__setattr__(self, "radius", as_positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True))
+        object.__setattr__(self, "centre", as_array(f"centre of foot {self.frame}", self.centre, (3,), "m"))
         if self.corners is not None:
-            object.__setattr__(self, "corners", checked_corners(self.frame, self.corners))
+            object.__setattr__(self, "corners", as_corners(self.frame, self.corners))
 
     @property
     def is_flat(self) -> bool:
@@ -101,8 +101,8 @@ class Robot(Value):
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "posture", checked_posture(self.name, self.model, self.posture))
-        object.__setattr__(self, "torque_limits", torque_limits_of(self.d, self.torque_limits))
+        object.__setattr__(self, "posture", as_posture(self.name, self.model, self.posture))
+        object.__setattr__(self, "torque_limits", as_torque_limits(self.d, self.torque_limits))
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         for foot in self.feet:
             if [self.frame_id(other.frame) for other in self.feet].count(self.frame_id(foot.frame)) > 1:
@@ -116,20 +116,20 @@ class Robot(Value):
         if not 0.0 < self.mass < np.inf:
             raise InputError(f"{self.name} has a mass of {self.mass:g} kg; give its links <inertial> in the URDF.")
         M = pin.crba(self.model, self.model.createData(), np.array(self.posture))
-        if not np.all(np.abs(M) <= LARGEST):
+        if not np.all(np.abs(M) <= MAX_MAGNITUDE):
             raise InputError(f"the inertia M (1) of {self.name} is not finite; look for lengths or masses that no robot has.")
-        size = np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
-        values, vectors = np.linalg.eigh(M / np.outer(size, size))
-        part = np.abs(vectors[:, values < _SINGULAR]).max(axis=1, initial=0.0)
+        scale = np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
+        values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
+        participation = np.abs(vectors[:, values < _SINGULAR_M]).max(axis=1, initial=0.0)
         names = [*["its base"] * (self.nv - self.d), *self.joint_names]
-        light = list(dict.fromkeys(name for name, share in zip(names, part, strict=True) if share > _SHARE))
-        if light:
-            joints = [name for name in light if name != "its base"]
-            held = f", or hold joints still, as with locked={joints}" if joints else ""
-            bolted = ", or load it with floating=False where it is bolted to the ground" if "its base" in light else ""
+        massless = list(dict.fromkeys(name for name, value in zip(names, participation, strict=True) if value > _PARTICIPATION_TOLERANCE))
+        if massless:
+            joints = [name for name in massless if name != "its base"]
+            lock_hint = f", or hold joints still, as with locked={joints}" if joints else ""
+            fix_hint = ", or load it with floating=False where it is bolted to the ground" if "its base" in massless else ""
             raise InputError(
-                f"{self.name} has a singular inertia M (1) in its posture: {', '.join(light)} can accelerate without moving "
-                f"any mass. Give the links there mass and inertia{held}{bolted}."
+                f"{self.name} has a singular inertia M (1) in its posture: {', '.join(massless)} can accelerate without moving "
+                f"any mass. Give the links there mass and inertia{lock_hint}{fix_hint}."
             )
 
     @cached_property
@@ -150,7 +150,7 @@ class Robot(Value):
     @cached_property
     def is_floating(self) -> bool:
         """Whether the base is free to move: nv = d + 6 rather than d."""
-        return has_free_base(self.model)
+        return has_floating_base(self.model)
 
     @cached_property
     def nq(self) -> int:
@@ -193,9 +193,9 @@ class Robot(Value):
         return self.mass * self.gravity
 
     @cached_property
-    def _spare(self) -> deque[pin.Data]:
+    def _data_pool(self) -> deque[pin.Data]:
         """Memory of states that are gone, for Pinocchio's results of the next one: making it takes longer than filling it."""
-        return deque(maxlen=_SPARE)
+        return deque(maxlen=_DATA_POOL_SIZE)
 
     @cached_property
     def base(self) -> str:
@@ -209,7 +209,7 @@ class Robot(Value):
         return tuple(str(f.name) for f in self.model.frames if f.name != "universe")
 
     @cached_property
-    def _frame_numbers(self) -> dict[str, int]:
+    def _frame_ids(self) -> dict[str, int]:
         """Pinocchio's number of each frame, the first of several that share a name; "base" is the base link."""
         numbers = {str(frame.name): i for i, frame in reversed(list(enumerate(self.model.frames)))}
         return {"base": numbers[self.base], **numbers}
@@ -219,9 +219,9 @@ class Robot(Value):
 
         Raises `UnknownNameError` with the near names.
         """
-        if not isinstance(frame, str) or frame not in self._frame_numbers:
+        if not isinstance(frame, str) or frame not in self._frame_ids:
             raise unknown_name(f"frame of {self.name}", frame, self.frames, "robot.frames lists them all.")
-        return self._frame_numbers[frame]
+        return self._frame_ids[frame]
 
     def foot(self, frame: str) -> Foot:
         """The foot carried by a frame; a frame that is no foot gives a point foot of radius 0 at its origin."""
@@ -244,15 +244,15 @@ class Robot(Value):
         offset: m, of the points normal · x = offset of a plane: one number for all, or (n,); 0 by default.
         Raises `InputError` when the feet cannot get there. A fixed-base robot, or one without feet, gets its posture.
         """
-        from floatbase.robots.standing import stand
+        from floatbase.robots.standing import find_standing_state
 
-        return self._standing if height is normal is offset is None else stand(self, height, normal, offset)
+        return self._standing if height is normal is offset is None else find_standing_state(self, height, normal, offset)
 
     @cached_property
     def _standing(self) -> State:
-        from floatbase.robots.standing import stand
+        from floatbase.robots.standing import find_standing_state
 
-        return stand(self)
+        return find_standing_state(self)
 
     def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:
         """A random state around standing, the same for the same seed.
@@ -261,12 +261,12 @@ class Robot(Value):
         that deviation in rad/s and m/s. Joints stay within their limits.
         """
         if not isinstance(seed, np.random.Generator):
-            seed = whole("seed", seed, 0, 2**64, "or a numpy.random.Generator")
+            seed = as_integer("seed", seed, 0, 2**64, "or a numpy.random.Generator")
         rng, standing = np.random.default_rng(seed), self.standing()
-        spread = positive("spread", spread, allow_zero=True)
+        spread = as_positive("spread", spread, allow_zero=True)
         q = np.array(standing.integrate(rng.uniform(-spread, spread, self.nv)))
-        _, at, low, high = joint_limits(self.model)
-        q[at] = np.clip(q[at], low, high)
+        _, index, lower, upper = joint_limits(self.model)
+        q[index] = np.clip(q[index], lower, upper)
         return standing.replace(q, spread * rng.standard_normal(self.nv))
 
     def __repr__(self) -> str:
@@ -274,7 +274,7 @@ class Robot(Value):
         return f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, {self.mass:.1f} kg)"
 
 
-def has_free_base(model: pin.Model) -> bool:
+def has_floating_base(model: pin.Model) -> bool:
     """Whether a model's base is free to move."""
     return model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
 
@@ -285,71 +285,71 @@ def joint_limits(model: pin.Model) -> tuple[Array, Array, Array, Array]:
     Equal limits, such as the 0 and 0 of a URDF that does not say, are none, as for MuJoCo.
     """
     joints = np.array([i for i in range(1, model.njoints) if model.nqs[i] == 1], dtype=int)
-    at = np.array(model.idx_qs)[joints]
-    low, high = model.lowerPositionLimit[at], model.upperPositionLimit[at]
-    limited = low < high
-    return joints[limited], at[limited], low[limited], high[limited]
+    index = np.array(model.idx_qs)[joints]
+    lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
+    limited = lower < upper
+    return joints[limited], index[limited], lower[limited], upper[limited]
 
 
-def within_limits(model: pin.Model, q: Array) -> Array:
+def clamp_to_limits(model: pin.Model, q: Array) -> Array:
     """A configuration with its joints within their limits: by whole turns where that will do, else at the nearest limit."""
-    joints, at, low, high = joint_limits(model)
-    inside, nearest = np.array(q), np.clip(q[at], low, high)
-    missed = q[at] - nearest
-    turned = q[at] - 2.0 * np.pi * np.sign(missed) * np.ceil(np.abs(missed) / (2.0 * np.pi))  # as few turns as will do
-    turns = np.array([model.joints[joint].shortname().startswith("JointModelR") for joint in joints.tolist()], dtype=bool)
-    will_do = turns & (np.abs(missed) > _LIMIT_ERROR) & (low <= turned) & (turned <= high)
-    inside[at] = np.where(will_do, turned, nearest)
-    return read_only(inside)
+    joints, index, lower, upper = joint_limits(model)
+    clamped, nearest = np.array(q), np.clip(q[index], lower, upper)
+    excess = q[index] - nearest
+    unwrapped = q[index] - 2.0 * np.pi * np.sign(excess) * np.ceil(np.abs(excess) / (2.0 * np.pi))  # as few turns as will do
+    is_revolute = np.array([model.joints[joint].shortname().startswith("JointModelR") for joint in joints.tolist()], dtype=bool)
+    use_unwrapped = is_revolute & (np.abs(excess) > _LIMIT_TOLERANCE) & (lower <= unwrapped) & (unwrapped <= upper)
+    clamped[index] = np.where(use_unwrapped, unwrapped, nearest)
+    return read_only(clamped)
 
 
-def checked_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
+def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
     """A configuration to stand in, shape (nq,), checked: its quaternions, and that joint limits allow it."""
-    parts = f"7 for the base, then {model.nq - 7} of the joints" if has_free_base(model) else "those of the joints"
-    q = checked("posture", posture, (model.nq,), parts)
-    check_unit_lengths(model, "posture", q)
-    joints, at, low, high = joint_limits(model)
-    for joint, x, least, most in zip(joints, q[at], low, high, strict=True):
-        if not least - _LIMIT_ERROR <= x <= most + _LIMIT_ERROR:
-            limits = f"its limits are {least:.6g} and {most:.6g}"
+    layout = f"7 for the base, then {model.nq - 7} of the joints" if has_floating_base(model) else "those of the joints"
+    q = as_array("posture", posture, (model.nq,), layout)
+    check_unit_norms(model, "posture", q)
+    joints, index, lower, upper = joint_limits(model)
+    for joint, x, minimum, maximum in zip(joints, q[index], lower, upper, strict=True):
+        if not minimum - _LIMIT_TOLERANCE <= x <= maximum + _LIMIT_TOLERANCE:
+            limits = f"its limits are {minimum:.6g} and {maximum:.6g}"
             raise InputError(f"the posture of {name} has {model.names[int(joint)]} at {x:.6g}; {limits} (rad, or m).")
     return q
 
 
-def check_unit_lengths(model: pin.Model, name: str, q: Array, hint: str = "", first: int = 1) -> None:
+def check_unit_norms(model: pin.Model, name: str, q: Array, hint: str = "", first_joint: int = 1) -> None:
     """Check that quaternions, and (cos, sin) of joints without limits, have length 1 in a configuration, else `InputError`.
 
     model: the Pinocchio model.
     name: of the configuration, for the message.
     q: shape (nq,), the configuration.
     hint: put behind the message's last word.
-    first: the first of Pinocchio's joints that counts: 2 leaves the base of a floating robot out.
+    first_joint: the first of Pinocchio's joints that counts: 2 leaves the base of a floating robot out.
     """
-    if pin.isNormalized(model, q, UNIT_LENGTH_TOLERANCE):
+    if pin.isNormalized(model, q, UNIT_NORM_TOLERANCE):
         return  # it is faster than this loop
-    for i in range(first, model.njoints):
-        positions = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # they come first
-        part = slice(model.idx_qs[i] + positions, model.idx_qs[i] + model.nqs[i])
+    for i in range(first_joint, model.njoints):
+        translations = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(model.joints[i].shortname(), 0)  # they come first
+        part = slice(model.idx_qs[i] + translations, model.idx_qs[i] + model.nqs[i])
         length = float(np.linalg.norm(q[part]))
-        if model.nqs[i] != model.nvs[i] and abs(length - 1.0) > UNIT_LENGTH_TOLERANCE:
-            what, numbers = f"{name}[{part.start}:{part.stop}]", "cosine and sine" if len(q[part]) == 2 else "the quaternion"
-            floating = i == 1 and positions == 3
-            what = f"the base quaternion {what} (x y z w)" if floating else f"{what}, {numbers} of {model.names[i]!r},"
-            raise InputError(f"{what} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
+        if model.nqs[i] != model.nvs[i] and abs(length - 1.0) > UNIT_NORM_TOLERANCE:
+            entries, numbers = f"{name}[{part.start}:{part.stop}]", "cosine and sine" if len(q[part]) == 2 else "the quaternion"
+            floating = i == 1 and translations == 3
+            entries = f"the base quaternion {entries} (x y z w)" if floating else f"{entries}, {numbers} of {model.names[i]!r},"
+            raise InputError(f"{entries} has length {length:.8g}; it must be 1. Divide it by its length{hint}.")
 
 
-def checked_corners(frame: str, requested: npt.ArrayLike) -> Array:
+def as_corners(frame: str, value: npt.ArrayLike) -> Array:
     """The corners of a foot, (n, 3), m, in its frame, checked: on one line they hold no six motions. Raises `InputError`."""
-    corners = checked(f"corners of {frame}", requested, (None, 3), "m")
+    corners = as_array(f"corners of {frame}", value, (None, 3), "m")
     if len(corners) < 3 or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=_AREA_TOLERANCE) < 2:
         raise InputError(f"the corners of {frame} span no area; a flat foot needs at least 3 that are not on one line.")
     return corners
 
 
-def torque_limits_of(d: int, requested: npt.ArrayLike) -> Array:
+def as_torque_limits(d: int, value: npt.ArrayLike) -> Array:
     """Requested torque limits, one number or (d,), N·m, +inf for none, as shape (d,). Raises `InputError`."""
-    limits = plain_numbers(requested)
+    limits = numeric_copy(value)
     if limits is None or limits.shape not in ((), (d,)) or not np.all(limits > 0):  # NaN is not > 0 either
-        got = said(requested) if limits is None else f"shape {limits.shape}: {said(requested)}"
+        got = short_repr(value) if limits is None else f"shape {limits.shape}: {short_repr(value)}"
         raise InputError(f"torque_limits must be one number > 0 or {d} of them (N·m); got {got}.")
     return read_only(np.broadcast_to(limits, (d,)))

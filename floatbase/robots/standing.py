@@ -8,58 +8,58 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, checked, half_spaces
+from floatbase._validation import Array, as_array, as_half_spaces
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
 from floatbase.robots.robot import Foot, Robot, joint_limits
 from floatbase.robots.state import State
 
 _TOLERANCE = 1e-11  # m and rad: a hundred roundings of a robot of 1 m
-_STEPS = 50  # the catalogue's robots take five
-_LEVEL = (0.0, 0.0, 1.0)  # normal of the ground
+_MAX_STEPS = 50  # the catalogue's robots take five
+_UP = (0.0, 0.0, 1.0)  # normal of the ground
 _LARGEST_STEP = 0.2  # m and rad: Gauss-Newton's Jacobian is good that far
 
 _Planes: TypeAlias = tuple[Array, Array]  # normals, shape (n, 3), and offsets, shape (n,), m: normal · x = offset
 
 
-def stand(
+def find_standing_state(
     robot: Robot, height: float | None = None, normal: npt.ArrayLike | None = None, offset: npt.ArrayLike | None = None
 ) -> State:
     """The standing state nearest to `robot.posture`, at rest; see `Robot.standing`."""
     posture = State(robot, robot.posture)
-    upwards, through = _LEVEL if normal is None else normal, 0.0 if offset is None else offset
-    planes = half_spaces("the ground", upwards, through)
-    height = None if height is None else float(checked("height", height, (), "m"))
+    normals, offsets = _UP if normal is None else normal, 0.0 if offset is None else offset
+    planes = as_half_spaces("the ground", normals, offsets)
+    height = None if height is None else float(as_array("height", height, (), "m"))
     if not robot.is_floating or not robot.feet:
         return posture
     q = posture.q.copy()
     q[2] = height if height is not None else q[2] - min(_clearance(posture, foot, planes)[0] for foot in robot.feet)
-    state, (joints, at, low, high) = State(robot, q), joint_limits(robot.model)
-    in_v = np.array(robot.model.idx_vs)[joints]
-    for _ in range(_STEPS):
-        error, J = _gap(state, posture, height, planes)
-        remains = np.max(np.abs(error))
-        if remains < _TOLERANCE:
+    state, (joints, index, lower, upper) = State(robot, q), joint_limits(robot.model)
+    v_index = np.array(robot.model.idx_vs)[joints]
+    for _ in range(_MAX_STEPS):
+        error, J = _standing_residual(state, posture, height, planes)
+        remaining = np.max(np.abs(error))
+        if remaining < _TOLERANCE:
             return state
-        held = np.zeros(len(joints), dtype=bool)  # joints at a limit that the step would take beyond it
+        at_limit = np.zeros(len(joints), dtype=bool)  # joints at a limit that the step would take beyond it
         while True:
             step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
-            more = ~held & ((state.q[at] <= low) & (step[in_v] < 0.0) | (state.q[at] >= high) & (step[in_v] > 0.0))
-            if not np.any(more):
+            newly_at_limit = ~at_limit & ((state.q[index] <= lower) & (step[v_index] < 0.0) | (state.q[index] >= upper) & (step[v_index] > 0.0))
+            if not np.any(newly_at_limit):
                 break
-            held |= more
-            J[:, in_v[held]] = 0.0
+            at_limit |= newly_at_limit
+            J[:, v_index[at_limit]] = 0.0
         q = pin.integrate(robot.model, state.q, np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
-        q[at] = np.clip(q[at], low, high)
+        q[index] = np.clip(q[index], lower, upper)
         state = State(robot, q)
-    where = "" if height is None else f" with its base {height:g} m above it"
-    ends = [f"{robot.model.names[joint]} at {x:.3g}" for joint, x in zip(joints[held].tolist(), state.q[at[held]], strict=True)]
-    reason = f", with joints at their limits: {', '.join(ends)}" if ends else ""
+    height_text = "" if height is None else f" with its base {height:g} m above it"
+    limited = [f"{robot.model.names[joint]} at {x:.3g}" for joint, x in zip(joints[at_limit].tolist(), state.q[index[at_limit]], strict=True)]
+    reason = f", with joints at their limits: {', '.join(limited)}" if limited else ""
     advice = "Ask for another height, or load it with another posture."
-    raise InputError(f"{robot.name} cannot put all its feet on the ground{where}: {remains:.2g} m remain{reason}. {advice}")
+    raise InputError(f"{robot.name} cannot put all its feet on the ground{height_text}: {remaining:.2g} m remain{reason}. {advice}")
 
 
-def _gap(state: State, posture: State, height: float | None, planes: _Planes) -> tuple[Array, Array]:
+def _standing_residual(state: State, posture: State, height: float | None, planes: _Planes) -> tuple[Array, Array]:
     """What must be zero when the robot stands, and its Jacobian.
 
     Soles on the ground and along it; the base where the posture has it, but for its height, which follows the feet or is given.

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, cached_property, checked, of_kind, read_only, sealed
-from floatbase.robots.robot import Robot, check_unit_lengths
+from floatbase._validation import Array, Value, cached_property, as_array, as_instance, read_only, frozen
+from floatbase.robots.robot import Robot, check_unit_norms
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -34,26 +34,26 @@ class State(Value):
     v: Array
 
     def __init__(self, robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike | None = None):
-        object.__setattr__(self, "robot", of_kind("robot", robot, Robot))
-        object.__setattr__(self, "q", checked("q", q, (robot.nq,)))
-        object.__setattr__(self, "v", checked("v", np.zeros(robot.nv) if v is None else v, (robot.nv,)))
-        check_unit_lengths(robot.model, "q", self.q, ", or use robot.standing()")
+        object.__setattr__(self, "robot", as_instance("robot", robot, Robot))
+        object.__setattr__(self, "q", as_array("q", q, (robot.nq,)))
+        object.__setattr__(self, "v", as_array("v", np.zeros(robot.nv) if v is None else v, (robot.nv,)))
+        check_unit_norms(robot.model, "q", self.q, ", or use robot.standing()")
 
-    def _memory(self) -> pin.Data:
+    def _take_data(self) -> pin.Data:
         """Memory for Pinocchio's results: of a state that is gone, where there is some."""
         try:
-            return self.robot._spare.pop()
+            return self.robot._data_pool.pop()
         except IndexError:
             return self.robot.model.createData()
 
     def __del__(self) -> None:
         if "_data" in self.__dict__:  # nothing refers to this state any more, and what it handed out are copies
-            self.robot._spare.append(self._data)
+            self.robot._data_pool.append(self._data)
 
     @cached_property
     def _data(self) -> pin.Data:
         """Pinocchio's results at (q, v), never handed out: kinematics, then what is asked for, which changes none of them."""
-        data = self._memory()
+        data = self._take_data()
         # accelerations at q̈ = 0 are the drifts J̇ v
         pin.forwardKinematics(self.robot.model, data, self.q, self.v, np.zeros(self.robot.nv))
         return data
@@ -61,19 +61,19 @@ class State(Value):
     @cached_property
     def M(self) -> Array:
         """The generalised inertia matrix M(q) of (1), shape (nv, nv), symmetric positive definite, rotor inertia included."""
-        return sealed(pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD))
+        return frozen(pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD))
 
     @cached_property
     def h(self) -> Array:
         """The generalised bias force h(q, q̇) of (1), shape (nv,): Coriolis, centrifugal and gravity."""
-        return sealed(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
+        return frozen(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
 
     @cached_property
     def _centre_of_mass(self) -> tuple[Array, Array, Array]:
         """Its position, velocity and drift."""
         data = self._data
         com = pin.centerOfMass(self.robot.model, data, pin.KinematicLevel.ACCELERATION, False)
-        return sealed(com), sealed(data.vcom[0].copy()), sealed(data.acom[0].copy())
+        return frozen(com), frozen(data.vcom[0].copy()), frozen(data.acom[0].copy())
 
     @property
     def com(self) -> Array:
@@ -88,7 +88,7 @@ class State(Value):
     @cached_property
     def com_jacobian(self) -> Array:
         """Jacobian of the centre of mass, shape (3, nv): com_velocity = com_jacobian v."""
-        J = sealed(pin.jacobianCenterOfMass(self.robot.model, self._data, False))
+        J = frozen(pin.jacobianCenterOfMass(self.robot.model, self._data, False))
         return J.reshape(3, self.robot.nv)  # of one joint Pinocchio gives (3,)
 
     @property
@@ -113,7 +113,7 @@ class State(Value):
 
     def point(self, frame: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """World position, shape (3,), m, of a point at `offset` (m, in the frame)."""
-        return read_only(self.frame_pose(frame).act(checked("offset", offset, (3,), "m")))
+        return read_only(self.frame_pose(frame).act(as_array("offset", offset, (3,), "m")))
 
     def frame_jacobian(self, frame: str) -> Array:
         """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows, world-aligned."""
@@ -134,11 +134,11 @@ class State(Value):
 
         dv: shape (nv,), velocity times time: base part, m and rad, in the base frame, then joints.
         """
-        return read_only(pin.integrate(self.robot.model, self.q, checked("dv", dv, (self.robot.nv,))))
+        return read_only(pin.integrate(self.robot.model, self.q, as_array("dv", dv, (self.robot.nv,))))
 
     def difference(self, q: npt.ArrayLike) -> Array:
         """The dv, shape (nv,), that leads from configuration q to this state's: `State(robot, q).integrate(dv)` = self.q."""
-        return read_only(pin.difference(self.robot.model, checked("q", q, (self.robot.nq,)), self.q))
+        return read_only(pin.difference(self.robot.model, as_array("q", q, (self.robot.nq,)), self.q))
 
     def replace(self, q: npt.ArrayLike | None = None, v: npt.ArrayLike | None = None) -> State:
         """A new state with q or v replaced."""

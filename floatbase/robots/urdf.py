@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.errors import InputError
-from floatbase.robots.robot import has_free_base
+from floatbase.robots.robot import has_floating_base
 
-_ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_LIMITED = ("revolute", "prismatic")  # types of joints that need a <limit>
+_INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_LIMITED_JOINT_TYPES = ("revolute", "prismatic")  # types of joints that need a <limit>
 _ROUNDING = 1e-12  # kg m²: programs that write URDFs put -5e-20 for an inertia of 0, and no part of a robot has so little
 
 
@@ -28,7 +28,7 @@ def read_urdf(path: Path) -> str:
         raise InputError(f"there is no file {path.absolute()} to read ({reason}); give the path of a URDF file.") from None
 
 
-def model_of(name: str, urdf: str, floating: bool) -> pin.Model:
+def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
     """Pinocchio's model of a URDF text, with a root joint where the base is free to move.
 
     Raises `InputError` for a text that is no URDF, or no XML: Pinocchio forgives more there than what reads it later.
@@ -37,10 +37,10 @@ def model_of(name: str, urdf: str, floating: bool) -> pin.Model:
         ElementTree.fromstring(urdf)
         return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
     except (ElementTree.ParseError, RuntimeError, ValueError) as error:
-        raise InputError(f"{name} cannot be read as a URDF: {_fault(urdf, error)}") from None
+        raise InputError(f"{name} cannot be read as a URDF: {_parse_error(urdf, error)}") from None
 
 
-def _fault(urdf: str, error: Exception) -> str:
+def _parse_error(urdf: str, error: Exception) -> str:
     """Why a text is no URDF; Pinocchio writes the reason to the terminal, not into its error."""
     if "xacro:" in urdf:
         return f"{str(error).rstrip('.')}. It is written in xacro: run xacro first, as in xacro robot.xacro > robot.urdf."
@@ -50,11 +50,11 @@ def _fault(urdf: str, error: Exception) -> str:
     if root.tag != "robot":
         return f"its outermost element is <{root.tag}>; that of a URDF is <robot>."
     for kind in ("link", "joint"):
-        for called, times in Counter(element.get("name") for element in root.findall(kind)).items():
-            if times > 1:
-                return f"{times} {kind}s are called {called!r}; give each a name of its own."
+        for duplicate, count in Counter(element.get("name") for element in root.findall(kind)).items():
+            if count > 1:
+                return f"{count} {kind}s are called {duplicate!r}; give each a name of its own."
     for joint in root.findall("joint"):
-        if joint.get("type") in _LIMITED and joint.find("limit") is None:
+        if joint.get("type") in _LIMITED_JOINT_TYPES and joint.find("limit") is None:
             return f"{joint.get('type')} joint {joint.get('name')!r} has no <limit>, with lower, upper, effort and velocity."
     return str(error)
 
@@ -65,38 +65,38 @@ def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
     for link in root.findall("link"):
         for inertial in link.findall("inertial"):
             mass, tensor = inertial.find("mass"), inertial.find("inertia")
-            given = {"mass": mass.get("value") if mass is not None else None}
-            given |= {entry: tensor.get(entry) if tensor is not None else None for entry in _ENTRIES}
-            wrong = [f"{key} {text}" for key, text in given.items() if not math.isfinite(_number(text))]
-            wrong += [f"mass {given['mass']}"] if _number(given["mass"]) < 0.0 else []
-            if wrong:
+            values = {"mass": mass.get("value") if mass is not None else None}
+            values |= {entry: tensor.get(entry) if tensor is not None else None for entry in _INERTIA_ATTRIBUTES}
+            invalid = [f"{key} {text}" for key, text in values.items() if not math.isfinite(_as_float(text))]
+            invalid += [f"mass {values['mass']}"] if _as_float(values["mass"]) < 0.0 else []
+            if invalid:
                 where = f"<inertial> of link {link.get('name')!r} of {name}"
-                raise InputError(f"{where} has {wrong[0]}; it needs a mass ≥ 0, kg, and six numbers ixx … izz, kg m².")
-    moving = [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
-    names = [joint.get("name", "") for joint in moving]
-    for joint in moving:
-        called, limit, axis = joint.get("name"), joint.find("limit"), joint.find("axis")
-        low, high = (_number(limit.get(end, "0")) if limit is not None else 0.0 for end in ("lower", "upper"))
-        if joint.get("type") in _LIMITED and low > high:
+                raise InputError(f"{where} has {invalid[0]}; it needs a mass ≥ 0, kg, and six numbers ixx … izz, kg m².")
+    movable = [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
+    names = [joint.get("name", "") for joint in movable]
+    for joint in movable:
+        label, limit, axis = joint.get("name"), joint.find("limit"), joint.find("axis")
+        lower, upper = (_as_float(limit.get(end, "0")) if limit is not None else 0.0 for end in ("lower", "upper"))
+        if joint.get("type") in _LIMITED_JOINT_TYPES and lower > upper:
             raise InputError(
-                f"joint {called!r} of {name} has the lower limit {low:g} above the upper limit {high:g} (rad, or m; a limit "
+                f"joint {label!r} of {name} has the lower limit {lower:g} above the upper limit {upper:g} (rad, or m; a limit "
                 "that is not given is 0). Swap lower and upper in <limit>, or make it continuous if it turns without limit."
             )
-        if axis is not None and not any(map(_number, axis.get("xyz", "1").split())):
-            raise InputError(f'joint {called!r} of {name} has an <axis> of zeros; give its direction, as in xyz="0 0 1".')
+        if axis is not None and not any(map(_as_float, axis.get("xyz", "1").split())):
+            raise InputError(f'joint {label!r} of {name} has an <axis> of zeros; give its direction, as in xyz="0 0 1".')
     for i, inertia in list(enumerate(model.inertias))[1:]:  # with all that is welded: a sum may mend a negative part
-        least = float(inertia.inertia.diagonal().min())
-        if least < -_ROUNDING:
+        smallest = float(inertia.inertia.diagonal().min())
+        if smallest < -_ROUNDING:
             where = "the base" if model.names[i] == "root_joint" else f"the link that joint {model.names[i]!r} moves"
             raise InputError(
-                f"{where} of {name} has a negative moment of inertia, {least:.4g} kg m², with all that is welded to it; "
+                f"{where} of {name} has a negative moment of inertia, {smallest:.4g} kg m², with all that is welded to it; "
                 "ixx, iyy and izz of <inertia> must be above zero there."
             )
-    own = next((frame for frame in model.frames if frame.name == "base"), None)
-    if own is not None and own.parentJoint != int(has_free_base(model)):
+    base_frame = next((frame for frame in model.frames if frame.name == "base"), None)
+    if base_frame is not None and base_frame.parentJoint != int(has_floating_base(model)):
         raise InputError(
-            f"a {'link' if own.type == pin.BODY else 'joint'} of {name} that moves is called base, the word for the link "
-            "that all others hang from, on every robot; rename it."
+            f"a {'link' if base_frame.type == pin.BODY else 'joint'} of {name} that moves is called base, the word for the "
+            "link that all others hang from, on every robot; rename it."
         )
     if list(model.names).count("root_joint") > 1:
         raise InputError(f"a joint of {name} is called root_joint, as Pinocchio calls that of a free base; rename it.")
@@ -106,13 +106,13 @@ def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
                 f"joint {model.names[moved.id]!r} of {name} moves in {moved.nv} ways; a motor drives one. Make it "
                 "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
             )
-    masters = {joint.get("name", ""): mimic.get("joint", "") for joint in moving for mimic in joint.findall("mimic")}
+    masters = {joint.get("name", ""): mimic.get("joint", "") for joint in movable for mimic in joint.findall("mimic")}
     if masters:
         pairs = ", ".join([f"{joint} mimics {master}" for joint, master in masters.items()][:2] + ["…"] * (len(masters) > 2))
-        held = [joint for joint in names if joint in masters or joint in masters.values()]
+        coupled = [joint for joint in names if joint in masters or joint in masters.values()]
         raise InputError(
             f"joints of {name} are coupled: {pairs}. Such couplings are not part of (1)-(7), where every joint has a motor of "
-            f"its own. Hold these joints still, locked={held}, or take <mimic> out of the URDF where they do have motors."
+            f"its own. Hold these joints still, locked={coupled}, or take <mimic> out of the URDF where they do have motors."
         )
 
 
@@ -133,7 +133,7 @@ def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def without_bolts(urdf: str) -> str:
+def without_world_link(urdf: str) -> str:
     """The URDF without the link "world", which some have below the base, and without the joints that hang from it."""
     root = ElementTree.fromstring(urdf)
     for element in [*root.findall("link[@name='world']"), *root.findall("joint/parent[@link='world']/..")]:
@@ -141,7 +141,7 @@ def without_bolts(urdf: str) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _number(text: str | None) -> float:
+def _as_float(text: str | None) -> float:
     """A number of a URDF, NaN where there is none."""
     try:
         return float(text or "nan")

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, Value, checked, cross, flag, of_kind, positive, texts
+from floatbase._validation import Array, Value, as_array, cross, as_bool, as_instance, as_positive, as_strings
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.build import Ground
@@ -37,13 +37,13 @@ class World(Value):
     magnets: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", positive("mass in the world, as a multiple of the robot's,", self.mass))
-        object.__setattr__(self, "untouched", texts("untouched", self.untouched))
-        object.__setattr__(self, "magnets", positive("magnets of the ground", self.magnets, "N", allow_zero=True))
+        object.__setattr__(self, "mass", as_positive("mass in the world, as a multiple of the robot's,", self.mass))
+        object.__setattr__(self, "untouched", as_strings("untouched", self.untouched))
+        object.__setattr__(self, "magnets", as_positive("magnets of the ground", self.magnets, "N", allow_zero=True))
         if self.friction is not None:
-            object.__setattr__(self, "friction", positive("friction coefficient of the world", self.friction))
+            object.__setattr__(self, "friction", as_positive("friction coefficient of the world", self.friction))
         for name in ("gravity", "velocity_forces"):
-            flag(name, getattr(self, name))
+            as_bool(name, getattr(self, name))
 
 
 class AlteredSimulation(Simulation):
@@ -53,7 +53,7 @@ class AlteredSimulation(Simulation):
     """
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3, world: World | None = None):
-        of_kind("robot", robot, Robot)
+        as_instance("robot", robot, Robot)
         self._world = World()
         self._base_wrench: Array = np.zeros(6)
         super().__init__(robot, ground, timestep)
@@ -70,7 +70,7 @@ class AlteredSimulation(Simulation):
     @world.setter
     def world(self, world: World) -> None:
         """Raises `UnknownNameError` for an untouched point that does not exist."""
-        for name in of_kind("world", world, World).untouched:
+        for name in as_instance("world", world, World).untouched:
             if name not in self.point_names:
                 raise unknown_name("contact point", name, self.point_names)
         model, self._world = self.model, world
@@ -91,7 +91,7 @@ class AlteredSimulation(Simulation):
     def base_wrench(self, wrench: npt.ArrayLike) -> None:
         if not self.robot.is_floating:
             raise InputError(f"{self.robot.name} is bolted to the ground; only a floating base has a wrench.")
-        self._base_wrench = checked("base_wrench", wrench, (6,), "N and N·m")
+        self._base_wrench = as_array("base_wrench", wrench, (6,), "N and N·m")
 
     def reset(self, state: State | None = None) -> None:
         """As `Simulation.reset`; the base's wrench is zero again."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, half_spaces, positive, read_only
+from floatbase._validation import Array, Value, as_half_spaces, as_positive, read_only
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
@@ -51,9 +51,9 @@ class Ground(Value):
     offset: float | Array = 0.0
 
     def __post_init__(self) -> None:
-        normals, offsets = half_spaces("the ground", self.normal, self.offset)
+        normals, offsets = as_half_spaces("the ground", self.normal, self.offset)
         one = np.ndim(self.normal) == 1
-        object.__setattr__(self, "mu", positive("friction coefficient mu of the ground", self.mu))
+        object.__setattr__(self, "mu", as_positive("friction coefficient mu of the ground", self.mu))
         object.__setattr__(self, "normal", normals[0] if one else normals)
         object.__setattr__(self, "offset", float(offsets[0]) if one else offsets)
 

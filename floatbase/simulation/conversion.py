@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.robots import Robot
 
 

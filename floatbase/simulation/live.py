@@ -10,7 +10,7 @@ from types import EllipsisType
 
 import numpy.typing as npt
 
-from floatbase._arrays import function, of_kind, positive, text
+from floatbase._validation import as_callable, as_instance, as_positive, as_string
 from floatbase.simulation.physics import Push, Simulation, acting
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
@@ -26,7 +26,7 @@ SEEN = 0.4  # s for which a slice still lists a push that is over: the eye misse
 
 def advice(status: str) -> str:
     """A status of `Live` as a line for who watches: what stopped the run, in a sentence, and what to do about it."""
-    if text("status", status) in GOES_ON:
+    if as_string("status", status) in GOES_ON:
         return status if status != IDLE else f"{IDLE}: press run"
     reason = status.split("\n")[0].split(". ")[0].rstrip(".")
     return f"{reason}: press reset, or push again"
@@ -57,17 +57,17 @@ class Live:
         after_reset: Callable[[], None] | None = None,
         idle: float = 120.0,
     ):
-        self.sim = of_kind("sim", sim, Simulation)
-        function("the controller", controller, "controller(q, v, t)")
-        function("show", show, "show(record)")
+        self.sim = as_instance("sim", sim, Simulation)
+        as_callable("the controller", controller, "controller(q, v, t)")
+        as_callable("show", show, "show(record)")
         check_actuators(actuators)
         if after_reset is not None:
-            function("after_reset", after_reset, "after_reset()")
+            as_callable("after_reset", after_reset, "after_reset()")
         self.error: Exception | None = None
         self._controller, self._show, self._actuators, self._after_reset = controller, show, actuators, after_reset
-        self._period = positive("control_period", control_period, "s")
+        self._period = as_positive("control_period", control_period, "s")
         self._duration = _slice_of(self._period)  # s
-        self._idle = positive("idle", idle, "s")
+        self._idle = as_positive("idle", idle, "s")
         self._speed = 1.0
         self._lock = threading.Lock()  # over all that follows
         self._pushes: tuple[Push, ...] = ()  # of the last slice
@@ -99,7 +99,7 @@ class Live:
 
     def on_status(self, listener: Callable[[str], None] | None) -> None:
         """Call `listener(status)` whenever the status changes, in the thread that changed it."""
-        self._listener = None if listener is None else function("listener", listener, "listener(status)")
+        self._listener = None if listener is None else as_callable("listener", listener, "listener(status)")
 
     def start(self) -> None:
         """Run, or go on after a pause. A fallen robot is put back on its feet."""
@@ -133,15 +133,15 @@ class Live:
         controller, sim, actuators: as for `rollout`; actuators stay where none are given, and None takes them away.
         control_period: s.
         """  # fmt: skip
-        function("the controller", controller, "controller(q, v, t)")
+        as_callable("the controller", controller, "controller(q, v, t)")
         if actuators is not ...:
             check_actuators(actuators)
-        period = self._period if control_period is None else positive("control_period", control_period, "s")
+        period = self._period if control_period is None else as_positive("control_period", control_period, "s")
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
             if sim is not None and sim is not self.sim and self._status != "running":
                 self._stop.set()  # it is not the other simulation's robot that falls
-            self.sim = self.sim if sim is None else of_kind("sim", sim, Simulation)
+            self.sim = self.sim if sim is None else as_instance("sim", sim, Simulation)
             self._actuators = self._actuators if actuators is ... else actuators
             self._period, self._duration = period, _slice_of(period)
 
@@ -150,14 +150,14 @@ class Live:
 
         An exception of it ends the run, as one of the controller does.
         """
-        function("call", call, "call()")
+        as_callable("call", call, "call()")
         with self._lock:
             self._last_call = time.monotonic()
             self._calls.append(call)
 
     def slow_motion(self, speed: float) -> None:
         """Simulated time per real time, 1 by default."""
-        speed = positive("speed", speed)
+        speed = as_positive("speed", speed)
         with self._lock:
             self._last_call, self._speed = time.monotonic(), speed
 

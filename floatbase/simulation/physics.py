@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array, Fixed, Value, checked, cross, flag, number, of_kind, positive, said, text
+from floatbase._validation import Array, FixedAttributes, Value, as_array, cross, as_bool, as_number, as_instance, as_positive, short_repr, as_string
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -48,14 +48,14 @@ class Push(Value):
     frame: str = "base"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "force", checked("force of the push", self.force, (3,), "N"))
-        object.__setattr__(self, "start", positive("start of the push", self.start, "s", allow_zero=True))
-        object.__setattr__(self, "duration", positive("duration of the push", self.duration, "s"))
-        text("frame of the push", self.frame)
+        object.__setattr__(self, "force", as_array("force of the push", self.force, (3,), "N"))
+        object.__setattr__(self, "start", as_positive("start of the push", self.start, "s", allow_zero=True))
+        object.__setattr__(self, "duration", as_positive("duration of the push", self.duration, "s"))
+        as_string("frame of the push", self.frame)
 
     def acts_at(self, t: float) -> bool:
         """Whether the push acts at t, s."""
-        t = number("t", t, "s")
+        t = as_number("t", t, "s")
         return self.start - _CLOCK_ERROR <= t < self.start + self.duration - _CLOCK_ERROR
 
     def _share(self, t: float, timestep: float) -> float:
@@ -67,8 +67,8 @@ class Push(Value):
 def pushes_of(pushes: Sequence[Push]) -> tuple[Push, ...]:
     """A list of pushes as a tuple, checked."""
     if not isinstance(pushes, Sequence):
-        raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {said(pushes)}.")
-    return tuple(of_kind("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])") for push in pushes)
+        raise InputError(f"pushes must be a list, as in pushes=[fb.Push(…)], not {short_repr(pushes)}.")
+    return tuple(as_instance("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])") for push in pushes)
 
 
 def acting(pushes: tuple[Push, ...], begin: float, end: float) -> tuple[Push, ...]:
@@ -76,7 +76,7 @@ def acting(pushes: tuple[Push, ...], begin: float, end: float) -> tuple[Push, ..
     return tuple(p for p in pushes if p.start < end - _CLOCK_ERROR and begin < p.start + p.duration - _CLOCK_ERROR)
 
 
-class Simulation(Fixed):
+class Simulation(FixedAttributes):
     """A robot on the ground in MuJoCo, driven by joint torques.
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat foot one at each corner),
@@ -89,15 +89,15 @@ class Simulation(Fixed):
     While `links` touch the ground they are another pair, which has what was changed in the first.
     """
 
-    _instead: ClassVar[dict[str, str]] = {
+    _hints: ClassVar[dict[str, str]] = {
         **dict.fromkeys(("robot", "ground", "timestep", "feet", "model", "data", "point_names"), _ANOTHER),
         **dict.fromkeys(("state", "q", "v", "joints", "time"), _MOVE),
     }
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
-        self.robot = of_kind("robot", robot, Robot)
+        self.robot = as_instance("robot", robot, Robot)
         self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
-        self.timestep = positive("timestep", timestep, "s", most=_LONGEST_TIMESTEP)
+        self.timestep = as_positive("timestep", timestep, "s", maximum=_LONGEST_TIMESTEP)
         self.feet = Contacts.feet(robot)
         self.model = build_model(robot, self.ground, self.timestep)
         self.data = mujoco.MjData(self.model)
@@ -115,7 +115,7 @@ class Simulation(Fixed):
         self._base = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._watch()
         self.reset()
-        self._made = True
+        self._initialised = True
 
     def __copy__(self) -> Self:
         return copy.deepcopy(self)  # two robots with the same data would move each other
@@ -186,7 +186,7 @@ class Simulation(Fixed):
 
     @links.setter
     def links(self, touch: bool) -> None:
-        if flag("links", touch) == self._links:
+        if as_bool("links", touch) == self._links:
             return
         self._links = bool(touch)
         if self._lying is None:
@@ -210,7 +210,7 @@ class Simulation(Fixed):
 
         By default it is turned with a slope; on a ground of several planes its base is as the posture has it.
         """
-        state = self._standing() if state is None else of_kind("state", state, State)
+        state = self._standing() if state is None else as_instance("state", state, State)
         if state.robot != self.robot:
             raise InputError(f"this simulation holds {self.robot.name}; the state belongs to another robot.")
         self.links = False
@@ -224,7 +224,7 @@ class Simulation(Fixed):
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits, and present pushes."""
-        self.advance(checked("torques", tau, (self.robot.d,), "N·m"), pushes_of(pushes))
+        self.advance(as_array("torques", tau, (self.robot.d,), "N·m"), pushes_of(pushes))
 
     def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
         """`step` without its check, for loops that have checked the torques already: float64, finite, shape (d,)."""
@@ -294,7 +294,7 @@ class Simulation(Fixed):
 
     def pushed_body(self, push: Push) -> int:
         """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted to the ground."""
-        frame = self.robot.model.frames[self.robot.frame_id(of_kind("push", push, Push).frame)]
+        frame = self.robot.model.frames[self.robot.frame_id(as_instance("push", push, Push).frame)]
         joint = self.robot.model.names[frame.parentJoint]
         if joint in self.robot.joint_names:
             return int(self.model.joint(joint).bodyid[0])

@@ -12,7 +12,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
-from floatbase._arrays import Array, Value, cached_property, checked, misfit, positive, read_only
+from floatbase._validation import Array, Value, cached_property, as_array, signature_error, as_positive, read_only
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, SimulationError
 from floatbase.friction import WrenchSet, wrench_set
@@ -51,9 +51,9 @@ class PushRose(Value):
     contacts: Contacts
 
     def __post_init__(self) -> None:
-        directions = checked("directions", self.directions, (None,), "rad")
+        directions = as_array("directions", self.directions, (None,), "rad")
         object.__setattr__(self, "directions", directions)
-        object.__setattr__(self, "pushes", checked("pushes", self.pushes, directions.shape, "N"))
+        object.__setattr__(self, "pushes", as_array("pushes", self.pushes, directions.shape, "N"))
 
     @cached_property
     def unit_vectors(self) -> Array:
@@ -64,11 +64,11 @@ class PushRose(Value):
     def steady(self) -> Array:
         """(20)(21)(28) The largest push that the stance bears for ever without moving, shape (n,), N.
 
-        The contact forces must carry the weight and hold against the push, all inside their friction cones: `WrenchSet.reach`.
-        0 where the stance cannot carry the weight alone, even if a push would help it to.
+        The contact forces must carry the weight and hold against the push, all inside their friction cones:
+        `WrenchSet.max_scaling`. 0 where the stance cannot carry the weight alone, even if a push would help it to.
         """
         wrenches = wrench_set(self.state, self.contacts, facets=_FACETS)
-        lever = self.state.frame_pose(self.frame).translation - wrenches.about
+        lever = self.state.frame_pose(self.frame).translation - wrenches.reference_point
         carried = np.array([0.0, 0.0, wrenches.weight, 0.0, 0.0, 0.0])
         if not wrenches.contains(carried):
             return read_only(np.zeros(len(self.directions)))
@@ -139,12 +139,12 @@ def push_rose(
         raise InputError(f"{robot.name} is bolted to the ground and cannot fall: it has no push rose.")
     robot.frame_id(frame)
     settings = {
-        "start": positive("start", start, "s", allow_zero=True),
-        "duration": positive("duration", duration, "s"),
-        "watch": positive("watch", watch, "s"),
-        "step": positive("step", step, "N"),
+        "start": as_positive("start", start, "s", allow_zero=True),
+        "duration": as_positive("duration", duration, "s"),
+        "watch": as_positive("watch", watch, "s"),
+        "step": as_positive("step", step, "N"),
     }
-    first = ceil(positive("most", robot.weight if most is None else most, "N") / step)
+    first = ceil(as_positive("most", robot.weight if most is None else most, "N") / step)
 
     def largest_push(direction: float) -> float:  # the bar shows this name
         return _largest(direction, make, frame, first, **settings)
@@ -165,7 +165,7 @@ def _maker(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
     if not callable(controller):
         raise InputError(f"push_rose needs {needs} or makes a pair (simulation, controller), not {controller!r}.")
     if not hasattr(controller, "robot"):
-        if fault := misfit(controller):
+        if fault := signature_error(controller):
             raise InputError(f"push_rose needs {needs}; {fault}.")
         return partial(_pair, controller)
     try:
@@ -234,7 +234,7 @@ def _unit_vectors(directions: Any) -> Array:
 def _reach(wrenches: WrenchSet, push: Array, carried: Array) -> float:
     """The largest multiple of a push that can go with what is carried; 0 where rounding puts that beyond the set's border."""
     try:
-        return max(0.0, wrenches.reach(push, carried))
+        return max(0.0, wrenches.max_scaling(push, carried))
     except InfeasibleError:
         return 0.0
 

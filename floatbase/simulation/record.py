@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, Value, cached_property, flag, read_only, sealed, whole
+from floatbase._validation import Array, Value, cached_property, as_bool, read_only, frozen, as_integer
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -69,12 +69,12 @@ class Rollout(Value):
 
     def state(self, i: int) -> State:
         """The state at row i."""
-        i = whole("row", i, -len(self), len(self) - 1)
+        i = as_integer("row", i, -len(self), len(self) - 1)
         return State(self.robot, self.q[i], self.v[i])
 
     def contacts_at(self, i: int) -> Contacts:
         """The controller's stance at row i."""
-        i = whole("row", i, -len(self), len(self) - 1)
+        i = as_integer("row", i, -len(self), len(self) - 1)
         return self.stances[i] if self.stances else self.contacts
 
     def force(self, contact: str, kind: Literal["measured", "planned"] = "measured") -> Array:
@@ -110,7 +110,7 @@ class Rollout(Value):
         rolling: whether the way that a ball rolls counts, too: its lowest point moves with it, and nothing slides.
         """
         self._check_not_empty()
-        places = self.foot_positions if flag("rolling", rolling) else self.foot_positions - self.rolled()
+        places = self.foot_positions if as_bool("rolling", rolling) else self.foot_positions - self.rolled()
         farthest, first = np.zeros(places.shape[1]), 0
         for contact in self.contacts:
             points = slice(first, first := first + len(contact.point_names))
@@ -251,7 +251,7 @@ class Recorder:
 
     def _kept(self, rows: Array) -> Array:
         """The rows that are complete, without a copy."""
-        return sealed(rows)[: self._n]
+        return frozen(rows)[: self._n]
 
     def _mean(self, steps: Array) -> Array:
         """The means over the timesteps of each row, shape (n, …), of numbers at all timesteps."""

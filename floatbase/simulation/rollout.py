@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from tqdm.auto import tqdm
 
-from floatbase._arrays import LARGEST, Array, checked, flag, function, of_kind, plain_numbers, positive, read_only, said
+from floatbase._validation import MAX_MAGNITUDE, Array, as_array, as_bool, as_callable, as_instance, numeric_copy, as_positive, read_only, short_repr
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.physics import Push, Simulation, acting, pushes_of
@@ -93,7 +93,7 @@ def rollout(
         lie_down(sim, record, _stance(sim, controller), more, substeps, pushes)
         return record.finished(pushes, outcome, error, off_at)
 
-    for _ in tqdm(range(ticks), "rollout", unit=" ticks") if flag("progress", progress) else range(ticks):
+    for _ in tqdm(range(ticks), "rollout", unit=" ticks") if as_bool("progress", progress) else range(ticks):
         t, q, v = sim.time, sim.q, sim.v
         record.before(t, q, v)
         try:
@@ -117,7 +117,7 @@ def rollout(
 
 def _multiple(name: str, time: float, unit: str, period: float, least: int = 1) -> int:
     """How many periods, s, make up a time, s: `InputError` where that is no whole number, or less than `least`, 0 or 1."""
-    time = positive(name, time, "s", allow_zero=least == 0)
+    time = as_positive(name, time, "s", allow_zero=least == 0)
     count = round(time / period)
     if count < least or abs(count * period - time) > _PERIOD_ERROR * period + _TIME_ERROR * time:
         near = max(count, 1) * period
@@ -141,14 +141,14 @@ def _idle(pushes: tuple[Push, ...], begin: float, end: float) -> str:
 
 def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None) -> None:
     """Raise `InputError` for what is of another kind or of another robot."""
-    of_kind("sim", sim, Simulation)
+    as_instance("sim", sim, Simulation)
     timestep = sim.model.opt.timestep
     if timestep != sim.timestep:
         raise InputError(
             f"sim.model.opt.timestep is {timestep:g} s; the simulation was made with {sim.timestep:g} s, and control periods "
             f"count in that: make another, fb.Simulation(robot, timestep={timestep:g})."
         )
-    function("the controller", controller, "controller(q, v, t)")
+    as_callable("the controller", controller, "controller(q, v, t)")
     check_actuators(actuators)
     for name, part in (("controller is", controller), ("actuators are", actuators)):
         robot = getattr(part, "robot", sim.robot)
@@ -163,7 +163,7 @@ def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], ac
 def check_actuators(actuators: Actuators | None) -> None:
     """Raise `InputError` for what has no method `step`."""
     if actuators is not None and (isinstance(actuators, type) or not callable(getattr(actuators, "step", None))):
-        raise InputError(f"actuators must have a method step, as HydraulicActuators have; {said(actuators)} has none.")
+        raise InputError(f"actuators must have a method step, as HydraulicActuators have; {short_repr(actuators)} has none.")
 
 
 class _NotFinite(InputError):
@@ -207,15 +207,15 @@ def _desired(sim: Simulation, command: Any) -> Array:
 
 def _torques(sim: Simulation, name: str, tau: Any) -> Array:
     """Torques as an array, shape (d,). Raises `_NotFinite`, or `InputError` for another shape."""
-    if type(tau) is np.ndarray and tau.dtype.char == "d" and tau.shape == (sim.robot.d,) and np.vdot(tau, tau) <= LARGEST:
+    if type(tau) is np.ndarray and tau.dtype.char == "d" and tau.shape == (sim.robot.d,) and np.vdot(tau, tau) <= MAX_MAGNITUDE:
         return tau  # as most of them are
     try:
-        return checked(name, tau, (sim.robot.d,), "N·m")
+        return as_array(name, tau, (sim.robot.d,), "N·m")
     except InputError:
         entries = np.array(tau, dtype=object)
         if entries.shape != (sim.robot.d,):
             raise
-        i = [plain_numbers(x) is not None and abs(float(x)) <= LARGEST for x in entries].index(False)
+        i = [numeric_copy(x) is not None and abs(float(x)) <= MAX_MAGNITUDE for x in entries].index(False)
         raise _NotFinite(f"{name} hold {entries[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
 
 
@@ -225,9 +225,9 @@ def _planned(command: Any, stance: Contacts) -> Array | None:
     if forces is None:
         return None
     plain = type(forces) is np.ndarray and forces.dtype.char == "d"  # float64, as most of them are
-    planned = forces if plain else plain_numbers(forces)
+    planned = forces if plain else numeric_copy(forces)
     if planned is None:
-        raise InputError(f"the controller planned forces that are no numbers: {said(forces)}.")
+        raise InputError(f"the controller planned forces that are no numbers: {short_repr(forces)}.")
     if planned.shape != (stance.k,):
         raise InputError(
             f"the controller planned forces of shape {planned.shape}; its contacts ({', '.join(stance.names)}) have "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from floatbase._arrays import Array, read_only
+from floatbase._validation import Array, read_only
 from floatbase.dynamics import Contacts
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.record import Recorder, Rollout

@@ -10,7 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from floatbase._arrays import Array, read_only
+from floatbase._validation import Array, read_only
 from floatbase.robots import Robot
 
 _THINNEST = 1e-3  # m: flatter points have no hull for MuJoCo

@@ -20,7 +20,7 @@ import cloudpickle
 import loky
 from tqdm.auto import tqdm
 
-from floatbase._arrays import misfit
+from floatbase._validation import signature_error
 from floatbase.errors import InputError, SimulationError
 from floatbase.simulation.table import RESERVED, Row, Store, Table, plain
 
@@ -152,7 +152,7 @@ def _check(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
     made = () if setup is None else (None,)
     for names in dict.fromkeys(tuple(point) for point in points):
-        if fault := misfit(function, *made, **dict.fromkeys(names)):
+        if fault := signature_error(function, *made, **dict.fromkeys(names)):
             raise InputError(f"the grid gives {'what setup returns, then ' if made else ''}{', '.join(names)}; {fault}.")
 
 

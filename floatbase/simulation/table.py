@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Value, cached_property, said
+from floatbase._validation import Value, cached_property, short_repr
 from floatbase.errors import InputError, unknown_name
 
 RESERVED = ("point", "error")  # names of the store's own
@@ -106,7 +106,7 @@ class Store:
         if path is None:
             return
         if not isinstance(path, str | os.PathLike):
-            raise InputError(f'to must be the path of a file, such as "rows.jsonl", not {said(path)}.')
+            raise InputError(f'to must be the path of a file, such as "rows.jsonl", not {short_repr(path)}.')
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array, checked, flag, number, positive
+from floatbase._validation import Array, as_array, as_bool, as_number, as_positive
 from floatbase.errors import InputError
 
 
@@ -33,13 +33,13 @@ class View:
     around: tuple[tuple[float, float, float], float] | None = None
 
     def __post_init__(self) -> None:
-        positive("distance of a View", self.distance)
+        as_positive("distance of a View", self.distance)
         for name in ("azimuth", "elevation"):
-            number(f"{name} of a View", getattr(self, name), "degrees")
-        flag("feet of a View", self.feet)
+            as_number(f"{name} of a View", getattr(self, name), "degrees")
+        as_bool("feet of a View", self.feet)
         if abs(self.elevation) > 90.0:
             raise InputError(f"elevation of a View is {self.elevation:g}; it must be from -90 (below) to 90 (above) degrees.")
-        if positive("angle of a View", self.angle, "degrees") >= 180.0:
+        if as_positive("angle of a View", self.angle, "degrees") >= 180.0:
             raise InputError(f"angle of a View is {self.angle:g}; it must be below 180 degrees; 32 is usual.")
         if self.around is not None:
             _check_around(self.around)
@@ -50,8 +50,8 @@ def _check_around(around: Any) -> None:
         point, radius = around
     except (TypeError, ValueError):
         raise InputError(f"around of a View is {around!r}; it must be a point and a radius, as ((0, 0, 0.3), 0.5).") from None
-    checked("point in around of a View", point, (3,), "m")
-    positive("radius in around of a View", radius, "m")
+    as_array("point in around of a View", point, (3,), "m")
+    as_positive("radius in around of a View", radius, "m")
 
 
 PRESETS = {

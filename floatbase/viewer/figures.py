@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import Contacts
 from floatbase.robots import load
 from floatbase.viewer import geometry, marks, props, shapes

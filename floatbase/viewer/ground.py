@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.friction import tangents
 from floatbase.viewer import lowering
 from floatbase.viewer.colours import RGB

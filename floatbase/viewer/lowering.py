@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
-from floatbase._arrays import cached_property
+from floatbase._validation import cached_property
 from floatbase.viewer.colours import RGB
 from floatbase.viewer.text import LETTER, text_picture
 

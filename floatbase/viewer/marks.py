@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
-from floatbase._arrays import checked, positive
+from floatbase._validation import as_array, as_positive
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
-from floatbase.qp import RowLabel, Solution
+from floatbase.qp import ConstraintLabel, Solution
 from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.ground import LEVEL, Plane, Planes
@@ -102,7 +102,7 @@ def prices(positions: npt.ArrayLike, contacts: Contacts, solution: Solution, hei
     qp, found = solution.qp, solution.multipliers
     forces = qp.blocks.get("forces", slice(0, 0))
     rows = [row for row in zip(qp.inequality_names, qp.G[:, forces], strict=True) if row[0] in found]
-    labels = [(name, row) for name, row in rows if isinstance(name, RowLabel) and name.kind in _AT_CONES]
+    labels = [(name, row) for name, row in rows if isinstance(name, ConstraintLabel) and name.kind in _AT_CONES]
     if forces.stop - forces.start != contacts.k or not {name.owner for name, _ in labels} <= set(contacts.point_names):
         raise InputError("the solution is not one of these contacts: give contacts and solution of the same command.")
     picture: Picture = {}
@@ -124,8 +124,8 @@ def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
 
     pose: (4, 4), homogeneous, world. length: of the rods, m. name: a label; without one there is none.
     """
-    matrix = np.array(checked("pose of a frame", pose, (4, 4)))
-    matrix[:3, :3] *= positive("length of a frame's axes", length, "m")
+    matrix = np.array(as_array("pose of a frame", pose, (4, 4)))
+    matrix[:3, :3] *= as_positive("length of a frame's axes", length, "m")
     picture = {"/axes": Item(_axes(), matrix)}
     if name:
         picture["/name"] = label(matrix[:3, 3] + [0.0, 0.0, 0.35 * length], name, 0.3 * length)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
-from floatbase._arrays import Array, cached_property, checked, of_kind, plain_numbers, said, texts
+from floatbase._validation import Array, cached_property, as_array, as_instance, numeric_copy, short_repr, as_strings
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
@@ -51,7 +51,7 @@ class Painter:
     robot: the robot.
     requested_scale: length of a drawn force, m/N; None for one that fits the robot.
     facets: number of facets of the friction polyhedra; None draws round cones.
-    inside, turn: as for `FrictionPolyhedron`.
+    inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
     ground: the ground; None for the plane that the contacts stand on.
     lines, text, paper: colours of the ground's lines, of text, and of the background.
     """
@@ -59,8 +59,8 @@ class Painter:
     robot: Robot
     requested_scale: float | None
     facets: int | None
-    inside: bool
-    turn: float
+    inner_approximation: bool
+    facet_rotation: float
     ground: Plane | Planes | None
     lines: RGB
     text: RGB
@@ -93,7 +93,7 @@ class Painter:
         """
         self._check_state(state)
         if contacts is not None:
-            of_kind("contacts", contacts, Contacts)
+            as_instance("contacts", contacts, Contacts)
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
@@ -111,18 +111,18 @@ class Painter:
             picture |= self._wrench(state, wrench)
         if push is not None:
             if not isinstance(push, Sequence) or isinstance(push, str) or len(push) != 2:
-                raise InputError(f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not {said(push)}.')
+                raise InputError(f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not {short_repr(push)}.')
             picture |= self._push(state, *push)
         if ghost is not None:
             self._check_state(ghost)
             picture |= self._robot(ghost, "ghost", self._ghosts)
-        for frame in texts("frames", frames):
+        for frame in as_strings("frames", frames):
             pose = state.frame_pose(frame).homogeneous
             picture |= below(f"frame/{plain(frame)}", marks.frame_axes(pose, 0.25 * self.size, frame))
         if any(path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench") for path in picture):
             picture |= self._scale_bar(ground)
         if not isinstance(extra, Mapping | None) or not all(isinstance(item, Item) for item in (extra or {}).values()):
-            raise InputError(f"extra must be a picture, path -> item, as shapes and marks make them, not {said(extra)}.")
+            raise InputError(f"extra must be a picture, path -> item, as shapes and marks make them, not {short_repr(extra)}.")
         return picture | dict(extra or {})
 
     def replace(self, **changes: Any) -> Painter:
@@ -237,7 +237,7 @@ class Painter:
             status = "idle" if judged is None else _friction_cone(tuple(normal.tolist()), mu).status(judged)
             made = {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
             return made | self._rim(position, _polyhedron(tuple(normal.tolist()), mu, 4, True, 0.0), height, status)
-        polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inside, self.turn)
+        polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inner_approximation, self.facet_rotation)
         status = "idle" if judged is None else polyhedron.status(judged)
         status = "inside" if status == "active" else status  # an active facet has a colour of its own
         active = () if judged is None else polyhedron.active_facets(judged)
@@ -274,12 +274,12 @@ class Painter:
         return picture
 
     def _wrench(self, state: State, value: npt.ArrayLike) -> Picture:
-        six = checked("wrench", value, (6,), "N and N·m")
+        six = as_array("wrench", value, (6,), "N and N·m")
         drawn = marks.wrench(state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size)
         return below("wrench", drawn)
 
     def _push(self, state: State, frame: str, value: npt.ArrayLike) -> Picture:
-        force = checked("force of the push", value, (3,), "N")
+        force = as_array("force of the push", value, (3,), "N")
         if self._is_quiet(force):
             return {}
         at = state.frame_pose(frame).translation
@@ -317,7 +317,7 @@ class Painter:
         return plane_under(contacts.normals, positions)
 
     def _check_state(self, state: Any) -> None:
-        self.check_robot("state", of_kind("state", state, State).robot)
+        self.check_robot("state", as_instance("state", state, State).robot)
 
     def check_robot(self, what: str, robot: Robot) -> None:
         """Raise `InputError` where `what` belongs to a robot of another name or, as with joints locked, with other joints."""
@@ -339,9 +339,9 @@ def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
 
 
 @lru_cache(maxsize=256)
-def _polyhedron(normal: tuple[float, ...], mu: float, facets: int, inside: bool, turn: float) -> FrictionPolyhedron:
+def _polyhedron(normal: tuple[float, ...], mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> FrictionPolyhedron:
     """The polyhedron with these values. There are few different ones, so each is made once."""
-    return FrictionPolyhedron(np.array(normal), mu, facets, inside, turn)
+    return FrictionPolyhedron(np.array(normal), mu, facets, inner_approximation, facet_rotation)
 
 
 def nice(value: float) -> float:
@@ -366,13 +366,13 @@ def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -
         return None
     if contacts is None:
         raise InputError(f"{name} were given without contacts, so it is not known where they act; pass contacts=… too.")
-    array = plain_numbers(value)
+    array = numeric_copy(value)
     n = contacts.n_points
     if array is None:
-        raise InputError(f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {said(value)}.")
+        raise InputError(f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {short_repr(value)}.")
     if array.shape not in ((3 * n,), (n, 3)):
         raise InputError(
             f"{name} has shape {array.shape}; {n} contact points ({', '.join(contacts.point_names)}) need shape "
             f"({3 * n},) or ({n}, 3)."
         )
-    return checked(name, array.reshape(n, 3), (n, 3), "N")
+    return as_array(name, array.reshape(n, 3), (n, 3), "N")

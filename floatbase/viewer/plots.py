@@ -12,7 +12,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from floatbase._arrays import Array, of_kind, plain_numbers, said
+from floatbase._validation import Array, as_instance, numeric_copy, short_repr
 from floatbase.errors import InputError
 from floatbase.viewer.colours import ALARM, GREYS, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.recording import checked_rollout
@@ -88,7 +88,7 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
         size = (8, 1.0 + 1.1 * len(names))
         grid = plt.subplots(len(names), 1, figsize=size, sharex=True, sharey=True, layout="constrained", squeeze=False)[1]
         axes = list(grid[:, 0])
-    made = [of_kind("one of axes", axis, Axes, "plt.gca()") for axis in np.atleast_1d(np.asarray(axes, dtype=object)).flat]
+    made = [as_instance("one of axes", axis, Axes, "plt.gca()") for axis in np.atleast_1d(np.asarray(axes, dtype=object)).flat]
     if len(made) != len(names):
         raise InputError(f"axes are {len(made)}; the record has {len(names)} contacts: {', '.join(names)}.")
     planned, measured = (_normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured))
@@ -137,9 +137,9 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
     forces: (n, k), N, world, for n times and k/3 points.
     """
     checked_rollout(rollout)
-    found = plain_numbers(forces)  # NaN stands for none planned
+    found = numeric_copy(forces)  # NaN stands for none planned
     if found is None or found.shape != rollout.measured.shape:
-        raise InputError(f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got {said(forces)}.")
+        raise InputError(f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got {short_repr(forces)}.")
     f = np.reshape(found, (len(rollout.time), -1, 3))
     normals, mus = rollout.contacts.normals, rollout.contacts.mus
     push = np.einsum("nij,ij->ni", f, normals)
@@ -186,7 +186,7 @@ def _spans(times: Array, there: npt.NDArray[np.bool_]) -> list[tuple[float, floa
 
 
 def _axis(axis: Axes | None) -> Axes:
-    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else of_kind("axis", axis, Axes, "plt.gca()")
+    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else as_instance("axis", axis, Axes, "plt.gca()")
 
 
 def _finished(axis: Axes, rollout: Rollout, label: str, legend: Mapping[str, Any] = _INSIDE) -> Axes:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
-from floatbase._arrays import Array, checked, of_kind, texts
+from floatbase._validation import Array, as_array, as_instance, as_strings
 from floatbase.errors import InputError, unknown_name
 from floatbase.qp import QP
 from floatbase.viewer.colours import GREYS
@@ -40,16 +40,16 @@ def plot(
     Raises `InputError` for another number of variables or with equalities, `UnknownNameError` for a row that does not exist.
     """
     corners = allowed(qp, box)
-    for name in texts("working", working):
+    for name in as_strings("working", working):
         if name not in qp.inequality_names:
-            raise unknown_name("inequality row", name, qp.inequality_names)
-    axis = plt.figure().gca() if axis is None else of_kind("axis", axis, Axes)
+            raise unknown_name("inequality constraint", name, qp.inequality_names)
+    axis = plt.figure().gca() if axis is None else as_instance("axis", axis, Axes)
     axis.fill(*corners.T, color=GREYS[2], alpha=0.35, linewidth=0.0)
     _plot_levels(qp, box, axis)
     for i, name in enumerate(qp.inequality_names):
         _plot_row(qp, i, name in working, box, axis)
     if point is not None:
-        axis.plot(*checked("point", point, (2,)), "o", color=GREYS[0], markeredgecolor="white", markersize=10, zorder=5)
+        axis.plot(*as_array("point", point, (2,)), "o", color=GREYS[0], markeredgecolor="white", markersize=10, zorder=5)
     axis.set(xlim=box[:2], ylim=box[2:], aspect="equal")
     return axis
 
@@ -59,9 +59,9 @@ def allowed(qp: QP, box: Box) -> Array:
 
     qp, box, errors: as for `plot`.
     """
-    if of_kind("qp", qp, QP).n != 2 or len(qp.A):
+    if as_instance("qp", qp, QP).n != 2 or len(qp.A):
         raise InputError(f"{qp!r} does not lie in the plane: 2 variables and no equalities can be drawn.")
-    x0, x1, y0, y1 = checked("box", box, (4,))
+    x0, x1, y0, y1 = as_array("box", box, (4,))
     if not (x0 < x1 and y0 < y1):
         raise InputError(f"box is {tuple(box)}; it must be from and to along each variable, in ascending order.")
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])

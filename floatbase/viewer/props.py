@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import checked, positive, unit_vector
+from floatbase._validation import as_array, as_positive, unit_vector
 from floatbase.errors import InputError
 from floatbase.viewer import geometry, lowering
 from floatbase.viewer.colours import MEASURED, PLANNED, RGB, WARNING
@@ -29,7 +29,7 @@ def wheel(centre: npt.ArrayLike, axis: npt.ArrayLike, radius: float, angle: floa
     width: m; None for 0.35 of the radius.
     """
     axle = unit_vector("axis of the wheel", axis)
-    positive("radius of the wheel", radius, "m")
+    as_positive("radius of the wheel", radius, "m")
     up = np.array([0.0, 0.0, 1.0]) if abs(axle[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
     x = up - axle * (axle @ up)
     x /= np.linalg.norm(x)
@@ -47,7 +47,7 @@ def turntable(centre: npt.ArrayLike, radius: float, angle: float) -> Item:
     radius: m.
     angle: rad, how far it has turned about the vertical by the right-hand rule; at 0 the marked line points along x.
     """
-    positive("radius of the turntable", radius, "m")
+    as_positive("radius of the turntable", radius, "m")
     c, s = np.cos(angle), np.sin(angle)
     return Item(_unit_table(), placed(centre, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), radius))
 
@@ -63,8 +63,8 @@ def hydraulic_cylinder(
     """
     if not 0.0 < stroke[0] < stroke[1]:
         raise InputError(f"stroke of the cylinder is {stroke}; it must be its shortest and longest length, m, above zero.")
-    start = checked("base of the cylinder", base, (3,), "m")
-    way, length = directed("a cylinder", checked("end of the cylinder", end, (3,), "m") - start)
+    start = as_array("base of the cylinder", base, (3,), "m")
+    way, length = directed("a cylinder", as_array("end of the cylinder", end, (3,), "m") - start)
     turned = geometry.frame_along(way / length)
     barrel = 0.92 * stroke[0]
     piston = min(max(length - 0.95 * stroke[0], 0.06 * barrel), 0.94 * barrel)
@@ -94,8 +94,8 @@ def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: f
     if np.linalg.norm(side) < 1e-6:
         raise InputError("normal of the wall is vertical; a wall stands, so its normal has a horizontal part.")
     side /= np.linalg.norm(side)
-    positive("width of the wall", width, "m")
-    positive("height of the wall", height, "m")
+    as_positive("width of the wall", width, "m")
+    as_positive("height of the wall", height, "m")
     turned = np.stack([n, side, np.cross(n, side)], axis=1)
     thick = 0.05 * height
     return Item(_unit_box(WALL), placed(np.asarray(position) - n * thick / 2, turned, (thick, width, height)))
@@ -103,7 +103,7 @@ def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: f
 
 def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
     """`count` bolts on a circle. position: (3,), m, world, centre of the circle. radius: of the circle, m."""
-    positive("radius of the bolts' circle", radius, "m")
+    as_positive("radius of the bolts' circle", radius, "m")
     picture: Picture = {}
     for i in range(count):
         angle = 2.0 * np.pi * (i + 0.5) / count

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
-from floatbase._arrays import Array, checked, flag, of_kind, positive, said, text, whole
+from floatbase._validation import Array, as_array, as_bool, as_instance, as_positive, short_repr, as_string, as_integer
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.viewer import wire
@@ -64,9 +64,9 @@ def animate(
     paused: whether the reader must press play first.
     """
     if not isinstance(pictures, Sequence) or not all(isinstance(picture, dict) for picture in pictures) or not pictures:
-        raise InputError(f"pictures must be a list of one picture or more, path -> item each, not {said(pictures)}.")
-    t, root = checked("times", times, (len(pictures),), "s"), text("root", root)
-    t, speed, paused = t - t[0], positive("speed", speed), flag("paused", paused)
+        raise InputError(f"pictures must be a list of one picture or more, path -> item each, not {short_repr(pictures)}.")
+    t, root = as_array("times", times, (len(pictures),), "s"), as_string("root", root)
+    t, speed, paused = t - t[0], as_positive("speed", speed), as_bool("paused", paused)
     courses = _courses(list(pictures))
     clips = []
     for path, course in courses.items():
@@ -80,7 +80,7 @@ def animate(
 
 def thinned(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
     """The rows of a record to draw: the first, the last, and `rate` rows a second between. times: (n,), s, of all rows."""
-    t, rate = checked("times", times, (None,), "s"), positive("rate", rate, "1/s", most=_MOST_PICTURES)
+    t, rate = as_array("times", times, (None,), "s"), as_positive("rate", rate, "1/s", maximum=_MOST_PICTURES)
     if not t.size:
         raise InputError("times holds no time, so there is nothing to draw.")
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
@@ -92,7 +92,7 @@ def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
 
     times: (n,), s, evenly spaced. places: (n, 3), m, world.
     """
-    t, x = checked("times", times, (None,), "s"), checked("places", places, (None, 3), "m")
+    t, x = as_array("times", times, (None,), "s"), as_array("places", places, (None, 3), "m")
     if len(x) != len(t):
         raise InputError(f"there are {len(t)} times and {len(x)} places; each place needs one time.")
     if len(t) < 3 or not t[-1] > t[0]:
@@ -108,7 +108,7 @@ def checked_rollout(rollout: Rollout) -> Rollout:
     """The record, after checking that it is one."""
     from floatbase.simulation import Rollout  # loads the physics, which pictures do without
 
-    return of_kind("rollout", rollout, Rollout)
+    return as_instance("rollout", rollout, Rollout)
 
 
 def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] | None:
@@ -116,8 +116,8 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
 
     seen: s that a push is still shown after its end.
     """
-    now = float(checked_rollout(rollout).time[whole("row", row, -len(rollout), len(rollout) - 1)])
-    seen = positive("seen", seen, "s", allow_zero=True)
+    now = float(checked_rollout(rollout).time[as_integer("row", row, -len(rollout), len(rollout) - 1)])
+    seen = as_positive("seen", seen, "s", allow_zero=True)
     for push in sorted(rollout.pushes, key=lambda push: push.start, reverse=True):
         if push.acts_at(now) or 0.0 <= now - push.start < push.duration + seen - 1e-9:
             return push.frame, push.force
@@ -126,7 +126,7 @@ def push_at(rollout: Rollout, row: int, seen: float = 0.0) -> tuple[str, Array] 
 
 def drawn_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
     """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot be drawn."""
-    of_kind("contacts", contacts, Contacts)
+    as_instance("contacts", contacts, Contacts)
     drawn = np.array([contact.k == 3 * len(contact.point_names) for contact in contacts], dtype=bool)
     names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
     return contacts.only(*names), np.repeat(drawn, np.array([contact.k for contact in contacts], dtype=int))

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.projections.polar import PolarAxes
 
-from floatbase._arrays import Array, of_kind, positive
+from floatbase._validation import Array, as_instance, as_positive
 from floatbase.errors import InputError
 from floatbase.friction import WrenchSet
 from floatbase.viewer import geometry, lowering
@@ -71,7 +71,7 @@ def compass(wrenches: WrenchSet, scale: float | None = None, n: int = 72) -> Pic
 
     wrenches, n: as for `plot_compass`. scale: length of a drawn force, m/N; None makes it half as wide again as the stance.
     """
-    return _picture(*_compass(wrenches, n), wrenches.about, wrenches.points, scale)
+    return _picture(*_compass(wrenches, n), wrenches.reference_point, wrenches.points, scale)
 
 
 def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None) -> Axes:
@@ -100,7 +100,7 @@ def _picture(directions: Array, curves: list[_Curve], middle: Array, feet: Array
     centre = np.array([*middle[:2], feet[:, 2].mean() + _LIFT])
     span = float(np.linalg.norm((feet - centre)[:, :2], axis=1).max())
     largest = max(float(values.max()) for _, values, _, _ in curves)
-    scale = 1.5 * span / largest if scale is None else positive("scale", scale, "m/N")
+    scale = 1.5 * span / largest if scale is None else as_positive("scale", scale, "m/N")
     items: Picture = {}
     for height, (kind, values, colour, _) in enumerate(reversed(curves)):
         tips = scale * values[:, None] * _horizontal(directions)
@@ -131,7 +131,7 @@ def _curves(rose: PushRose, theory: bool, before: PushRose | None) -> list[_Curv
 
 def _compass(wrenches: WrenchSet, n: int) -> tuple[Array, list[_Curve]]:
     """Directions, rad, and the one curve."""
-    angles, forces = of_kind("wrenches", wrenches, WrenchSet).horizontal_reach(n)
+    angles, forces = as_instance("wrenches", wrenches, WrenchSet).max_horizontal_forces(n)
     if not np.isfinite(forces).all():
         raise InputError("the forces of this stance have no end in some direction: give its wrench_set max_normal_force.")
     return angles, [("compass", forces, COM, "-")]

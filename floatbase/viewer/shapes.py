@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, positive, read_only
+from floatbase._validation import Array, as_array, as_positive, read_only
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
 from floatbase.viewer import geometry, lowering
@@ -73,10 +73,10 @@ def placed(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale
     try:
         matrix[:3, 3] = position
     except (TypeError, ValueError):
-        checked("position in the picture", position, (3,), "m")
+        as_array("position in the picture", position, (3,), "m")
         raise
     if not math.isfinite(matrix.sum()):
-        checked("position in the picture", position, (3,), "m")
+        as_array("position in the picture", position, (3,), "m")
         raise InputError(f"axes or size of a shape at {position!r} are not finite numbers: {matrix[:3, :3].tolist()}.")
     return matrix
 
@@ -89,7 +89,7 @@ def directed(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
     array = np.asarray(vector, dtype=np.float64)
     length = math.sqrt(array @ array) if array.shape == (3,) else 0.0
     if not 1e-12 < length < math.inf:
-        checked(f"the vector of {what}", vector, (3,), "m")
+        as_array(f"the vector of {what}", vector, (3,), "m")
         raise InputError(f"{what} of no length points nowhere: leave it out of the picture.")
     return array, length
 
@@ -123,8 +123,8 @@ def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, hei
     height: m: the largest normal force that it shows, times the picture's scale.
     status: "idle" (no force), "inside", "active" or "outside", which gives the colour.
     """
-    positive("mu of a friction cone", mu)
-    positive("height of a friction cone", height, "m")
+    as_positive("mu of a friction cone", mu)
+    as_positive("height of a friction cone", height, "m")
     matrix = placed(position, _surface_frame(normal), (mu * height, mu * height, height))
     return Item(_unit_cone(), matrix, cone_colour(status))
 
@@ -148,9 +148,9 @@ def friction_polyhedron(
     height, status: as for `friction_cone`.
     active: numbers of the facets that have the colour of a reached limit.
     """
-    positive("height of a friction polyhedron", height, "m")
+    as_positive("height of a friction polyhedron", height, "m")
     matrix = placed(position, _surface_frame(polyhedron.normal), height)
-    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside), float(polyhedron.turn))
+    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inner_approximation), float(polyhedron.facet_rotation))
     picture = {"/sides": Item(_unit_polyhedron(*key), matrix, cone_colour(status))}
     for facet in np.atleast_1d(np.asarray(active, dtype=int)):
         picture[f"/facet {facet}"] = Item(_facet(*key, int(facet)), matrix)
@@ -166,13 +166,13 @@ def rim(position: npt.ArrayLike, polyhedron: FrictionPolyhedron, height: float, 
     frame = _surface_frame(polyhedron.normal)
     if is_round:
         return Item(_round_rim(), placed(position, frame, (polyhedron.mu * height, polyhedron.mu * height, height)))
-    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inside), float(polyhedron.turn))
+    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inner_approximation), float(polyhedron.facet_rotation))
     return Item(_edged_rim(*key), placed(position, frame, height))
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
     """A disc at a contact. position: (3,), m, world. normal: (3,), unit, world. radius: m."""
-    positive("radius of a contact patch", radius, "m")
+    as_positive("radius of a contact patch", radius, "m")
     return Item(_unit_disc(PATCH), placed(position, _surface_frame(normal), (radius, radius, 0.12 * radius)))
 
 
@@ -200,7 +200,7 @@ def label(position: npt.ArrayLike, text: str, height: float, colour: RGB = (0.13
     colour: RGB of the text.
     plate: whether a plate lies behind it.
     """
-    return Item(_label(text, positive("height of a label's letters", height, "m"), plate, colour), placed(position))
+    return Item(_label(text, as_positive("height of a label's letters", height, "m"), plate, colour), placed(position))
 
 
 def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB) -> Picture:
@@ -232,13 +232,13 @@ def rod(start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: fl
     length, radius: m.
     colour: RGB.
     """
-    positive("length of a rod", length, "m")
+    as_positive("length of a rod", length, "m")
     return Item(_unit_rod(colour), placed(start, rotation, (radius, radius, length)))
 
 
 def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
     """A flat convex polygon, seen from both sides. corners: (n, 3), m. colour: RGB. opacity: from 0 to 1."""
-    points = checked("corners of a polygon", corners, (None, 3), "m")
+    points = as_array("corners of a polygon", corners, (None, 3), "m")
     if len(points) < 3:
         raise InputError(f"a polygon needs three corners or more, not {len(points)}.")
     return _polygon(tuple(tuple(corner) for corner in points.tolist()), colour, opacity)
@@ -307,14 +307,14 @@ def _unit_cone() -> Shape:
 
 
 @lru_cache(maxsize=64)
-def _unit_polyhedron(mu: float, facets: int, inside: bool, turn: float) -> Shape:
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside, turn).rays
+def _unit_polyhedron(mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> Shape:
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation).rays
     return lowering.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True)
 
 
 @lru_cache(maxsize=64)
-def _edged_rim(mu: float, facets: int, inside: bool, turn: float) -> Shape:
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside, turn).rays
+def _edged_rim(mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> Shape:
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation).rays
     edges = [geometry.rod(a, b, _RIM * mu) for a, b in zip(rays, np.roll(rays, -1, axis=0), strict=True)]
     return lowering.mesh(*geometry.merged(edges), PATCH)
 
@@ -326,9 +326,9 @@ def _round_rim() -> Shape:
 
 
 @lru_cache(maxsize=256)
-def _facet(mu: float, facets: int, inside: bool, turn: float, facet: int) -> Shape:
+def _facet(mu: float, facets: int, inner_approximation: bool, facet_rotation: float, facet: int) -> Shape:
     """One side of the polyhedron: facet i lies between rays i - 1 and i."""
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside, turn).rays
+    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation).rays
     corners = [np.zeros(3), rays[facet - 1], rays[facet]]
     return lowering.mesh(*geometry.fan(corners), WARNING, opacity=FACET_ALPHA, flat=True)
 

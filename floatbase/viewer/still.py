@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.viewer.canvas import ROOT
 from floatbase.viewer.colours import BACKGROUNDS, RGB, hexadecimal
 from floatbase.viewer.ground import LEVEL, Plane, Planes, way

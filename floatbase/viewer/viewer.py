@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, checked, flag, of_kind, positive, said, text, unit_vector, whole
+from floatbase._validation import Array, as_array, as_bool, as_instance, as_positive, short_repr, as_string, unit_vector, as_integer
 from floatbase.behaviours import Step, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
@@ -46,7 +46,7 @@ class Viewer(Controls):
     scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's weight about twice as long as
         its centre of mass is high.
     facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
-    inside, turn: as for `FrictionPolyhedron`.
+    inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
     ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin; None takes the plane that the
         contacts stand on when they share a normal, else a level ground.
     follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it otherwise.
@@ -66,24 +66,25 @@ class Viewer(Controls):
         background: str = "light",
         scale: float | None = None,
         facets: int | None = None,
-        inside: bool = True,
-        turn: float = 0.0,
+        inner_approximation: bool = True,
+        facet_rotation: float = 0.0,
         ground: Ground | npt.ArrayLike | None = None,
         follow: bool = False,
         port: int = 0,
     ):
-        of_kind("robot", robot, Robot)
+        as_instance("robot", robot, Robot)
         if not isinstance(background, str) or background not in BACKGROUNDS:
-            raise InputError(f"background is {said(background)}; it must be one of {', '.join(BACKGROUNDS)}.")
-        cut = FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inside, turn)  # raises for wrong ones
+            raise InputError(f"background is {short_repr(background)}; it must be one of {', '.join(BACKGROUNDS)}.")
+        # raises for wrong ones
+        cut = FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation)
         self.robot, self.background = robot, background
-        self.height = whole("height", height, 1, _MOST_PIXELS, "pixels")
-        requested = None if scale is None else positive("scale", scale, "m/N")
+        self.height = as_integer("height", height, 1, _MOST_PIXELS, "pixels")
+        requested = None if scale is None else as_positive("scale", scale, "m/N")
         paper, _, lines, text = BACKGROUNDS[background]
-        self.painter = Painter(robot, requested, facets, cut.inside, cut.turn, _ground(ground), lines, text, paper)
+        self.painter = Painter(robot, requested, facets, cut.inner_approximation, cut.facet_rotation, _ground(ground), lines, text, paper)
         self.window = Window(port)
         self.canvas = Canvas(self.window)
-        self._moving, self._follow = False, flag("follow", follow)
+        self._moving, self._follow = False, as_bool("follow", follow)
         self._last: State | None = None
         self._seen: State | None = None  # where the robot was when the camera was set
         self._own: dict[str, tuple[RGB, str]] = {}  # kinds of items that the legend explains beside its own
@@ -168,8 +169,8 @@ class Viewer(Controls):
 
         kind: first part of their paths. colour: RGB, from 0 to 1. meaning: what the legend says.
         """
-        red, green, blue = np.clip(checked("colour", colour, (3,)), 0.0, 1.0).tolist()
-        self._own[text("kind", kind)] = (red, green, blue), text("meaning", meaning)
+        red, green, blue = np.clip(as_array("colour", colour, (3,)), 0.0, 1.0).tolist()
+        self._own[as_string("kind", kind)] = (red, green, blue), as_string("meaning", meaning)
 
     def prices(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
         """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle, of a normal force on top.
@@ -181,9 +182,9 @@ class Viewer(Controls):
         solution: its answer: `command.solution`, or that of `solve(controller.qp(state))`.
         Raises `InputError` for a solution of other contacts.
         """
-        self.painter.check_robot("state", of_kind("state", state, State).robot)
-        positions, height = of_kind("contacts", contacts, Contacts).positions(state), self.painter.cone_height(contacts)
-        drawn = marks.prices(positions, contacts, of_kind("solution", solution, Solution), height, self.painter.size)
+        self.painter.check_robot("state", as_instance("state", state, State).robot)
+        positions, height = as_instance("contacts", contacts, Contacts).positions(state), self.painter.cone_height(contacts)
+        drawn = marks.prices(positions, contacts, as_instance("solution", solution, Solution), height, self.painter.size)
         return below("price", drawn)
 
     def walking(self, walk: Walk, state: State) -> Picture:
@@ -194,13 +195,13 @@ class Viewer(Controls):
         walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of the robot, then.
         Raises `InputError` for those of another robot.
         """
-        self.painter.check_robot("walk", of_kind("walk", walk, Walk).robot)
-        self.painter.check_robot("state", of_kind("state", state, State).robot)
+        self.painter.check_robot("walk", as_instance("walk", walk, Walk).robot)
+        self.painter.check_robot("state", as_instance("state", state, State).robot)
         return walks.walking(walk, state, self._look)
 
     def step(self, step: Step, t: float, state: State) -> Picture:
         """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s. state: of the robot, then."""
-        self.painter.check_robot("state", of_kind("state", state, State).robot)
+        self.painter.check_robot("state", as_instance("state", state, State).robot)
         return walks.step(step, t, state, self._look)
 
     @property
@@ -250,7 +251,7 @@ class Viewer(Controls):
             raise InputError("the record has no rows, so there is nothing to play.")
         _check_flags(planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused)
         _check_texts(title=title, ghost_name=ghost_name)
-        rows, planned_steps = recording.thinned(rollout.time, positive("rate", rate, "1/s")), walks.checked_steps(steps)
+        rows, planned_steps = recording.thinned(rollout.time, as_positive("rate", rate, "1/s")), walks.checked_steps(steps)
         states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
         times = rollout.time[rows].tolist()
         contacts, columns = recording.drawn_contacts(rollout.contacts)
@@ -284,7 +285,7 @@ class Viewer(Controls):
         pictures: n pictures, path -> item each.
         speed, paused, title, ghost_name: as for `play`.
         """
-        moving = recording.animate(times, pictures, ROOT, positive("speed", speed), paused)
+        moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
         self.canvas.set(*self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name))
         self.window.put([moving.command])
@@ -302,8 +303,8 @@ class Viewer(Controls):
         if isinstance(view, str) and view in PRESETS:
             view = PRESETS[view]
         if not isinstance(view, View):
-            raise InputError(f"camera view is {said(view)}; it must be one of {', '.join(PRESETS)}, or a View.")
-        self._follow = self._follow if follow is None else flag("follow", follow)
+            raise InputError(f"camera view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, or a View.")
+        self._follow = self._follow if follow is None else as_bool("follow", follow)
         self.canvas.set_again(*self._looking(view, FOLLOWED if self._moving else ROBOT))
         return self
 
@@ -342,7 +343,7 @@ class Viewer(Controls):
 
         Raises `ViewerError` when nothing is drawn yet, for another ending, and when it cannot be written.
         """
-        target = Path(path if isinstance(path, Path) else text("path", path))
+        target = Path(path if isinstance(path, Path) else as_string("path", path))
         if self.window.scene.is_empty:
             raise ViewerError("nothing is drawn yet, so there is nothing to save; call show(state) or play(rollout) first.")
         size = film.pixels(size)
@@ -364,7 +365,7 @@ class Viewer(Controls):
 
     def ending(self, words: str) -> None:
         """What the page says when this viewer has been closed. words: the text."""
-        self.canvas.set(wire.page_command("set_ending", text=text("words", words)))
+        self.canvas.set(wire.page_command("set_ending", text=as_string("words", words)))
 
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
@@ -425,12 +426,12 @@ class Viewer(Controls):
 
 def _check_flags(**flags: bool) -> None:
     for name, value in flags.items():
-        flag(name, value)
+        as_bool(name, value)
 
 
 def _check_texts(**texts: str | None) -> None:
     for name, value in texts.items():
-        text(name, "" if value is None and name == "title" else value)
+        as_string(name, "" if value is None and name == "title" else value)
 
 
 def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:

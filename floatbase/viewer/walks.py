@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, number, of_kind, said
+from floatbase._validation import Array, as_number, as_instance, short_repr
 from floatbase.behaviours import LIPM, Step, Swing, Walk, capture_point
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
@@ -42,7 +42,7 @@ def walking(walk: Walk, state: State, look: Look) -> Picture:
 
     walk: the behaviour, after a tick; nothing is drawn before its first one. state: of the robot, then. look: of the marks.
     """
-    if of_kind("walk", walk, Walk).plan is None:
+    if as_instance("walk", walk, Walk).plan is None:
         return {}
     assert walk.plan is not None and walk.time is not None
     turns = {foot: walk.yaw_rate * max(path.land - walk.time, 0.0) for foot, path in walk.swings.items()}
@@ -54,26 +54,26 @@ def step(step: Step, t: float, state: State, look: Look) -> Picture:
 
     step: an entry of `walk.history`. t: s. state: of the robot, then. look: of the marks.
     """
-    marks = _on_ground(of_kind("step", step, Step).plan, number("t", t, "s"), state, look)
+    marks = _on_ground(as_instance("step", step, Step).plan, as_number("t", t, "s"), state, look)
     return marks | _steps(step.footholds, step.swings, {}, state, look.size)
 
 
 def step_at(steps: Sequence[Step], t: float) -> Step | None:
     """Of the steps of a walk, in the order of time, the one in which time t, s, lies; None before the first."""
-    i = bisect_right(steps, number("t", t, "s") + 1e-9, key=lambda step: step.time)
+    i = bisect_right(steps, as_number("t", t, "s") + 1e-9, key=lambda step: step.time)
     return steps[i - 1] if i else None
 
 
 def checked_steps(steps: Iterable[Step]) -> list[Step]:
     """The steps as a list, after checking that they are some."""
     if not isinstance(steps, Iterable):
-        raise InputError(f"steps must be those of a Walk, as walk.history, not {said(steps)}.")
-    return [of_kind("a step", step, Step, "one of walk.history") for step in steps]
+        raise InputError(f"steps must be those of a Walk, as walk.history, not {short_repr(steps)}.")
+    return [as_instance("a step", step, Step, "one of walk.history") for step in steps]
 
 
 def _on_ground(plan: LIPM, t: float, state: State, look: Look) -> Picture:
     """Capture point and ZMP. t: s."""
-    dcm, zmp = capture_point(of_kind("state", state, State).com, state.com_velocity, plan.omega), plan.zmp(t)
+    dcm, zmp = capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega), plan.zmp(t)
     lift = _LIFT * look.size
     ring = placed([*dcm, look.ground.height(dcm) + lift], scale=_RING * look.size)
     diamond = placed([*zmp, look.ground.height(zmp) + lift], scale=_DIAMOND * look.size)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.errors import ViewerError
 
 Key = tuple[str, str, str]

@@ -13,7 +13,7 @@ from judges import Array
 
 import floatbase as fb
 from floatbase.control import AnalyticController
-from floatbase.objectives import rotational_inertia
+from floatbase.objectives import centroidal_inertia
 
 PERIOD = 2e-3
 
@@ -185,7 +185,7 @@ def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_
 @pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
 def test_the_inertia_about_the_centre_of_mass_is_the_sum_over_mujocos_bodies(name: str) -> None:
     for state in judges.states(name, 3):
-        assert judges.relative(rotational_inertia(state), inertia_about_com(state)) < 1e-9
+        assert judges.relative(centroidal_inertia(state), inertia_about_com(state)) < 1e-9
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

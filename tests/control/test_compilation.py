@@ -172,7 +172,7 @@ def test_an_edit_in_any_file_of_the_tick_changes_the_key_of_its_cache(tmp_path: 
         assert jit.digest(copy) != key, file.name
         file.write_text(text, encoding="utf-8")
     assert jit.digest(copy) == key
-    for name in ("INCONSISTENT", "MOTION_TOLERANCE", "MOTION_NOISE", "FEASIBILITY_TOLERANCE", "UNIT_LENGTH_TOLERANCE"):
+    for name in ("INCONSISTENT", "CONSTRAINT_RANK_TOLERANCE", "CONSTRAINT_NOISE", "FEASIBILITY_TOLERANCE", "UNIT_NORM_TOLERANCE"):
         with monkeypatch.context() as patch:
             patch.setattr(jit, name, 2.0 * getattr(jit, name))
             assert jit.digest() != key, name

@@ -14,7 +14,7 @@ from messages import missing, raises
 
 import floatbase as fb
 from floatbase.control.tick import Compiled
-from floatbase.dynamics import MOTION_TOLERANCE
+from floatbase.dynamics import CONSTRAINT_RANK_TOLERANCE
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.linear_algebra import null_space
 from floatbase.qp import FEASIBILITY_TOLERANCE, Solution
@@ -33,7 +33,7 @@ def prove_optimal(solution: Solution) -> None:
     assert residuals.stationarity <= ROUNDING * largest(*slopes)
     assert residuals.equality <= ROUNDING * largest(*forces)
     assert residuals.complementarity <= ROUNDING * largest(*costs)
-    assert residuals.inequality <= 2.0 * FEASIBILITY_TOLERANCE * np.max(qp.row_lengths)
+    assert residuals.inequality <= 2.0 * FEASIBILITY_TOLERANCE * np.max(qp.row_norms)
     assert residuals.dual == 0.0
 
 
@@ -108,11 +108,11 @@ def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
 
 @pytest.mark.parametrize("share", [0.03, 0.3, 0.99, 1.01, 3.0])
 def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(share: float) -> None:
-    """solo8 on three feet, with the least singular value of A on either side of MOTION_TOLERANCE."""
+    """solo8 on three feet, with the least singular value of A on either side of CONSTRAINT_RANK_TOLERANCE."""
     robot = judges.load("solo8")
     contacts = fb.Contacts.points(robot).without(robot.feet[3].frame)
     both = judges.pair(robot, contacts)
-    states = [with_resolution(state, contacts, share * MOTION_TOLERANCE) for state in judges.states("solo8", 5, 0.1)]
+    states = [with_resolution(state, contacts, share * CONSTRAINT_RANK_TOLERANCE) for state in judges.states("solo8", 5, 0.1)]
     assert max(judges.difference(*both, state) for state in states) < DEPENDENT
     prove_all(both[0], states)
 

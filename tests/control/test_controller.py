@@ -310,12 +310,12 @@ def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict() -> None
     state = judges.load("go2").standing()
     with pytest.raises(InfeasibleError) as caught:
         controller(state.q, state.v)
-    assert any(row.endswith("normal force") for row in caught.value.rows)
-    assert any(row.startswith("torque limit") for row in caught.value.rows)
-    for row in caught.value.rows:  # each by its owner, in the line of its kind
+    assert any(row.endswith("normal force") for row in caught.value.constraints)
+    assert any(row.startswith("torque limit") for row in caught.value.constraints)
+    for row in caught.value.constraints:  # each by its owner, in the line of its kind
         owner = row.removeprefix("torque limit ").removesuffix(" upper").removesuffix(" lower").removesuffix(" normal force")
         assert owner in str(caught.value)
-    assert judges.is_smallest_conflict(controller.qp(state), caught.value.rows)
+    assert judges.is_smallest_conflict(controller.qp(state), caught.value.constraints)
 
 
 def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
@@ -375,7 +375,7 @@ def test_inconsistent_motions_are_named_and_not_averaged() -> None:
     state = robot.standing()
     with raises(InfeasibleError, "motion FL_foot z", "motion drive of FL_foot row 2") as e:
         controller(state.q, state.v, 1.0)
-    assert e.value.rows == ("motion FL_foot z", "motion drive of FL_foot row 2")
+    assert e.value.constraints == ("motion FL_foot z", "motion drive of FL_foot row 2")
 
 
 def test_limits_keep_their_own_copy() -> None:

@@ -22,7 +22,7 @@ from floatbase.robots import Robot
 def own_rows(robot: Robot, contacts: fb.Contacts) -> list[Rows]:
     """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with time."""
     E, up = np.eye(robot.nv)[robot.nv - robot.d :], np.zeros((1, contacts.k))
-    up[0, contacts.point_entries[2::3]] = 1.0
+    up[0, contacts.point_force_indices[2::3]] = 1.0
     turns = np.resize([1.0, -1.0], (1, robot.d))
     sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
     return [
@@ -74,9 +74,9 @@ def test_rows_in_conflict_are_told_by_their_names() -> None:
     for controller in judges.pair(robot, judges.stance(robot), [], rows=[light], min_normal_force=10.0):
         with raises(InfeasibleError, "light feet") as caught:
             controller(robot.standing().q, np.zeros(18))
-        row = next(row for row in caught.value.rows if row == "light feet")
+        row = next(row for row in caught.value.constraints if row == "light feet")
         assert (row.kind, row.owner, row.number) == ("rows", "light feet", 0)
-        assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
+        assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.constraints)
 
 
 # forces over time ----------------------------------------------------------------------------------------------------------

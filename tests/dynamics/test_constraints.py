@@ -144,7 +144,7 @@ def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls
     """With no torque at all λ = m (a_com - g): less than the weight, as the legs fall."""
     state = judges.load("go2").standing()
     qdd, wrench = motion(state, fixed_frame("base"))
-    rate = objectives.momentum_rate(state, qdd)
+    rate = objectives.centroidal_momentum_rate(state, qdd)
     up = np.array([0.0, 0.0, state.robot.mass * G])
     assert np.allclose(wrench[:3], rate[:3] + up, atol=1e-8)
     lever = state.com - state.frame_pose("base").translation
@@ -203,7 +203,7 @@ def test_a_driven_frame_has_the_desired_acceleration_at_that_time() -> None:
         qdd, force = motion(state, moving_frame(frame, desired), t=t)
         found = judges.acceleration_of(lambda s, f=frame: s.point(f), state, qdd)
         assert np.allclose(found, desired(t), atol=1e-4)
-        rate = objectives.momentum_rate(state, qdd)
+        rate = objectives.centroidal_momentum_rate(state, qdd)
         assert np.allclose(force, rate[:3] + np.array([0.0, 0.0, state.robot.mass * G]), atol=1e-7)
 
 

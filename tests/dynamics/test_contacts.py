@@ -118,7 +118,7 @@ def test_corner_forces_make_the_wrench_of_their_generators(name: str) -> None:
             forces = rng.normal(size=(len(contact.corners), 3))
             origin = state.point(contact.frame)
             moment = sum(np.cross(p - origin, f) for p, f in zip(contact.positions(state), forces, strict=True))
-            wrench = contact.generators(state) @ forces.ravel()
+            wrench = contact.force_generator_matrix(state) @ forces.ravel()
             assert np.allclose(wrench, np.concatenate([forces.sum(axis=0), moment]), atol=1e-12)
             A, _ = contact.constraint(state)
             assert np.allclose(contact.jacobian(state).T @ forces.ravel(), A.T @ wrench, atol=1e-12)

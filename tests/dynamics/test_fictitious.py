@@ -12,9 +12,9 @@ from floatbase.dynamics import (
     bias_forces,
     coriolis_matrix,
     inertia_rate,
-    inward_acceleration,
+    centripetal_acceleration,
     power_identity,
-    seen_from_turning_frame,
+    view_from_rotating_frame,
 )
 
 N = 5
@@ -174,7 +174,7 @@ def wandering_rate(t: float) -> np.ndarray:
 
 def test_the_three_terms_explain_the_curved_path_whatever_the_frame_does() -> None:
     time = np.linspace(0.0, 2.0, 4001)
-    view = seen_from_turning_frame(time, wandering, (0.4, -0.2, 0.7), (0.3, 0.5, -0.1), wandering_rate)
+    view = view_from_rotating_frame(time, wandering, (0.4, -0.2, 0.7), (0.3, 0.5, -0.1), wandering_rate)
     dt = time[1] - time[0]
     velocity = (view.position[2:] - view.position[:-2]) / (2.0 * dt)
     acceleration = (view.position[2:] - 2.0 * view.position[1:-1] + view.position[:-2]) / dt**2
@@ -190,7 +190,7 @@ def test_the_frames_rotation_agrees_with_a_tight_integrator() -> None:
         return (np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ R.reshape(3, 3)).ravel()
 
     time = np.linspace(0.0, 3.0, 7)
-    found = seen_from_turning_frame(time, wandering, (1.0, 0.0, 0.0), omega_rate=wandering_rate).rotation
+    found = view_from_rotating_frame(time, wandering, (1.0, 0.0, 0.0), omega_rate=wandering_rate).rotation
     exact = scipy.integrate.solve_ivp(derivative, (0.0, 3.0), np.eye(3).ravel(), t_eval=time, rtol=1e-12, atol=1e-13)
     assert np.max(np.abs(found.reshape(7, 9) - exact.y.T)) < 1e-8
     assert np.allclose(found @ found.transpose(0, 2, 1), np.eye(3), atol=1e-12)
@@ -200,7 +200,7 @@ def test_a_particle_at_rest_in_the_world_circles_backwards_in_a_frame_that_turns
     """p' = (r cos ωt, -r sin ωt): Coriolis pulls inward twice as hard as centrifugal pushes outward."""
     time = np.linspace(0.0, 5.0, 101)
     r, w = 0.8, 1.3
-    view = seen_from_turning_frame(time, (0.0, 0.0, w), (r, 0.0, 0.2))
+    view = view_from_rotating_frame(time, (0.0, 0.0, w), (r, 0.0, 0.2))
     circle = np.column_stack([r * np.cos(w * time), -r * np.sin(w * time), np.full(time.size, 0.2)])
     assert np.allclose(view.position, circle, atol=1e-12)
     outward = circle * [1.0, 1.0, 0.0]
@@ -215,7 +215,7 @@ def test_a_link_that_turns_evenly_pulls_its_points_inward_by_omega_squared_times
     state = robot.standing().replace(v=2.0 * np.eye(robot.nv)[0])
     axis, place = state.frame_pose("shoulder_pan_joint").rotation[:, 2], state.point("shoulder_pan_joint")
     r = state.point("wrist_3_link") - place
-    inward = inward_acceleration(2.0 * axis, r)
+    inward = centripetal_acceleration(2.0 * axis, r)
     assert np.allclose(state.frame_drift("wrist_3_link")[:3], inward, atol=1e-10)
     from_axis = r - (r @ axis) * axis
     assert np.linalg.norm(from_axis) > 0.1

@@ -17,9 +17,9 @@ from floatbase.dynamics import (
     RollingWheel,
     bias_forces,
     fixed_frame,
-    inward_acceleration,
+    centripetal_acceleration,
     moving_frame,
-    seen_from_turning_frame,
+    view_from_rotating_frame,
 )
 from floatbase.errors import InputError, UnknownNameError
 
@@ -98,13 +98,13 @@ def wheel(**wrong: object) -> RollingWheel:
         (lambda: fb.feasible_space(eom())(np.zeros(11)), InputError, "beta", 11, 12),
         (lambda: fb.feasible_space(eom())(np.full(12, np.nan)), InputError, "beta", np.nan),
         (lambda: fb.feasible_space(eom()).coordinates(np.zeros(17), *np.zeros((2, 12))), InputError, "qdd", 17, 18),
-        (lambda: seen_from_turning_frame([0.0, 1.0], lambda t: (t, t, t), X), InputError, "omega", "omega_rate"),
-        (lambda: seen_from_turning_frame([0.0, 0.0], UP, X), InputError, "time"),
-        (lambda: seen_from_turning_frame([], UP, X), InputError, "time"),
-        (lambda: seen_from_turning_frame([0.0], UP, (1.0, 0.0)), InputError, "position", 2, 3),
-        (lambda: seen_from_turning_frame([0.0, 1.0], lambda t: (1.0, t), X, omega_rate=UP), InputError, "omega", 2, 3),
+        (lambda: view_from_rotating_frame([0.0, 1.0], lambda t: (t, t, t), X), InputError, "omega", "omega_rate"),
+        (lambda: view_from_rotating_frame([0.0, 0.0], UP, X), InputError, "time"),
+        (lambda: view_from_rotating_frame([], UP, X), InputError, "time"),
+        (lambda: view_from_rotating_frame([0.0], UP, (1.0, 0.0)), InputError, "position", 2, 3),
+        (lambda: view_from_rotating_frame([0.0, 1.0], lambda t: (1.0, t), X, omega_rate=UP), InputError, "omega", 2, 3),
         (lambda: bias_forces(STATE, axes="body"), UnknownNameError, "axes", "body", "base", "world"),
-        (lambda: inward_acceleration(UP, (1.0, np.nan, 0.0)), InputError, "r", np.nan),
+        (lambda: centripetal_acceleration(UP, (1.0, np.nan, 0.0)), InputError, "r", np.nan),
     ],
 )
 def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:

@@ -292,7 +292,7 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_
     run = fb.rollout(sim, controller, 1.0, pushes=[fb.Push([0.0, 0.1, 0.0], 0.9)], control_period=2e-3)
     eom = fb.equations_of_motion(sim.state, contacts)
     _, s, Vt = np.linalg.svd(eom.A)
-    assert 1e-6 < s[10] / s[0] < dynamics.MOTION_TOLERANCE
+    assert 1e-6 < s[10] / s[0] < dynamics.CONSTRAINT_RANK_TOLERANCE
     rolling = 0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()  # N·m, torques along the badly resolved direction
     change, rolls = [], []
     motors = [sim.model.joint(joint).dofadr[0] for joint in robot.joint_names]
@@ -316,12 +316,12 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_
 def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_to_it() -> None:
     eom = near_singular(6, 0.1)
     U, _, Vt = np.linalg.svd(eom.A)
-    A, b = dynamics.resolved_motion(eom)
+    A, b = dynamics.resolved_constraint(eom)
     assert np.max(np.abs(U[:, 10:].T @ b)) < 1e-12 < np.max(np.abs(U[:, 10:].T @ eom.b))
     assert np.max(np.abs(A @ Vt[10])) < 1e-12 < np.max(np.abs(eom.A @ Vt[10]))
     assert np.allclose(U[:, :10].T @ b, U[:, :10].T @ eom.b, atol=1e-12)
     regular = fb.equations_of_motion(judges.load("go2").random_state(0), fb.Contacts.points(judges.load("go2")))
-    for found, given in zip(dynamics.resolved_motion(regular), (regular.A, regular.b), strict=True):
+    for found, given in zip(dynamics.resolved_constraint(regular), (regular.A, regular.b), strict=True):
         assert np.allclose(found, given, atol=1e-12)
 
 
@@ -429,7 +429,7 @@ def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: st
         tau = 10.0 * rng.normal(size=eom.d)
         qdd, wrenches = pinocchios(eom, tau, pin.ContactType.CONTACT_6D)
         forces = dynamics.forces_from_torques(eom)(tau)
-        found = np.concatenate([c.generators(eom.state) @ forces[contacts.force_slice(c.name)] for c in contacts])
+        found = np.concatenate([c.force_generator_matrix(eom.state) @ forces[contacts.force_slice(c.name)] for c in contacts])
         assert judges.relative(found, wrenches) < 1e-8
         assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-8
 

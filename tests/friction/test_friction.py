@@ -72,7 +72,7 @@ def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_sl
 
 
 def test_the_tolerance_is_in_newton() -> None:
-    cone, polyhedron = FrictionCone(UP, 0.5), FrictionPolyhedron(UP, 0.5, 4, inside=False)
+    cone, polyhedron = FrictionCone(UP, 0.5), FrictionPolyhedron(UP, 0.5, 4, inner_approximation=False)
     slipping = [50.02, 0.0, 100.0]
     for shape in (cone, polyhedron):
         assert not shape.contains(slipping)
@@ -100,7 +100,7 @@ def test_rows_and_rays_describe_the_same_set(seed: int, n: int, mu: float, insid
     rng = np.random.default_rng(seed)
     polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)
     for direction in rng.normal(size=(4, 3)):
-        rows = np.vstack([polyhedron.rows, polyhedron.normal])
+        rows = np.vstack([polyhedron.face_matrix, polyhedron.normal])
         best = linprog(-direction, rows, np.append(np.zeros(n), 1.0), bounds=(None, None))
         assert -best.fun == pytest.approx(max(0.0, np.max(polyhedron.rays @ direction)), abs=1e-9)
 
@@ -124,7 +124,7 @@ def test_the_status_changes_at_the_friction_limit() -> None:
 
 def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it() -> None:
     force = [5.0, 0.0, 10.0]
-    inner, outer = FrictionPolyhedron(UP, 0.6, 4, inside=True), FrictionPolyhedron(UP, 0.6, 4, inside=False)
+    inner, outer = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True), FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False)
     assert (inner.status(force), FrictionCone(UP, 0.6).status(force), outer.status(force)) == ("outside", "inside", "inside")
     assert (inner.active_facets(force), outer.active_facets(force)) == ((0,), ())
 
@@ -148,7 +148,7 @@ def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(seed: int, n
 @given(seeds, facets, mus)
 def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(seed: int, n: int, mu: float) -> None:
     rng, normal = np.random.default_rng(seed), any_normal(np.random.default_rng(seed))
-    cone, (t1, t2) = FrictionPolyhedron(normal, mu, n, inside=False), tangents(normal)
+    cone, (t1, t2) = FrictionPolyhedron(normal, mu, n, inner_approximation=False), tangents(normal)
     for angle, part in zip(rng.uniform(0, 2 * np.pi, 50), rng.uniform(0, 1, 50), strict=True):
         force = normal + part * mu * (np.cos(angle) * t1 + np.sin(angle) * t2)
         assert cone.margin(force) >= -1e-12
@@ -157,17 +157,17 @@ def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(seed: int, n
 @given(seeds, facets, mus)
 def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_between(seed: int, n: int, mu: float) -> None:
     normal = any_normal(np.random.default_rng(seed))
-    inner, outer = FrictionPolyhedron(normal, mu, n), FrictionPolyhedron(normal, mu, n, inside=False)
+    inner, outer = FrictionPolyhedron(normal, mu, n), FrictionPolyhedron(normal, mu, n, inner_approximation=False)
     for ray in inner.rays:
         assert slips(ray, normal, mu) == pytest.approx(0.0, abs=1e-9)
-    for direction in inner.rows + inner.mu_facet * normal:
+    for direction in inner.face_matrix + inner.mu_facet * normal:
         assert np.linalg.norm(direction) == pytest.approx(1.0)
         assert inner.margin(normal + mu * np.cos(np.pi / n) * direction) == pytest.approx(0.0, abs=1e-9)
         assert outer.margin(normal + mu * direction) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_margin_is_the_force_that_may_be_added_along_the_nearest_facet() -> None:
-    cone = FrictionPolyhedron([0.0, 0.0, 1.0], 0.5, 4, inside=False)
+    cone = FrictionPolyhedron([0.0, 0.0, 1.0], 0.5, 4, inner_approximation=False)
     assert cone.margin([0.0, 0.0, 10.0]) == pytest.approx(5.0)
     assert cone.margin([3.0, 0.0, 10.0]) == pytest.approx(2.0)
     assert cone.margin([0.0, -7.0, 10.0]) == pytest.approx(-2.0)
@@ -175,9 +175,9 @@ def test_the_margin_is_the_force_that_may_be_added_along_the_nearest_facet() -> 
 
 
 def test_facet_0_looks_along_the_worlds_x_and_the_next_one_along_y() -> None:
-    cone = FrictionPolyhedron([0.0, 0.0, 1.0], 1.0, 4, inside=False)
-    assert np.allclose(cone.rows[0], [1.0, 0.0, -1.0])
-    assert np.allclose(cone.rows[1], [0.0, 1.0, -1.0])
+    cone = FrictionPolyhedron([0.0, 0.0, 1.0], 1.0, 4, inner_approximation=False)
+    assert np.allclose(cone.face_matrix[0], [1.0, 0.0, -1.0])
+    assert np.allclose(cone.face_matrix[1], [0.0, 1.0, -1.0])
 
 
 @given(seeds, facets, mus, st.booleans(), st.floats(-10.0, 10.0))
@@ -186,10 +186,10 @@ def test_turned_facets_are_the_facets_turned_about_the_normal(seed: int, n: int,
     turned, straight = (FrictionPolyhedron(normal, mu, n, inside, angle) for angle in (turn, 0.0))
     about = Rotation.from_rotvec(turn * normal).as_matrix()
     size = 1.0 + mu
-    assert np.allclose(turned.rows, straight.rows @ about.T, rtol=0, atol=1e-9 * size)
+    assert np.allclose(turned.face_matrix, straight.face_matrix @ about.T, rtol=0, atol=1e-9 * size)
     assert np.allclose(turned.rays, straight.rays @ about.T, rtol=0, atol=1e-9 * size / np.cos(np.pi / n))
     whole = FrictionPolyhedron(normal, mu, n, inside, turn + 2 * np.pi / n)
-    assert np.allclose(np.roll(turned.rows, -1, axis=0), whole.rows, rtol=0, atol=1e-9 * size)
+    assert np.allclose(np.roll(turned.face_matrix, -1, axis=0), whole.face_matrix, rtol=0, atol=1e-9 * size)
 
 
 @given(seeds)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from floatbase.friction import cone_rows, vertices
+from floatbase.friction import cone_face_matrix, polytope_vertices
 
 Array = npt.NDArray[np.float64]
 seeds = st.integers(0, 100_000)
@@ -26,7 +26,7 @@ def test_rows_hold_for_just_what_the_rays_make(seed: int, n: int, N: int) -> Non
     """Any rays: too few to span the space, enough, or so many that they make lines or everything."""
     rng = np.random.default_rng(seed)
     rays = rng.normal(size=(n, N)) + rng.uniform(0, 1.5) * np.eye(n)[:, :1]
-    G, E = cone_rows(rays)
+    G, E = cone_face_matrix(rays)
     assert len(E) == n - np.linalg.matrix_rank(rays)
     assert np.allclose(E @ rays, 0.0, atol=1e-9)
     assert np.max(G @ rays, initial=0.0) <= 1e-9
@@ -38,16 +38,16 @@ def test_rows_hold_for_just_what_the_rays_make(seed: int, n: int, N: int) -> Non
 
 def test_every_row_is_a_facet() -> None:
     rays = np.random.default_rng(0).normal(size=(6, 20)) + 2.5 * np.eye(6)[:, :1]
-    for row in cone_rows(rays)[0]:
+    for row in cone_face_matrix(rays)[0]:
         assert np.linalg.matrix_rank(rays[:, np.abs(row @ rays) < 1e-9]) == 5
 
 
 def test_a_half_space_has_one_row_and_the_whole_space_none() -> None:
     lines = np.array([[1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])
-    G, E = cone_rows(lines)
+    G, E = cone_face_matrix(lines)
     assert np.allclose(G, [[0.0, 0.0, -1.0]])
     assert E.shape == (0, 3)
-    G, E = cone_rows(np.hstack([np.eye(3), -np.eye(3)]))
+    G, E = cone_face_matrix(np.hstack([np.eye(3), -np.eye(3)]))
     assert G.shape == (0, 3)
     assert E.shape == (0, 3)
 
@@ -62,7 +62,7 @@ def points_of(rng: np.random.Generator, n: int, rank: int) -> Array:
 def test_vertices_are_those_of_the_hull_whatever_its_dimension(seed: int, n: int, rank: int) -> None:
     rank = min(rank, n)
     points = points_of(np.random.default_rng(seed), n, rank)
-    found = vertices(lambda direction: points[int(np.argmax(points @ direction))], n, 1.0)
+    found = polytope_vertices(lambda direction: points[int(np.argmax(points @ direction))], n, 1.0)
     if rank == 0:
         assert np.allclose(found, points[:1])
         return
@@ -77,7 +77,7 @@ def test_points_on_an_edge_are_no_vertices_and_the_plane_is_walked_counter_clock
     square = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 1.0]])
     # the worst answer that is allowed: among the farthest, the one in the middle of the edge
     middle = np.array([0.0, 1e-12, 0.0, 0.0, 0.0, 1e-12])
-    found = vertices(lambda d: square[int(np.argmax(square @ d + middle))], 2, 2.0)
+    found = polytope_vertices(lambda d: square[int(np.argmax(square @ d + middle))], 2, 2.0)
     assert len(found) == 4
     x, y = found.T
     assert 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) == pytest.approx(4.0)

@@ -21,7 +21,7 @@ import floatbase as fb
 from floatbase.dynamics import LinearConstraint
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction import FrictionPolyhedron, WrenchSet, wrench_set
-from floatbase.objectives import com_wrench
+from floatbase.objectives import com_wrench_map
 
 seeds = st.integers(0, 100_000)
 UP = np.array([0.0, 0.0, 1.0])
@@ -115,7 +115,7 @@ def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra
     state, contacts = stance(name, feet, 0.5)
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=True)
     inner = wrench_set(state, contacts, facets=6)
-    outer = wrench_set(state, contacts, facets=6, inside=False)
+    outer = wrench_set(state, contacts, facets=6, inner_approximation=False)
     for w in random_wrenches(inner, 16, seed=3):
         exact = judge.margin(state.com, w)
         assert inner.margin(w) < 1e-4 or exact > -1e-4
@@ -125,7 +125,7 @@ def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra
 def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays() -> None:
     state, contacts = stance("go2", 3, 0.5)
     wrenches = wrench_set(state, contacts, facets=5)
-    G = com_wrench(state, contacts).A
+    G = com_wrench_map(state, contacts).A
     for i, cone in enumerate(wrenches.cones):
         forces = np.zeros((9, 5))
         forces[3 * i : 3 * i + 3] = cone.rays.T
@@ -137,10 +137,10 @@ def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays() -> None:
 def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: int) -> None:
     state, contacts = stance(name, feet, 0.4)
     wrenches = wrench_set(state, contacts, facets=facets)
-    rows, E, rays = wrenches.rows, wrenches.equalities, wrenches.rays
+    rows, E, rays = wrenches.face_matrix, wrenches.equalities, wrenches.rays
     assert np.max(rows @ rays) <= 1e-9
     assert np.max(np.abs(E @ rays), initial=0.0) <= 1e-9
-    scale = np.repeat([1.0, wrenches.arm], 3)
+    scale = np.repeat([1.0, wrenches.max_lever_arm], 3)
     assert np.allclose(np.linalg.norm(rows * scale, axis=1), 1.0)
     # the other way round: the farthest that the rows allow in any direction is made by the rays
     rng = np.random.default_rng(feet)
@@ -167,7 +167,7 @@ def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line
     if feet == 2:
         a, b = wrenches.points
         # (a - b) · (τ + (x_c - a) × f): the moment about the line through a and b
-        about_line = np.concatenate([np.cross(a - b, wrenches.about - a), a - b])
+        about_line = np.concatenate([np.cross(a - b, wrenches.reference_point - a), a - b])
         row = wrenches.equalities[0]
         assert np.linalg.matrix_rank(np.vstack([row / np.linalg.norm(row), about_line]), tol=1e-9) == 1
         assert wrenches.margin(np.concatenate([np.zeros(3), a - b])) == -np.inf
@@ -203,23 +203,23 @@ def test_reach_is_where_membership_ends() -> None:
     wrenches = wrench_set(state, contacts, max_normal_force=400.0)
     start = wrenches.rays @ np.full(wrenches.rays.shape[1], 30.0)
     for direction in np.random.default_rng(1).normal(size=(10, 6)):
-        far = wrenches.reach(direction, start)
+        far = wrenches.max_scaling(direction, start)
         assert 0 < far < np.inf
         assert wrenches.contains(start + (far - 1e-3) * direction)
         assert not wrenches.contains(start + (far + 1e-2) * direction)
-        assert wrenches.reach(5.0 * direction, start) == pytest.approx(far / 5.0, rel=1e-6)
+        assert wrenches.max_scaling(5.0 * direction, start) == pytest.approx(far / 5.0, rel=1e-6)
 
 
 def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight() -> None:
     """Without torque about a CoM at the height of the ground, only friction ends it."""
     wrenches = of([[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]], [UP] * 4, 0.5, 4, inside=False)
     carrying = [0.0, 0.0, 100.0, 0.0, 0.0, 0.0]
-    assert wrenches.reach([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(50.0)
-    assert wrenches.reach([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], carrying) == np.inf
-    assert wrenches.reach([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(100.0)
-    assert wrenches.reach([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0]) == np.inf
+    assert wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(50.0)
+    assert wrenches.max_scaling([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], carrying) == np.inf
+    assert wrenches.max_scaling([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(100.0)
+    assert wrenches.max_scaling([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0]) == np.inf
     with raises(InfeasibleError, "start", "direction"):
-        wrenches.reach([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+        wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
 def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
@@ -234,8 +234,8 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
         (4, np.pi / 4, rear, facet, half),  # edges do
         (16, 0.0, rear, 0.7 * np.cos(np.pi / 16), half),
     ):
-        wrenches = wrench_set(state, contacts, facets=facets, turn=turn)
-        angles, forces = wrenches.horizontal_reach(8)
+        wrenches = wrench_set(state, contacts, facets=facets, facet_rotation=turn)
+        angles, forces = wrenches.max_horizontal_forces(8)
         assert np.allclose(angles, np.pi / 4 * np.arange(8))
         assert forces[[0, 1, 2, 6, 7]] / wrenches.weight == pytest.approx(
             [forwards, diagonally, sideways, sideways, diagonally], rel=1e-6
@@ -251,7 +251,7 @@ def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(name: st
     state, contacts = stance(name, feet, 0.4)
     limit = None if limit is None else limit / 150.0 * state.robot.weight
     wrenches = wrench_set(state, contacts, max_normal_force=limit)
-    corners = wrenches.torques()
+    corners = wrenches.moment_vertices()
     carried = np.array([0.0, 0.0, state.robot.weight])
     assert len(corners) >= 4
     assert all(wrenches.contains(np.concatenate([carried, corner]), tolerance=1e-4) for corner in corners)
@@ -278,17 +278,17 @@ def wrenches_limits(wrenches: WrenchSet) -> tuple[Array | None, Array | None]:
 def test_slices_of_stances_without_area_are_flat() -> None:
     state, contacts = stance("go2", 1)
     f = wrench_set(state, contacts).cones[0].rays[0] * 40.0
-    one = wrench_set(state, contacts).torques(f)
+    one = wrench_set(state, contacts).moment_vertices(f)
     assert np.allclose(one, [np.cross(contacts.positions(state)[0] - state.com, f)])
     state, contacts = stance("go2", 2)
-    two = wrench_set(state, contacts).torques()
+    two = wrench_set(state, contacts).moment_vertices()
     assert np.linalg.matrix_rank(two - two[0], tol=1e-7) == 2
 
 
 def test_a_force_that_pulls_has_no_torques() -> None:
     state, contacts = stance("go2", 4)
-    assert wrench_set(state, contacts).torques([0.0, 0.0, -1.0]).shape == (0, 3)
-    assert np.allclose(wrench_set(state, contacts).torques(np.zeros(3)), np.zeros((1, 3)))
+    assert wrench_set(state, contacts).moment_vertices([0.0, 0.0, -1.0]).shape == (0, 3)
+    assert np.allclose(wrench_set(state, contacts).moment_vertices(np.zeros(3)), np.zeros((1, 3)))
 
 
 # where a robot can stand
@@ -389,13 +389,13 @@ def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
     limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
     assert limited.contains([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])
     assert len(limited.support_region()) >= 3
-    assert len(limited.torques()) >= 4
+    assert len(limited.moment_vertices()) >= 4
 
 
 def test_a_grip_from_all_sides_makes_every_wrench() -> None:
     directions = np.vstack([np.eye(3), -np.eye(3)])
     grip = of(directions, -directions, 0.7)
-    assert grip.rows.shape == (0, 6) and grip.equalities.shape == (0, 6)
+    assert grip.face_matrix.shape == (0, 6) and grip.equalities.shape == (0, 6)
     assert all(grip.margin(w) == np.inf for w in np.random.default_rng(0).normal(size=(5, 6)))
 
 
@@ -407,7 +407,7 @@ def test_a_grip_from_all_sides_makes_every_wrench() -> None:
 def test_moving_everything_changes_nothing(seed: int) -> None:
     here = feet_on_slopes(seed)
     step = np.random.default_rng(seed).normal(size=3)
-    there = WrenchSet(here.points + step, here.cones, here.about + step, here.weight, here.max_normal_force)
+    there = WrenchSet(here.points + step, here.cones, here.reference_point + step, here.weight, here.max_normal_force)
     assert np.allclose(there.rays, here.rays)
     region, moved = here.support_region(), there.support_region()
     assert region.shape == moved.shape
@@ -444,12 +444,12 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
         (lambda: wrench_set(state, contacts, max_normal_force=0.0), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force="much"), "max_normal_force", 4),
-        (lambda: wrench_set(state, contacts, max_normal_force=9.0).rows, "rows", "max_normal_force"),
+        (lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix, "rows", "max_normal_force"),
         (lambda: wrench_set(state, contacts).margin(np.zeros(3)), "wrench", 3, 6),
-        (lambda: wrench_set(state, contacts).reach([np.nan] * 6), "direction", np.nan),
-        (lambda: wrench_set(state, contacts).reach(np.zeros(6)), "direction"),
-        (lambda: wrench_set(state, contacts).horizontal_reach(0), "n", 0),
-        (lambda: wrench_set(state, contacts).torques([1.0]), "force", 1, 3),
+        (lambda: wrench_set(state, contacts).max_scaling([np.nan] * 6), "direction", np.nan),
+        (lambda: wrench_set(state, contacts).max_scaling(np.zeros(6)), "direction"),
+        (lambda: wrench_set(state, contacts).max_horizontal_forces(0), "n", 0),
+        (lambda: wrench_set(state, contacts).moment_vertices([1.0]), "force", 1, 3),
         (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "cones", "FrictionPolyhedron", 2),
     ):
         refused(call, InputError, *named)

@@ -6,7 +6,7 @@ from importlib import import_module
 
 import pytest
 
-from floatbase.dynamics import MOTION_NOISE
+from floatbase.dynamics import CONSTRAINT_NOISE
 from floatbase.lessons.publish import conventions, equations
 from floatbase.linear_algebra import RANK_TOLERANCE
 from floatbase.qp import FEASIBILITY_TOLERANCE
@@ -36,7 +36,7 @@ def test_a_test_counts_only_where_it_names_the_function(entries: list[equations.
 def test_the_page_of_conventions_shows_values_of_three_rooms_and_a_reason_for_every_tolerance() -> None:
     shown = {(file, name): value for file, name, value, _ in conventions.tolerances()}
     assert float(shown["linear_algebra", "RANK_TOLERANCE"]) == RANK_TOLERANCE
-    assert float(shown["dynamics/resolve", "MOTION_NOISE"]) == MOTION_NOISE
+    assert float(shown["dynamics/constraint_rank", "CONSTRAINT_NOISE"]) == CONSTRAINT_NOISE
     assert float(shown["qp/conflicts", "FEASIBILITY_TOLERANCE"]) == FEASIBILITY_TOLERANCE
     assert shown["qp/solve", "CLARABEL"] == "(1e-12, 1e-10, 1e-8)"
     assert all(len(reason) > 15 for *_, reason in conventions.tolerances())

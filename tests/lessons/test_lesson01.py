@@ -10,7 +10,7 @@ from hints import right
 
 import floatbase as fb
 from floatbase.lessons import joint_servo, lesson01
-from floatbase.robots import PLATE, Foot, Robot, unbolted
+from floatbase.robots import PLATE_SIZE, Foot, Robot, with_floating_base
 
 WIDE_ENOUGH = 0.6596  # m: by hand, 2 (120 N · 0.6340 m / 205.95 N - 0.0396 m)
 
@@ -26,7 +26,7 @@ def go2() -> Robot:
 
 
 def test_a_servo_follows_its_path_at_its_ends(arm: Robot) -> None:
-    state = unbolted(arm).standing()
+    state = with_floating_base(arm).standing()
     path = lesson01.turn(joint=2, angle=0.7, duration=1.5)
     assert np.allclose(path(0.0), 0.0)
     assert np.allclose(path(9.0), 0.7 * np.eye(6)[2])
@@ -61,12 +61,12 @@ def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(go2: Robot, 
 @pytest.fixture(scope="module")
 def pressing(arm: Robot) -> Robot:
     """The arm on its plate."""
-    return unbolted(arm, plate=True)
+    return with_floating_base(arm, plate=True)
 
 
 def outcome(pressing: Robot, width: float, press: float) -> str:
     """How two seconds of pressing end on a plate of that width, m, on the physics engine."""
-    corners = [[x * width / 2, y * width / 2, -PLATE[1]] for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    corners = [[x * width / 2, y * width / 2, -PLATE_SIZE[1]] for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
     robot = replace(pressing, feet=(Foot(pressing.base, corners=np.array(corners)),))
     state, force = robot.standing(), np.array([-press, 0.0, 0.0])
     hold = (state.h - state.frame_jacobian("tool0")[:3].T @ force)[6:]

@@ -25,7 +25,7 @@ from floatbase.lessons.lesson06 import (
     uphill,
     with_feet,
 )
-from floatbase.objectives import com_wrench
+from floatbase.objectives import com_wrench_map
 from floatbase.viewer import CONE, GREYS, MEASURED, Picture, hexadecimal, shapes
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -35,10 +35,10 @@ SOLVED = 1e-5  # N: what the QP solver leaves in rows of forces up to 200 N
 
 def test_the_smallest_cost_within_rows_is_found() -> None:
     cost = fb.Quadratic.from_residual(np.eye(3), [3.0, 0.0, 1.0])
-    rows = FrictionPolyhedron(UP, 0.5, 4).rows
+    rows = FrictionPolyhedron(UP, 0.5, 4).face_matrix
     found = least_inside(cost, rows)
     assert np.allclose(found, FrictionPolyhedron(UP, 0.5, 4).project([3.0, 0.0, 1.0]), atol=SOLVED)
-    assert np.allclose(least_inside(cost, FrictionPolyhedron(UP, 5.0, 4).rows), [3.0, 0.0, 1.0], atol=SOLVED)
+    assert np.allclose(least_inside(cost, FrictionPolyhedron(UP, 5.0, 4).face_matrix), [3.0, 0.0, 1.0], atol=SOLVED)
 
 
 def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed() -> None:
@@ -63,7 +63,7 @@ def test_dearer_moments_are_missed_by_less() -> None:
         controller = ConeController(state.robot, rose_controller().contacts, state, moment_weight=weight)
         forces = controller(aside.q, aside.v).forces
         assert forces is not None
-        gaps.append(abs(com_wrench(aside, controller.contacts).A @ forces - np.concatenate(controller.wish(aside))))
+        gaps.append(abs(com_wrench_map(aside, controller.contacts).A @ forces - np.concatenate(controller.wish(aside))))
     (force, moment), (force_then, moment_then) = ((each[:3].max(), each[3:].max()) for each in gaps)
     assert moment_then < 0.5 * moment and force_then > force > 1.0
 
@@ -131,7 +131,7 @@ def test_the_pictures_are_drawn() -> None:
     finally:
         view.close()
     state, contacts = robot.standing(), fb.Contacts.points(robot)
-    figure = compass_row(one=wrench_set(state, contacts), two_turned=wrench_set(state, contacts, turn=np.pi / 4))
+    figure = compass_row(one=wrench_set(state, contacts), two_turned=wrench_set(state, contacts, facet_rotation=np.pi / 4))
     assert [axis.get_title() for axis in figure.axes] == ["one", "two turned"]
     feet = contacts.positions(state)
     assert region_picture(state, feet, feet[[0, 1, 3, 2], :2]).count("<polygon") == 2

@@ -49,7 +49,7 @@ SOLVED = 0.05  # N, and N·m: what a least-squares fit with a small cost on forc
 
 @cache
 def limits() -> WrenchSet:
-    return replace(wrench_set(STATE, LEFT), about=MIDDLE)
+    return replace(wrench_set(STATE, LEFT), reference_point=MIDDLE)
 
 
 @cache
@@ -100,11 +100,11 @@ def test_how_a_record_ended_in_words() -> None:
 def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_where_they_do_not() -> None:
     possible = np.array([20.0, -30.0, 443.0, 5.0, -12.0, 6.0])
     forces = corner_forces(STATE, LEFT, possible)
-    assert np.max(limits().rows @ possible) < 0.0
+    assert np.max(limits().face_matrix @ possible) < 0.0
     assert np.allclose(contact_wrench(STATE, LEFT, forces, MIDDLE), possible, atol=SOLVED)
     beyond = np.array([0.0, 0.0, 443.0, 0.0, -60.0, 0.0])  # beyond the toes
     nearest = contact_wrench(STATE, LEFT, corner_forces(STATE, LEFT, beyond), MIDDLE)
-    assert np.max(limits().rows @ nearest) < SOLVED and not np.allclose(nearest, beyond, atol=1.0)
+    assert np.max(limits().face_matrix @ nearest) < SOLVED and not np.allclose(nearest, beyond, atol=1.0)
 
 
 def test_rows_of_a_sole_have_names() -> None:
@@ -156,7 +156,7 @@ def test_the_slice_is_as_wide_as_the_sole_and_as_high_as_the_twist(view: fb.View
     assert points is not None
     corners = np.array([[float(x) for x in pair.split(",")] for pair in points[1].split()])
     assert np.allclose(np.ptp(corners[:, 0]) * 300 / 300, 200.0, atol=2.0)  # mm
-    most = limits().reach([0, 0, 0, 0, 0, 1], weight)
+    most = limits().max_scaling([0, 0, 0, 0, 0, 1], weight)
     assert np.allclose(np.ptp(corners[:, 1]) * 120 / 250, 2 * most, atol=1.0)  # N·m
 
 

@@ -133,7 +133,7 @@ def test_a_stopped_solver_keeps_its_rows_for_the_next_tick_only_when_it_is_warm(
         for _ in range(40):
             solver(qp)
         assert {run.solution.iterations for run in solver.runs} == {1}
-        assert not solver.runs[0].finished and solver.runs[-1].finished == warm
+        assert not solver.runs[0].converged and solver.runs[-1].converged == warm
         if warm:
             assert np.allclose(solver.runs[-1].solution.x, solve(qp).x, atol=1e-7)
 

@@ -68,11 +68,11 @@ def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
     for state in judges.states(name, 3):
         judge, contacts = judges.Mujoco(state.robot).move_to(state), judges.stance(state.robot)
         found = mujocos_momentum(judge, judge.data.qpos.copy(), judge.data.qvel.copy())
-        assert judges.relative(objectives.momentum(state), found) < 1e-9
+        assert judges.relative(objectives.centroidal_momentum(state), found) < 1e-9
         forces = state.robot.weight * rng.normal(size=contacts.k)
         rate, qdd = mujocos_momentum_rate(state, contacts, forces, rng.normal(size=state.robot.d))
-        assert np.allclose(objectives.momentum_rate(state, qdd), rate, atol=1e-6 * np.abs(forces).sum())
-        still = objectives.momentum_rate(state, np.zeros(state.robot.nv))  # q̇ turns and carries the momentum along, too
+        assert np.allclose(objectives.centroidal_momentum_rate(state, qdd), rate, atol=1e-6 * np.abs(forces).sum())
+        still = objectives.centroidal_momentum_rate(state, np.zeros(state.robot.nv))  # q̇ carries the momentum along, too
         assert not np.allclose(still, rate, atol=1e-2 * np.abs(forces).sum())
 
 
@@ -97,7 +97,7 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
         forces = state.robot.weight * rng.normal(size=contacts.k)
         tau = 5.0 * seed * rng.normal(size=state.robot.d)
         rate = mujocos_momentum_rate(state, contacts, forces, tau)[0]
-        wrench = objectives.com_wrench(state, contacts)
+        wrench = objectives.com_wrench_map(state, contacts)
         gravity = np.array([0.0, 0.0, -state.robot.mass * 9.81])
         scale = np.abs(forces).sum()
         assert np.allclose(wrench["force"](forces), rate[:3] - gravity, atol=1e-6 * scale)
@@ -111,7 +111,7 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_1
     left = contacts.positions(state)[:, 1] > 0
     up = np.zeros((4, 3))
     up[left, 2] = 10.0
-    moment = objectives.moment_sum(state, contacts) @ up.ravel()
+    moment = objectives.net_moment_matrix(state, contacts) @ up.ravel()
     assert moment[0] > 1.0
     rate = mujocos_momentum_rate(state, contacts, up.ravel(), np.zeros(12))[0][3:]
     footnote = sum(np.cross(state.com - x, f) for x, f in zip(contacts.positions(state), up, strict=True))
@@ -122,7 +122,7 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_1
 def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name: str) -> None:
     """(20) prints three blocks for four feet."""
     contacts = judges.stance(judges.load(name))
-    G_f = objectives.force_sum(contacts)
+    G_f = objectives.net_force_matrix(contacts)
     assert G_f.shape == (3, 3 * contacts.n_points)
     for block in np.split(G_f, contacts.n_points, axis=1):
         assert np.array_equal(block, np.eye(3))
@@ -134,7 +134,7 @@ def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name:
     state = judges.load(name).random_state(0)
     contacts = judges.stance(state.robot)
     eom = fb.equations_of_motion(state, contacts)
-    G = objectives.com_wrench(state, contacts).A
+    G = objectives.com_wrench_map(state, contacts).A
     assert np.linalg.matrix_rank(G) == 6
     assert np.allclose(G @ dynamics.internal_forces(eom), 0.0, atol=1e-9)
     assert dynamics.internal_forces(eom).shape[1] == contacts.k - 6
@@ -167,7 +167,7 @@ def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
     got = {}
     for weight in (1.0, 1e6):
         cost = objectives.wrench_objective(state, contacts, force, moment, moment_weight=weight).pullback(zeta)
-        got[weight] = objectives.com_wrench(state, contacts)(zeta(cost.minimiser()))
+        got[weight] = objectives.com_wrench_map(state, contacts)(zeta(cost.minimiser()))
     missed = {weight: wrench - np.concatenate([force, moment]) for weight, wrench in got.items()}
     assert np.linalg.norm(missed[1.0][:3]) < 0.1 < 0.15 < np.linalg.norm(missed[1.0][3:])
     assert np.linalg.norm(missed[1e6][3:]) < 1e-3 and np.linalg.norm(missed[1e6][:3]) > 4.9
@@ -240,10 +240,10 @@ def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() ->
 @pytest.mark.parametrize(("name", "sign"), [("solo8", -1), ("go2", 0), ("solo12", 0), ("anymal_kinova", 1)])
 def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(name: str, sign: int) -> None:
     eom = judges.at_rest(name, 0)
-    found = objectives.torque_for_forces(eom)
+    found = objectives.torques_from_forces(eom)
     assert np.sign(eom.d - eom.k) == sign
     assert found.reachable.n_in == (9 if name == "solo8" else 12)  # solo8: 8 torques and one null(Jᵀ)
-    assert found.free_torques.shape[1] == max(eom.d - eom.k, 0)
+    assert found.null_torques.shape[1] == max(eom.d - eom.k, 0)
 
 
 @pytest.mark.parametrize("seed", [None, 0, 1])
@@ -252,10 +252,10 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
     """min ½‖τ‖² over (q̈, τ) with (7) and λ given; a force that solo8 can give is drawn from what random torques give."""
     rng = np.random.default_rng(0)
     eom = judges.at_rest(name, seed)
-    found = objectives.torque_for_forces(eom)
+    found = objectives.torques_from_forces(eom)
     tau0 = rng.normal(size=eom.d)
     expected = dynamics.forces_from_torques(eom)(tau0)
-    assert found.gap(expected) < 1e-6 * np.linalg.norm(expected)
+    assert found.distance(expected) < 1e-6 * np.linalg.norm(expected)
     tau = found.torque(expected)
     qdd = judges.aba(eom, tau, expected)
     assert np.max(np.abs(eom.A @ qdd - eom.b)) < 1e-6 * max(1.0, np.abs(qdd).max())
@@ -275,14 +275,14 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
 
 def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> None:
     eom = judges.at_rest("anymal_kinova", 0)
-    found = objectives.torque_for_forces(eom)
+    found = objectives.torques_from_forces(eom)
     rng = np.random.default_rng(0)
     tau = rng.normal(size=eom.d)
     zeta, eta = dynamics.forces_from_torques(eom), dynamics.accelerations_from_torques(eom)
-    more = found.free_torques @ rng.normal(size=found.free_torques.shape[1])
+    more = found.null_torques @ rng.normal(size=found.null_torques.shape[1])
     assert np.allclose(zeta(tau + more), zeta(tau), atol=1e-8)
     assert np.linalg.norm(eta(tau + more) - eta(tau)) > 1e-2
-    assert np.allclose(found.free_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8)  # the smallest has none of them
+    assert np.allclose(found.null_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8)  # the smallest has none of them
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7])
@@ -292,7 +292,7 @@ def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_ra
     desired = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
     rng = np.random.default_rng(0)
     near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).replace(v=0.1 * rng.normal(size=14))
-    there, here = (objectives.torque_for_forces(fb.equations_of_motion(s, contacts)).torque(desired) for s in (standing, near))
+    there, here = (objectives.torques_from_forces(fb.equations_of_motion(s, contacts)).torque(desired) for s in (standing, near))
     assert np.max(np.abs(here - there)) < 0.3  # N·m
 
 
@@ -301,7 +301,7 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
     for seed in (None, 0, 1):
         eom = judges.at_rest("solo8", seed)
         found, zeta, N = (
-            objectives.torque_for_forces(eom),
+            objectives.torques_from_forces(eom),
             dynamics.forces_from_torques(eom),
             dynamics.undetermined_forces(eom),
         )
@@ -310,10 +310,10 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
         reach = zeta.A @ tau + zeta.b + N @ unseen
         cp.Problem(cp.Minimize(cp.sum_squares(reach - desired))).solve(**TIGHT)
         nearest = reach.value
-        assert found.gap(desired) > 1.0
-        assert found.gap(desired) == pytest.approx(np.linalg.norm(nearest - desired), rel=1e-5)
+        assert found.distance(desired) > 1.0
+        assert found.distance(desired) == pytest.approx(np.linalg.norm(nearest - desired), rel=1e-5)
         assert np.allclose(found.nearest(desired), nearest, atol=1e-4)
-        assert found.gap(found.nearest(desired)) < 1e-7
+        assert found.distance(found.nearest(desired)) < 1e-7
         again = zeta(found.torque(found.nearest(desired)))
         assert np.allclose(eom.J.T @ again, eom.J.T @ found.nearest(desired), atol=1e-5)
 
@@ -321,22 +321,22 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
 @pytest.mark.parametrize("name", ["go2", "anymal_kinova"])
 def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
     eom = judges.at_rest(name, 1)
-    found = objectives.torque_for_forces(eom)
+    found = objectives.torques_from_forces(eom)
     desired = 30.0 * np.random.default_rng(0).normal(size=eom.k)
-    assert found.gap(desired) < 1e-8
+    assert found.distance(desired) < 1e-8
     assert np.allclose(found.nearest(desired), desired, atol=1e-8)
     assert np.allclose(dynamics.forces_from_torques(eom)(found.torque(desired)), desired, atol=1e-6)
 
 
 def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration() -> None:
-    """What `TorqueForForces` promises for d < k: min ‖J q̈ - b‖ with that λ, then the smallest τ."""
+    """What `TorquesFromForces` promises for d < k: min ‖J q̈ - b‖ with that λ, then the smallest τ."""
     eom = judges.at_rest("solo8", 0)
     desired = 10.0 * np.random.default_rng(3).normal(size=12)
     x = cp.Variable(8)
     free = np.linalg.solve(eom.M, eom.J.T @ desired - eom.h)
     gap = eom.A @ free + eom.A @ np.linalg.solve(eom.M, eom.S) @ x - eom.b
     cp.Problem(cp.Minimize(cp.sum_squares(gap))).solve(**TIGHT)
-    tau = objectives.torque_for_forces(eom).torque(desired)
+    tau = objectives.torques_from_forces(eom).torque(desired)
     left = eom.A @ judges.aba(eom, tau, desired) - eom.b
     assert np.linalg.norm(left) > 1.0
     assert np.linalg.norm(left) == pytest.approx(np.linalg.norm(gap.value), rel=1e-6)
@@ -354,7 +354,7 @@ EOM = fb.equations_of_motion(STATE, FEET)
 @pytest.mark.parametrize(
     "case",
     [
-        (lambda: objectives.com_wrench(STATE, MIXED), "bolts of base"),
+        (lambda: objectives.com_wrench_map(STATE, MIXED), "bolts of base"),
         (lambda: objectives.wrench_objective(STATE, MIXED, np.zeros(3), np.zeros(3)), "bolts of base"),
         (lambda: objectives.tangential_bias(MIXED), "bolts of base"),
         (lambda: objectives.force_bias(MIXED, 1.0, 0.0), "bolts of base"),
@@ -365,11 +365,11 @@ EOM = fb.equations_of_motion(STATE, FEET)
         (lambda: objectives.force_bias(FEET, -1.0, 10.0), "alpha", -1),
         (lambda: objectives.wrench_objective(STATE, FEET, [1.0, 2.0], np.zeros(3)), "force", 2, 3),
         (lambda: objectives.desired_wrench(STATE, [0.0, 0.0]), "com_acceleration", 2, 3),
-        (lambda: objectives.torque_for_forces(EOM).gap(np.zeros(9)), "forces", 9, 12),
-        (lambda: objectives.torque_for_forces(EOM).nearest(np.zeros(9)), "forces", 9, 12),
+        (lambda: objectives.torques_from_forces(EOM).distance(np.zeros(9)), "forces", 9, 12),
+        (lambda: objectives.torques_from_forces(EOM).nearest(np.zeros(9)), "forces", 9, 12),
         (lambda: objectives.cost_on_torques(Quadratic.zero(12), EOM), 18, 12),
         (
-            lambda: objectives.seen_from_best(Quadratic.zero(12), fb.feasible_space(EOM), "lambda"),
+            lambda: objectives.partial_minimum(Quadratic.zero(12), fb.feasible_space(EOM), "lambda"),
             "lambda", "qdd", "tau", "forces",
         ),
     ],

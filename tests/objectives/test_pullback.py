@@ -135,14 +135,14 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name: 
     residuals = costs(eom)
     space = dynamics.feasible_space(eom)
     cost = objectives.cost_on_space(space, **as_quadratics(residuals))
-    best, smallest = (f(cost, space, block) for f in (objectives.seen_from_best, objectives.seen_from_smallest))
+    best, smallest = (f(cost, space, block) for f in (objectives.partial_minimum, objectives.minimum_norm_pullback))
     rng = np.random.default_rng(0)
     for seed in range(2):
         x = space.map[block](3.0 * rng.normal(size=space.dimension))
         assert best(x) <= smallest(x) * (1 + 1e-9)
         if seed == 0:
             assert best(x) == pytest.approx(least(eom, residuals, {block: x}), rel=1e-6)
-        beta = objectives.best_coordinates(cost, space, block)(x)
+        beta = objectives.argmin_coordinates(cost, space, block)(x)
         assert np.allclose(space.map[block](beta), x, atol=1e-7 * max(1.0, np.abs(x).max()))
 
 
@@ -154,7 +154,7 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
         space, found = dynamics.feasible_space(eom), dynamics.dimensions(eom)
         assert (found.rank_V_qdd == found.null_B) == agree
         cost = objectives.cost_on_space(space, **as_quadratics(costs(eom)))
-        best, smallest = (f(cost, space, "qdd") for f in (objectives.seen_from_best, objectives.seen_from_smallest))
+        best, smallest = (f(cost, space, "qdd") for f in (objectives.partial_minimum, objectives.minimum_norm_pullback))
         rng = np.random.default_rng(0)
         for _ in range(4):
             x = space.qdd(rng.normal(size=space.dimension))
@@ -172,7 +172,7 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
         forces=Quadratic.from_residual(sideways, np.zeros(12)),
     )
     still = np.zeros(18)
-    smallest, best = (f(cost, space, "qdd")(still) for f in (objectives.seen_from_smallest, objectives.seen_from_best))
+    smallest, best = (f(cost, space, "qdd")(still) for f in (objectives.minimum_norm_pullback, objectives.partial_minimum))
     expected = least(
         eom, {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))}, {"qdd": still}
     )
@@ -187,10 +187,10 @@ def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
     eom = fb.equations_of_motion(robot.standing(), contacts)
     space = dynamics.feasible_space(eom)
     assert np.max(np.abs(space.qdd.A)) < 1e-10
-    assert np.max(np.abs(objectives.smallest_coordinates(space, "qdd").A)) < 1e6
+    assert np.max(np.abs(objectives.minimum_norm_coordinates(space, "qdd").A)) < 1e6
     cost = objectives.cost_on_space(space, tau=Quadratic.from_residual(np.eye(12), np.zeros(12)))
     least = cost(cost.minimiser())  # q̈ leaves everything free
-    assert objectives.seen_from_best(cost, space, "qdd")(np.zeros(18)) == pytest.approx(least, abs=1e-6)
+    assert objectives.partial_minimum(cost, space, "qdd")(np.zeros(18)) == pytest.approx(least, abs=1e-6)
 
 
 def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
@@ -199,10 +199,10 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
     space = dynamics.feasible_space(eom)
     squeeze = dynamics.internal_forces(eom)[:, 0]
     reward = objectives.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
-    for call in (objectives.seen_from_best, objectives.best_coordinates):
+    for call in (objectives.partial_minimum, objectives.argmin_coordinates):
         with raises(InputError):
             call(reward, space, "qdd")
-    assert np.isfinite(objectives.seen_from_smallest(reward, space, "qdd")(np.zeros(18)))
+    assert np.isfinite(objectives.minimum_norm_pullback(reward, space, "qdd")(np.zeros(18)))
 
 
 def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
@@ -211,7 +211,7 @@ def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> 
     space = dynamics.feasible_space(eom)
     hill = objectives.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
     with raises(InputError):
-        objectives.seen_from_best(hill, space, "qdd")
+        objectives.partial_minimum(hill, space, "qdd")
 
 
 def test_directions_that_cost_nothing_are_left_alone() -> None:
@@ -219,8 +219,8 @@ def test_directions_that_cost_nothing_are_left_alone() -> None:
     space = dynamics.feasible_space(eom)
     free = Quadratic.zero(space.dimension)
     x = space.qdd(np.ones(space.dimension))
-    smallest = objectives.smallest_coordinates(space, "qdd")(x)
-    assert np.allclose(objectives.best_coordinates(free, space, "qdd")(x), smallest)
+    smallest = objectives.minimum_norm_coordinates(space, "qdd")(x)
+    assert np.allclose(objectives.argmin_coordinates(free, space, "qdd")(x), smallest)
 
 
 def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
@@ -237,6 +237,6 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
             tau=Quadratic.from_residual(np.eye(8), np.zeros(8)),
             forces=Quadratic.from_residual(np.eye(12), desired, weight),
         )
-        beta = objectives.best_coordinates(cost, space, "qdd")(np.zeros(14))
+        beta = objectives.argmin_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)
         assert np.allclose(N.T @ (space.forces(beta) - desired), 0.0, atol=1e-3), weight

@@ -33,7 +33,7 @@ def check_optimum(run: ActiveSetRun, tolerance: float = 1e-7) -> None:
     qp, r = run.solution.qp, run.solution.residuals
     scale = 1.0 + float(np.max(np.abs(qp.H) @ np.abs(run.solution.x) + np.abs(qp.g)))
     assert r.stationarity < tolerance * scale and r.equality < tolerance
-    assert r.inequality < 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_lengths, initial=1.0))
+    assert r.inequality < 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_norms, initial=1.0))
     assert r.complementarity < tolerance * scale and r.dual == 0.0
 
 
@@ -42,25 +42,25 @@ def check_record(run: ActiveSetRun) -> None:
     qp = run.solution.qp
     scale = 1.0 + abs(run.iterations[0].objective)
     for now, after in pairwise(run.iterations):
-        assert np.allclose(now.arrival, after.x)
+        assert np.allclose(now.x_next, after.x)
         assert after.objective <= now.objective + 1e-9 * scale
         if now.blocking is not None:
             assert now.multipliers == {} and now.dropped is None
-            assert after.working == (*now.working, now.blocking)
+            assert after.working_set == (*now.working_set, now.blocking)
         else:
             assert now.dropped is not None and now.multipliers[now.dropped] < 0
-            assert after.working == tuple(row for row in now.working if row != now.dropped)
+            assert after.working_set == tuple(row for row in now.working_set if row != now.dropped)
     for step in run.iterations:
-        assert np.all(qp.G @ step.x - qp.h <= 10 * FEASIBILITY_TOLERANCE * qp.row_lengths)
+        assert np.all(qp.G @ step.x - qp.h <= 10 * FEASIBILITY_TOLERANCE * qp.row_norms)
         assert np.allclose(qp.A @ step.x, qp.b, atol=1e-7)
-        held = [qp.inequality_names.index(row) for row in step.working]
+        held = [qp.inequality_names.index(row) for row in step.working_set]
         assert np.allclose((qp.G @ step.x - qp.h)[held], 0.0, atol=1e-7)
         assert np.linalg.matrix_rank(qp.G[held] @ qp.equality_space.A) == len(held)
         assert step.objective == pytest.approx(qp.objective(step.x), rel=1e-9, abs=1e-9)
     last = run.iterations[-1]
-    assert last.length == 1.0 and last.blocking is None and last.dropped is None
-    assert last.working == run.working
-    assert np.allclose(last.arrival, run.solution.x)
+    assert last.step_length == 1.0 and last.blocking is None and last.dropped is None
+    assert last.working_set == run.working_set
+    assert np.allclose(last.x_next, run.solution.x)
     for now, after in pairwise(run.phase_one):
         assert after.objective <= now.objective + 1e-12
 
@@ -71,7 +71,7 @@ def check_record(run: ActiveSetRun) -> None:
 def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there() -> None:
     run = active_set(table_top(minimum=(0.5, 1.0)))
     assert np.allclose(run.solution.x, [0.5, 1.0])
-    assert run.solution.active == () == run.working
+    assert run.solution.active == () == run.working_set
 
 
 def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equality() -> None:
@@ -86,19 +86,19 @@ def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equal
 
 def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> None:
     first, second = active_set(table_top((0.5, -1.0)), start=(0.0, 1.0)).iterations
-    assert (first.working, first.blocking, first.length) == ((), "table", 0.5)
+    assert (first.working_set, first.blocking, first.step_length) == ((), "table", 0.5)
     assert np.allclose(first.direction, [0.5, -2.0])
-    assert np.allclose(first.arrival, [0.25, 0.0])
-    assert (second.working, second.blocking, second.length) == (("table",), None, 1.0)
+    assert np.allclose(first.x_next, [0.25, 0.0])
+    assert (second.working_set, second.blocking, second.step_length) == (("table",), None, 1.0)
     assert np.allclose(second.direction, [0.25, 0.0])
     assert second.multipliers == {"table": pytest.approx(1.0)} and second.dropped is None
 
 
 def test_a_row_that_would_have_to_pull_is_dropped() -> None:
-    first, second = active_set(table_top((0.5, 1.0)), start=(0.0, 0.0), working=["table"]).iterations
+    first, second = active_set(table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"]).iterations
     assert first.multipliers == {"table": pytest.approx(-1.0)} and first.dropped == "table"
-    assert second.working == ()
-    assert np.allclose(second.arrival, [0.5, 1.0])
+    assert second.working_set == ()
+    assert np.allclose(second.x_next, [0.5, 1.0])
 
 
 def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised() -> None:
@@ -117,12 +117,12 @@ def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so(
         whole = active_set(qp)
         rounds = [*whole.phase_one, *whole.iterations]
         for most in range(1, len(rounds) + 2):
-            run = active_set(qp, most=most)
+            run = active_set(qp, max_iterations=most)
             kept = rounds[:most]
             assert run.solution.iterations == len(kept) == len(run.phase_one) + len(run.iterations)
-            assert run.finished == (most >= len(rounds))
-            assert np.allclose(run.solution.x, kept[-1].arrival, atol=1e-9)
-            assert run.finished or not np.any(run.solution.inequality_multipliers)
+            assert run.converged == (most >= len(rounds))
+            assert np.allclose(run.solution.x, kept[-1].x_next, atol=1e-9)
+            assert run.converged or not np.any(run.solution.inequality_multipliers)
 
 
 def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may() -> None:
@@ -130,8 +130,8 @@ def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may()
     for qp in controller_qps("go2", 6, torque=0.3):
         whole = active_set(qp)
         for most in range(1, whole.solution.iterations):
-            run = active_set(qp, most=most)
-            broken = run.solution.residuals.inequality > 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_lengths))
+            run = active_set(qp, max_iterations=most)
+            broken = run.solution.residuals.inequality > 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_norms))
             assert not (broken and run.iterations)
             seen.add((broken, bool(run.iterations)))
     assert {(True, False), (False, True)} <= seen
@@ -139,11 +139,11 @@ def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may()
 
 def test_a_stopped_run_can_be_taken_up_again_where_it_ended() -> None:
     for qp in controller_qps("go2", 6, torque=0.3):
-        run = active_set(qp, most=1)
+        run = active_set(qp, max_iterations=1)
         for _ in range(60):
-            x, working = run.solution.x, run.working
-            run = active_set(qp, x, working, most=1)
-        assert run.finished
+            x, working = run.solution.x, run.working_set
+            run = active_set(qp, x, working, max_iterations=1)
+        assert run.converged
         assert np.allclose(run.solution.x, solve(qp).x, atol=1e-7)
 
 
@@ -196,7 +196,7 @@ def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks
     for qp in swaying_qps(name, ticks):
         run = active_set(qp)
         if last is not None:
-            again = active_set(qp, start=last.solution.x, working=last.working)
+            again = active_set(qp, start=last.solution.x, working_set=last.working_set)
             assert np.allclose(again.solution.x, run.solution.x, atol=1e-7)
             cold.append(run.solution.iterations)
             warm.append(again.solution.iterations)
@@ -213,7 +213,7 @@ def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(
     controller = fb.WholeBodyController(robot, contacts, tasks, min_normal_force=2000.0, solver="active_set")
     with pytest.raises(InfeasibleError) as caught:
         controller(robot.standing().q, robot.standing().v)
-    assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.rows)
+    assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.constraints)
 
 
 # degenerate, infeasible, unbounded -----------------------------------------------------------------------------------
@@ -265,7 +265,7 @@ def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends() -> None
     qp = problem(np.zeros((4, 4)), [-0.75, 150.0, -1 / 50, 6.0], rows, [0, 0, 1, 0, 0, 0, 0])
     run = active_set(qp, np.zeros(4), [f"inequality {i}" for i in range(3, 7)])
     assert run.solution.objective == pytest.approx(-1 / 20)
-    assert any(step.length == 0.0 for step in run.iterations)  # it does stand still on the way
+    assert any(step.step_length == 0.0 for step in run.iterations)  # it does stand still on the way
     check_optimum(run)
     check_record(run)
 
@@ -287,7 +287,7 @@ def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp: QP)
     for start in (None, (0.0, 0.0), (50.0, -20.0)):
         with pytest.raises(InfeasibleError) as caught:
             active_set(qp, start)
-        assert judges.is_smallest_conflict(qp, caught.value.rows)
+        assert judges.is_smallest_conflict(qp, caught.value.constraints)
     with pytest.raises(InfeasibleError):
         solve(qp, "active_set")
 
@@ -331,7 +331,7 @@ def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed: in
         run = active_set(qp)
     except InfeasibleError as error:
         assert expected == "infeasible"
-        assert judges.is_smallest_conflict(qp, error.rows)
+        assert judges.is_smallest_conflict(qp, error.constraints)
     except SolverError as error:
         assert expected == "unbounded", error
     else:

@@ -24,11 +24,11 @@ from floatbase.qp import (
     QP,
     UNBOUNDED,
     Residuals,
-    RowLabel,
+    ConstraintLabel,
     Solution,
     active_set,
     check_solver,
-    conflicting_rows,
+    conflicting_constraints,
     linear_program,
     solve,
     solvers,
@@ -104,7 +104,7 @@ def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver: str) ->
         assert solve(problems[right], solver).residuals.stationarity < 1e-6
     with raises(InfeasibleError, "wall") as caught:
         solve(problems[0.5], solver)
-    assert caught.value.rows == ("wall",)
+    assert caught.value.constraints == ("wall",)
 
 
 # residuals ---------------------------------------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ def test_each_residual_measures_its_own_mistake(residuals: Residuals, fields: di
 def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(seed: int, n: int, rows: int) -> None:
     rng = np.random.default_rng(seed)
     G, h = rng.normal(size=(rows, n)), rng.normal(size=rows) - 0.5
-    qp, found = QP(np.eye(n), np.zeros(n), *empty(n), G, h), conflicting_rows(G, h)
+    qp, found = QP(np.eye(n), np.zeros(n), *empty(n), G, h), conflicting_constraints(G, h)
     if judges.is_feasible(qp, list(range(rows))):
         assert found == ()
         return
@@ -169,7 +169,7 @@ def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(seed: int
     ],
 )
 def test_rows_in_conflict_are_told_from_those_that_can_be_met(G: np.ndarray, h: np.ndarray, conflict: tuple[int, ...]) -> None:
-    assert conflicting_rows(G, h) == conflict
+    assert conflicting_constraints(G, h) == conflict
 
 
 @pytest.mark.parametrize("solver", solvers())
@@ -178,7 +178,7 @@ def test_the_error_of_an_infeasible_problem_names_its_rows(solver: str) -> None:
     qp = QP(np.eye(2), np.zeros(2), *empty(2), G, h, inequality_names=("x ≤ 1", "x ≥ 2", "y ≤ 3"))
     with raises(InfeasibleError, "x ≤ 1", "x ≥ 2") as caught:
         solve(qp, solver)
-    assert caught.value.rows == ("x ≤ 1", "x ≥ 2")
+    assert caught.value.constraints == ("x ≤ 1", "x ≥ 2")
 
 
 def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
@@ -186,19 +186,19 @@ def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
     solution = solve(qp)
     for copied in (copy.deepcopy(solution), pickle.loads(pickle.dumps(solution))):
         assert np.array_equal(copied["tau"], solution["tau"]) and copied.active == solution.active
-        assert copied.qp.reduced.row_lengths.tolist() == pickle.loads(pickle.dumps(qp.reduced)).row_lengths.tolist()
-    assert np.array_equal(replace(qp.reduced, h=np.zeros(2)).row_lengths, qp.row_lengths)
+        assert copied.qp.reduced.row_norms.tolist() == pickle.loads(pickle.dumps(qp.reduced)).row_norms.tolist()
+    assert np.array_equal(replace(qp.reduced, h=np.zeros(2)).row_norms, qp.row_norms)
     space = Affine.stack(first=qp.equality_space, second=qp.equality_space)
     assert np.array_equal(pickle.loads(pickle.dumps(space))["second"].A, copy.deepcopy(space)["first"].A)
 
 
 def test_labels_are_texts_that_know_their_kind_owner_and_number() -> None:
-    label = RowLabel("FL_foot facet 2", "friction", "FL_foot", 2)
+    label = ConstraintLabel("FL_foot facet 2", "friction", "FL_foot", 2)
     assert label == "FL_foot facet 2" and label in {"FL_foot facet 2": 1}
     for same in (label, copy.deepcopy(label), pickle.loads(pickle.dumps(label))):
         assert (same, same.kind, same.owner, same.number) == ("FL_foot facet 2", "friction", "FL_foot", 2)
     qp = QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=(label, "roof"))
-    assert [name.kind for name in qp.inequality_names] == ["friction", "other rows"]
+    assert [name.kind for name in qp.inequality_names] == ["friction", "other constraints"]
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]
 
 
@@ -222,8 +222,8 @@ def test_rows_can_be_left_out_by_kind() -> None:
 
 def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_name() -> None:
     """Six variables, each at least 1, whose sum is at most 5."""
-    normal = [RowLabel(f"{foot} normal force", "normal force", foot) for foot in ("FL", "FR", "RL")]
-    facets = [RowLabel(f"FL facet {i}", "friction", "FL", i) for i in (2, 3)]
+    normal = [ConstraintLabel(f"{foot} normal force", "normal force", foot) for foot in ("FL", "FR", "RL")]
+    facets = [ConstraintLabel(f"FL facet {i}", "friction", "FL", i) for i in (2, 3)]
     G, h = np.vstack([-np.eye(6), np.ones(6)]), np.append(-np.ones(6), 5.0)
     with pytest.raises(InfeasibleError) as caught:
         solve(QP(np.eye(6), np.zeros(6), *empty(6), G, h, inequality_names=(*normal, *facets, "sixth", "sum")))
@@ -252,9 +252,9 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
         (lambda: solve(SQUARE)["torques"], InputError, "torques"),
         (lambda: check_solver("activeset"), UnknownNameError, "solver", "activeset", "active_set"),
         (lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), InputError, "start", 3, 2),
-        (lambda: active_set(table_top(), working=["tabel"]), UnknownNameError, "tabel", "table"),
-        *[(lambda most=most: active_set(table_top(), most=most), InputError, "most", most) for most in (0, -1, 1.5, "3")],
-        (lambda: active_set(table_top(), most=True), InputError, "most", "True"),
+        (lambda: active_set(table_top(), working_set=["tabel"]), UnknownNameError, "tabel", "table"),
+        *[(lambda most=most: active_set(table_top(), max_iterations=most), InputError, "most", most) for most in (0, -1, 1.5, "3")],
+        (lambda: active_set(table_top(), max_iterations=True), InputError, "most", "True"),
     ],
 )
 def test_problems_that_do_not_fit_together_are_refused(case: tuple[Any, ...]) -> None:

@@ -134,7 +134,7 @@ def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver: str, ga
     qp = QP(np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [1.0, -1.0 - gap, 9.0])
     with pytest.raises(InfeasibleError) as caught:
         solve(qp, solver)
-    assert caught.value.rows == ("inequality 0", "inequality 1")
+    assert caught.value.constraints == ("inequality 0", "inequality 1")
 
 
 @pytest.mark.parametrize("name", judges.KINDS[:3])
@@ -153,7 +153,7 @@ def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str
         try:
             solve(qp)
         except InfeasibleError as error:
-            assert judges.is_smallest_conflict(qp, error.rows), seed
+            assert judges.is_smallest_conflict(qp, error.constraints), seed
             verdicts.append(False)
         else:
             assert judges.is_feasible(qp, list(range(len(qp.G)))), seed
@@ -197,7 +197,7 @@ def test_rows_that_meet_far_away_only_are_met_there_or_refused(solver: str, slop
 def test_equalities_that_nearly_repeat_each_other_are_named(slope: float) -> None:
     with pytest.raises(InfeasibleError) as caught:
         solve(QP(np.eye(2), np.zeros(2), [[1.0, 0.0], [1.0, slope]], [0.0, 1.0], *NONE))
-    assert caught.value.rows == ("equality 0", "equality 1")
+    assert caught.value.constraints == ("equality 0", "equality 1")
 
 
 @pytest.mark.parametrize("solver", solvers())
@@ -207,9 +207,9 @@ def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> Non
     qp = QP(np.eye(2), np.zeros(2), A, [1.0, 3.0, 3.0, 2.0, 6.0], *NONE, equality_names=names)
     with pytest.raises(InfeasibleError) as caught:
         solve(qp, solver)
-    assert not missing(str(caught.value), *caught.value.rows)
-    kept = [names.index(row) for row in caught.value.rows]
-    assert set(caught.value.rows) in ({"x is 1", "x is 1.5"}, {"sum is 3", "x is 1.5", "y is 2"},
+    assert not missing(str(caught.value), *caught.value.constraints)
+    kept = [names.index(row) for row in caught.value.constraints]
+    assert set(caught.value.constraints) in ({"x is 1", "x is 1.5"}, {"sum is 3", "x is 1.5", "y is 2"},
                                       {"sum is 3", "x is 1.5", "y is 2 again"})  # fmt: skip
     for row in kept:
         rest = [i for i in kept if i != row]
@@ -269,7 +269,7 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
         try:
             found = solve(qp)
         except InfeasibleError as error:
-            assert judges.is_smallest_conflict(qp, error.rows)
+            assert judges.is_smallest_conflict(qp, error.constraints)
             continue
         answered.add(found.solver)
         assert judges.is_feasible(qp, list(range(len(qp.G))))

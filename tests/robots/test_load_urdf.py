@@ -14,7 +14,7 @@ from messages import raises, refused, warns
 
 import floatbase as fb
 from floatbase.errors import InputError, RobotWarning
-from floatbase.robots import PLATE, unbolted
+from floatbase.robots import PLATE_SIZE, with_floating_base
 
 LOADERS = example_robot_data.robots_loader.ROBOTS
 CHANGED = [name for name, loader in LOADERS.items() if loader.__init__ is not example_robot_data.utils.RobotLoader.__init__]
@@ -38,17 +38,17 @@ def test_an_arm_may_be_bolted_down_or_float() -> None:
 
 def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand_on_a_plate() -> None:
     arm = fb.load("ur5", posture=[0.0, -1.7, 1.2, 0.5, 1.5, 0.0])
-    loose, standing = unbolted(arm), unbolted(arm, plate=True)
+    loose, standing = with_floating_base(arm), with_floating_base(arm, plate=True)
     assert loose.joint_names == arm.joint_names and loose.mass == pytest.approx(arm.mass)
     assert np.array_equal(loose.torque_limits, arm.torque_limits)
-    for robot, height in ((loose, 1.0), (standing, PLATE[1])):
+    for robot, height in ((loose, 1.0), (standing, PLATE_SIZE[1])):
         state = robot.standing()
         assert np.allclose(state.M[6:, 6:], arm.standing().M)
         assert np.allclose(state.h[6:], arm.standing().h)
         assert state.q[2] == pytest.approx(height)
     assert np.allclose(judges.stance(standing).positions(standing.standing())[:, 2], 0.0, atol=1e-9)
     with raises(InputError, "go2"):
-        unbolted(judges.load("go2"))
+        with_floating_base(judges.load("go2"))
 
 
 @pytest.mark.parametrize("name", [*judges.ROBOTS, *CHANGED])
@@ -116,7 +116,7 @@ def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path: Path) -> None
     file.write_text(fb.load("ur5").urdf, encoding="utf-8")
     arm = fb.load_urdf(file, floating=False)
     file.write_text("<robot/>")
-    state = pickle.loads(pickle.dumps(unbolted(arm))).random_state(0)
+    state = pickle.loads(pickle.dumps(with_floating_base(arm))).random_state(0)
     assert judges.relative(state.M, judges.Mujoco(state.robot).move_to(state).M) < 1e-9
 
 

@@ -68,7 +68,7 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slic
     [
         ("paused", "paused"),
         ("fell", "fell"),
-        ("controller failed: no point satisfies all rows. In conflict:\n  6 × friction.", "rows"),
+        ("controller failed: no point satisfies all constraints. In conflict:\n  6 × friction.", "rows"),
         ("stopped: 0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
     ],
 )

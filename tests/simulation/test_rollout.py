@@ -13,7 +13,7 @@ from messages import missing, raises, refused
 import floatbase as fb
 from floatbase.dynamics import fixed_frame
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError, UnknownNameError
-from floatbase.robots import State, unbolted
+from floatbase.robots import State, with_floating_base
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def test_forces_that_a_controller_does_not_give_are_nan_and_are_measured_all_the
 
 
 def test_a_base_that_begins_at_height_zero_falls_only_when_it_sinks() -> None:
-    arm = unbolted(judges.load("ur5"))
+    arm = with_floating_base(judges.load("ur5"))
     q = arm.standing().q.copy()
     q[2] = 0.0
     sim = fb.Simulation(arm)
@@ -78,13 +78,13 @@ def test_a_controller_without_an_answer_ends_the_record_and_its_error_is_kept(si
 
     def gives_up(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
         if t > 0.0095:
-            raise InfeasibleError("no point satisfies all rows", ["FL_foot normal force"])
+            raise InfeasibleError("no point satisfies all constraints", ["FL_foot normal force"])
         return inner(q, v, t)
 
     record = fb.rollout(sim, gives_up, 1.0)
     assert record.outcome == "controller failed"
     assert isinstance(record.error, InfeasibleError)
-    assert record.error.rows == ("FL_foot normal force",)
+    assert record.error.constraints == ("FL_foot normal force",)
     assert len(record) == 10
 
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from floatbase.dynamics import Contacts
-from floatbase.robots import catalogue, load, load_urdf, unbolted
+from floatbase.robots import catalogue, load, load_urdf, with_floating_base
 from floatbase.viewer import robot_meshes, urdf_visuals
 
 MESHES = Path(__file__).parents[2] / "assets" / "meshes"
@@ -94,7 +94,7 @@ def test_light_meshes_are_those_of_a_urdf_and_not_of_a_name() -> None:
 def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut() -> None:
     arm = load("ur5")
     bolted = {mesh.joint: mesh for mesh in robot_meshes(arm)}
-    loose = unbolted(arm)
+    loose = with_floating_base(arm)
     free = {mesh.joint: mesh for mesh in robot_meshes(loose)}
     assert set(free) == {joint + 1 for joint in bolted}
     for joint, mesh in bolted.items():

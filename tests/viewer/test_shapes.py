@@ -237,7 +237,7 @@ def test_figures(screen: Screen) -> None:
 
 def test_the_compass_is_plotted_and_drawn_to_scale(viewer: Viewer, standing: State, contacts: Contacts) -> None:
     wrenches = wrench_set(standing, contacts)
-    forces = wrenches.horizontal_reach(8)[1]
+    forces = wrenches.max_horizontal_forces(8)[1]
     axis = roses.plot_compass(wrenches, n=8)
     np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == ["reachable horizontal force"]
@@ -252,7 +252,7 @@ def test_the_compass_is_plotted_and_drawn_to_scale(viewer: Viewer, standing: Sta
     inwards = {name: [0.0, -1.0 if name[1] == "L" else 1.0, 0.1] for name in contacts.names}
     walls = Contacts.points(standing.robot, normals=inwards)
     with raises(InputError, "max_normal_force"):
-        roses.plot_compass(wrench_set(standing, walls, inside=False, facets=8), n=8)
+        roses.plot_compass(wrench_set(standing, walls, inner_approximation=False, facets=8), n=8)
     refused(lambda: roses.compass(wrench_set(standing, contacts.only("FL_foot"))), InfeasibleError)
 
 
@@ -276,7 +276,7 @@ def test_prices_stand_at_the_middle_of_their_facets(
         normal = contacts.normals[i]
         arm = picture[f"price/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
         if name.kind == "friction":
-            rays = FrictionPolyhedron(normal, 0.6, facets, turn=turn).rays
+            rays = FrictionPolyhedron(normal, 0.6, facets, facet_rotation=turn).rays
             np.testing.assert_allclose(arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9)
         else:
             np.testing.assert_allclose(arm, height * normal, atol=1e-9)

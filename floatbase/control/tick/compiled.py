@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.control.problem import Problem, assemble_qp, residual_of
 from floatbase.control.tick.own import Given, Own
 from floatbase.control.tick.tables import TASK_KINDS, dynamics_of, tables_of

@@ -46,7 +46,8 @@ def rotation_error(R, target):
 
 @jit
 def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
-    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for an angle too large.
+    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for an angle too
+    large.
 
     rows: (3, nv) receives the Jacobian.
     """

@@ -1,7 +1,8 @@
 """The equalities of (27) eliminated: q̈, λ and τ as functions of the free entries β, by Gauss-Jordan elimination (13)(16)(17).
 
 The readable path takes an SVD for the space of motions (13). Here variables are eliminated one by one, and each β is an entry
-of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv, d, k as everywhere, n = nv + k entries of (q̈, λ), nb of β.
+of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv, d, k as everywhere, n = nv + k entries of (q̈, λ), nb of
+β.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from floatbase.control.problem import INCONSISTENT
 from floatbase.control.tick.jit import jit, jit_allocating, jit_forced
 from floatbase.control.tick.memory import clear, take_vector
-from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
+from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
 
 DEPENDENT_ROW = 2e-2  # a motion row of which elimination leaves less may nearly depend on the others: an SVD must decide
 LOST_ROW = 1e-11  # less than this part of a row is rounding
@@ -90,17 +91,17 @@ def equalities(A, b, M, h, J, base, lengths, B):
 def independent_rows(A, b, v, rows, right):
     """(5) Orthonormal rows (r, nv) that say what A q̈ = b says along the directions that A resolves, as in `build_qp`.
 
-    rows, right: (m, nv), (m,) receive them and their right-hand sides first. Returns r, or -1 where rows of A q̈ = b disagree by
-    more than the contacts' motion A v explains.
+    rows, right: (m, nv), (m,) receive them and their right-hand sides first. Returns r, or -1 where rows of A q̈ = b disagree
+    by more than the contacts' motion A v explains.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
-    while r < s.size and s[r] > MOTION_TOLERANCE * s[0]:
+    while r < s.size and s[r] > CONSTRAINT_RANK_TOLERANCE * s[0]:
         r += 1
     U = np.ascontiguousarray(U[:, :r])
     rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
-    return -1 if np.max(np.abs(gap)) > INCONSISTENT + MOTION_NOISE * np.max(np.abs(motion)) else r
+    return -1 if np.max(np.abs(gap)) > INCONSISTENT + CONSTRAINT_NOISE * np.max(np.abs(motion)) else r
 
 
 @jit

@@ -20,9 +20,9 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCach
 from numba.core.serialize import dumps
 
 from floatbase.control.problem import INCONSISTENT
-from floatbase.dynamics import MOTION_NOISE, MOTION_TOLERANCE
+from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
 from floatbase.qp import FEASIBILITY_TOLERANCE
-from floatbase.robots import UNIT_LENGTH_TOLERANCE
+from floatbase.robots import UNIT_NORM_TOLERANCE
 
 # Without numba's run time, which counts references to every array that is made, sliced or passed on: that took a quarter of the
 # tick. What is compiled so can neither make an array nor return one.
@@ -39,7 +39,7 @@ cache_trouble = ""  # why what is compiled cannot be kept on disk, in words
 
 def digest(folder: Path = Path(__file__).parent) -> int:
     """A number for the text of this folder and for the constants of other rooms that numba compiles in."""
-    text = repr((INCONSISTENT, MOTION_TOLERANCE, MOTION_NOISE, FEASIBILITY_TOLERANCE, UNIT_LENGTH_TOLERANCE)).encode()
+    text = repr((INCONSISTENT, CONSTRAINT_RANK_TOLERANCE, CONSTRAINT_NOISE, FEASIBILITY_TOLERANCE, UNIT_NORM_TOLERANCE)).encode()
     for file in sorted(folder.glob("*.py")):
         text += file.name.encode() + file.read_bytes()
     return int.from_bytes(sha256(text).digest()[:7], "big")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from floatbase._arrays import Array, sealed
+from floatbase._validation import Array, frozen
 from floatbase.control.tick.tables import Dynamics
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.robots import State
@@ -18,7 +18,7 @@ class TickState(State):
     """
 
     def __init__(self, dynamics: Dynamics, q: Array, v: Array):
-        self.__dict__.update(robot=dynamics.robot, q=sealed(q.view()), v=sealed(v.view()))
+        self.__dict__.update(robot=dynamics.robot, q=frozen(q.view()), v=frozen(v.view()))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return State, (self.robot, self.q, self.v)

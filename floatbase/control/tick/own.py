@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, read_only
+from floatbase._validation import Array, read_only
 from floatbase.affine import Affine
 from floatbase.control.problem import Problem, residual_of
 from floatbase.control.tick.moment import TickEquations, TickState
 from floatbase.control.tick.tables import BLOCKS, CONTACT_KINDS, TASK_KINDS, Dynamics
-from floatbase.dynamics import EquationsOfMotion, equations_of_motion, motion_of
+from floatbase.dynamics import EquationsOfMotion, equations_of_motion, constraint_and_jacobian
 from floatbase.errors import InputError
 from floatbase.robots import State
 
@@ -67,7 +67,7 @@ class Own:
         eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)
         contacts, residuals, rows, inequalities = [], {}, 0, []
         for contact in self._contacts:
-            A, b, J = motion_of(contact, eom.state, t)
+            A, b, J = constraint_and_jacobian(contact, eom.state, t)
             contacts.append((A, b, J))
             parts += A.ravel(), b, J.ravel()
         for i, task, block in self._tasks:
@@ -91,7 +91,7 @@ class Own:
         if not self._contacts:
             return equations_of_motion(state, contacts, t)
         own = iter(given.contacts)
-        rows = [motion_of(contact, state, t) if type(contact) in CONTACT_KINDS else next(own) for contact in contacts]
+        rows = [constraint_and_jacobian(contact, state, t) if type(contact) in CONTACT_KINDS else next(own) for contact in contacts]
         A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))
         return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import Contact, FlatFootContact, PointContact
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import (
@@ -106,7 +106,7 @@ def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Mo
     Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
     """
     contacts, frames, points, cones = _contact_tables(problem)
-    cones[:, 4] = np.repeat(problem.contacts.point_entries[::3], problem.limits.facets + 1)
+    cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses, targets, moving = _task_tables(problem)
     dynamics, limits, on = dynamics_of(problem.robot), problem.limits, problem.contacts
     sizes = (
@@ -165,7 +165,7 @@ def _cones(contact: Contact, cut: Cut) -> Array:
     if not contact.point_names:
         return np.zeros((0, 5))
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *cut)
-    rows = np.vstack([polyhedron.rows, -polyhedron.normal])
+    rows = np.vstack([polyhedron.face_matrix, -polyhedron.normal])
     cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])
     return np.tile(cones, (len(contact.point_names), 1))
 

@@ -23,7 +23,7 @@ from floatbase.control.tick.inequalities import Inequalities, affine_value
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, forward_velocities
 from floatbase.control.tick.memory import all_finite, take_matrix, take_vector
-from floatbase.robots import UNIT_LENGTH_TOLERANCE
+from floatbase.robots import UNIT_NORM_TOLERANCE
 
 INVALID, STOPPED = -1, -4
 PARTS = 4  # of a tick: contact rows, elimination, costs, optimum
@@ -82,7 +82,7 @@ def inputs_valid(q, v, given, tree):
             square = 0.0
             for at in range(tree[i, 3] + (3 if tree[i, 4] == 7 else 0), tree[i, 3] + tree[i, 4]):
                 square += q[at] * q[at]
-            if abs(np.sqrt(square) - 1.0) > UNIT_LENGTH_TOLERANCE:
+            if abs(np.sqrt(square) - 1.0) > UNIT_NORM_TOLERANCE:
                 return False
     return True
 

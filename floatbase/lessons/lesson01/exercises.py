@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import fixed_frame
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers, vector_text
 from floatbase.lessons.lesson01.pictures import PRESSING
-from floatbase.objectives import momentum_rate
-from floatbase.robots import PLATE, unbolted
+from floatbase.objectives import centroidal_momentum_rate
+from floatbase.robots import PLATE_SIZE, with_floating_base
 
 
 @cache
 def _pressed() -> tuple[fb.State, Array, Array]:
     """The pressing arm without bolts, the tool's position seen from the base, and f_r."""
-    state = unbolted(fb.load("ur5", posture=PRESSING)).standing()
+    state = with_floating_base(fb.load("ur5", posture=PRESSING)).standing()
     return state, state.point("tool0") - state.point("base_link"), np.array([-60.0, 0.0, 0.0])
 
 
@@ -70,7 +70,7 @@ def _held_width() -> float:
 
 @cache
 def _on_the_plate() -> fb.State:
-    return unbolted(fb.load("ur5", posture=PRESSING), plate=True).standing()
+    return with_floating_base(fb.load("ur5", posture=PRESSING), plate=True).standing()
 
 
 def _by_levers(press: float = 120.0, *, weight: float | None = None, below: float = 0.0, ahead: float | None = None) -> float:
@@ -88,7 +88,7 @@ def _by_levers(press: float = 120.0, *, weight: float | None = None, below: floa
 def _in_proportion() -> float:
     """The width, m, if what a plate holds were proportional to its width."""
     twice = 2 * _on_the_plate().com[0]
-    return float(PLATE[0] * (_by_levers() + twice) / (PLATE[0] + twice))
+    return float(PLATE_SIZE[0] * (_by_levers() + twice) / (PLATE_SIZE[0] + twice))
 
 
 def _judge_thrust(answer: Any) -> Verdict:
@@ -100,7 +100,7 @@ def _judge_thrust(answer: Any) -> Verdict:
     state = fb.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     # by the momentum that (4) brings about, not by sums of forces and levers
-    rate = momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0]
+    rate = centroidal_momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0]
     if abs(rate[2] + 200.0) < 0.2:
         return Verdict(False, "The size is right, the sign is not: these thrusters push the robot down.", "sign")
     if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
@@ -248,10 +248,10 @@ EXERCISES = (
             praise="A harder push needs a wider plate. A robot that walks has no wider plate; it puts a foot there in time.",
             mistakes={
                 "half": lambda: _held_width() / 2,
-                "height_from_base": lambda: _by_levers(below=PLATE[1]),
+                "height_from_base": lambda: _by_levers(below=PLATE_SIZE[1]),
                 "com_in_middle": lambda: _by_levers(ahead=0.0),
                 "com_sign": lambda: _by_levers(ahead=-_on_the_plate().com[0]),
-                "plate_as_is": lambda: PLATE[0],
+                "plate_as_is": lambda: PLATE_SIZE[0],
                 "in_proportion": (_in_proportion),
                 "half_press": lambda: _by_levers(60.0),
                 "mass": lambda: _by_levers(weight=_on_the_plate().robot.mass),

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import floatbase as fb
-from floatbase._arrays import Array, read_only
+from floatbase._validation import Array, read_only
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 

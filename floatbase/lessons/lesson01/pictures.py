@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.lessons.exercises import vector_text
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.lessons.rounding import about
-from floatbase.objectives import Task, momentum_rate
-from floatbase.robots import PLATE
+from floatbase.objectives import Task, centroidal_momentum_rate
+from floatbase.robots import PLATE_SIZE
 from floatbase.simulation import Rollout
 from floatbase.viewer import MEASURED, Item, Picture, View, Viewer, below, marks, props, recording, shapes
 
@@ -158,7 +158,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
         f[:, 2] = np.where(left, left_feet, right_feet)
         f[:, 0] = np.where(left, twist, -twist)
         qdd = eom.acceleration(np.zeros(eom.d), f)
-        rate = momentum_rate(state, qdd) + np.concatenate([state.robot.mass * gravity, np.zeros(3)])
+        rate = centroidal_momentum_rate(state, qdd) + np.concatenate([state.robot.mass * gravity, np.zeros(3)])
         picture = view.painter.picture(state, wrench=rate)
         drawn = _afloat(picture)
         for name, foot, force in zip(contacts.names, feet, f, strict=True):
@@ -189,7 +189,7 @@ def _wall(tool: Array) -> Picture:
 
 def _plate(state: fb.State) -> Item:
     """The plate below the base: the slab of a wall, placed flat."""
-    width, thick = PLATE
+    width, thick = PLATE_SIZE
     slab = props.wall(np.zeros(3), [1.0, 0.0, 0.0], 1.0, 1.0)
     pose = state.frame_pose("base_link")
     centre = pose.translation - pose.rotation[:, 2] * thick / 2

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.exercises import NO_ANSWER, Example, Exercise, Numeric, Shaped, Verdict, vector_text
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.exercises import vector_text
 from floatbase.lessons.lesson02.helpers import DISC_RADIUS, park, wheel

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces, torque_force_matrix, torque_force_space
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson03.helpers import rising_solo8, standing_go2, tilted_squeeze

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, FeasibleSpace
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
 from floatbase.robots import Robot

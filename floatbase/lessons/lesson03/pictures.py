@@ -11,7 +11,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import FeasibleSpace
 from floatbase.lessons.lesson03.helpers import upright
 from floatbase.linear_algebra import rank

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, least_point
 from floatbase.lessons.lesson03 import standing_go2

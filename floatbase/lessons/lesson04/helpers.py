@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, FeasibleSpace
 from floatbase.lessons.controllers import Torques
 from floatbase.lessons.lesson03 import tilted_squeeze

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, least_point
 from floatbase.lessons.lesson03 import standing_go2, standing_still
 from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, squeezes, three_feet
 from floatbase.lessons.rounding import about
-from floatbase.objectives import com_wrench, force_bias, momentum_rate, tangential_bias, wrench_objective
+from floatbase.objectives import com_wrench_map, force_bias, centroidal_momentum_rate, tangential_bias, wrench_objective
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
 FORWARDS = 60.0  # N, of exercise 05.4
@@ -62,7 +62,7 @@ def _moments() -> dict[str, Callable[[], Any]]:
 def _force_by_momentum() -> Array:
     """By the momentum of all links: some q̈ that accelerates the centre of mass so, and what has to change it."""
     state = standing_go2().state
-    rate = momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
+    rate = centroidal_momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
     return np.asarray(rate - state.robot.mass * state.robot.model.gravity.linear)
 
 
@@ -202,7 +202,7 @@ def _designs() -> list[Example]:
     eom = standing_go2()
     cost, share, force = _cost_60(eom), eom.robot.weight / 4, np.array([FORWARDS, 0.0, eom.robot.weight])
     right, smallest = _leaning(force), cost.minimiser()
-    by_hand = np.linalg.pinv(com_wrench(eom.state, eom.contacts).A) @ [*force, 0, 0, 0]
+    by_hand = np.linalg.pinv(com_wrench_map(eom.state, eom.contacts).A) @ [*force, 0, 0, 0]
     by_hand[0::3] += [-7.8, -7.8, 7.8, 7.8]
     diagonal = squeezes(eom.contacts)["diagonal"]
     return [

@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._arrays import Array, checked, flat_forces
+from floatbase._validation import Array, as_array, as_forces
 from floatbase.control import AnalyticController
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.controllers import Torques
 from floatbase.lessons.lesson03 import standing_still
-from floatbase.objectives import torque_for_forces
+from floatbase.objectives import torques_from_forces
 from floatbase.robots import Robot
 
 STRETCHED = (np.pi / 2, np.pi / 2, np.pi, 0.0, 0.0, 0.0)  # rad: anymal_kinova's arm, straight forwards
@@ -51,7 +51,7 @@ def squeezes(contacts: fb.Contacts) -> dict[str, Array]:
         "left feet apart": [[1, 0, 0], [0, 0, 0], [-1, 0, 0], [0, 0, 0]],
         "diagonal": [[0, 0, 1], [0, 0, -1], [0, 0, -1], [0, 0, 1]],
     }
-    return {name: checked(name, np.ravel(forces).astype(float), (contacts.k,)) for name, forces in rows.items()}
+    return {name: as_array(name, np.ravel(forces).astype(float), (contacts.k,)) for name, forces in rows.items()}
 
 
 def leans(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
@@ -59,7 +59,7 @@ def leans(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
 
     μ where a force lies on its cone. Infinite where it has no normal part or pulls. forces: shape (k,) or (n, 3), N, world.
     """
-    f = flat_forces(forces, contacts.k).reshape(-1, 3)
+    f = as_forces(forces, contacts.k).reshape(-1, 3)
     normal = np.einsum("ij,ij->i", f, contacts.normals)
     tangential = np.linalg.norm(f - normal[:, None] * contacts.normals, axis=1)
     found = np.full(len(f), np.inf)
@@ -74,12 +74,12 @@ class GivenForces:
     """
 
     def __init__(self, robot: Robot, contacts: fb.Contacts, forces: npt.ArrayLike):
-        self.robot, self.contacts, self.forces = robot, contacts, flat_forces(forces, contacts.k)
+        self.robot, self.contacts, self.forces = robot, contacts, as_forces(forces, contacts.k)
 
     def __call__(self, q: Array, v: Array, t: float) -> Torques:
         """The torques for configuration q and velocity v."""
         eom = fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)
-        return Torques(torque_for_forces(eom).torque(self.forces), self.forces)
+        return Torques(torques_from_forces(eom).torque(self.forces), self.forces)
 
 
 @cache

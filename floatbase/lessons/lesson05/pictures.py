@@ -8,9 +8,9 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 import floatbase as fb
-from floatbase._arrays import flat_forces
+from floatbase._validation import as_forces
 from floatbase.lessons.rounding import about
-from floatbase.objectives import com_wrench
+from floatbase.objectives import com_wrench_map
 from floatbase.simulation import Rollout
 from floatbase.viewer import GREYS, View, Viewer, below, hexadecimal, marks, plots, shapes
 
@@ -26,8 +26,8 @@ def show_forces(
     What carries the weight is left out of the wrench. forces: shape (k,), N, world. wish: shape (3,), N, world, the force that
     was wished for beside the weight: a grey arrow.
     """
-    forces = flat_forces(forces, contacts.k)
-    wrench = com_wrench(state, contacts)(forces) - [0, 0, state.robot.weight, 0, 0, 0]
+    forces = as_forces(forces, contacts.k)
+    wrench = com_wrench_map(state, contacts)(forces) - [0, 0, state.robot.weight, 0, 0, 0]
     wrench = np.where(np.abs(wrench) > np.repeat([LEAST_FORCE, LEAST_MOMENT], 3), wrench, 0.0)
     size, scale = view.painter.size, view.scale
     above = np.array([state.com[0], state.com[1], view.painter.box[1][2] + 0.12 * size])

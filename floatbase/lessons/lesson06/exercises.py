@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson06.pictures import uphill
-from floatbase.objectives import com_wrench
+from floatbase.objectives import com_wrench_map
 
 BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5  # of exercise 06.1: normal, not unit; μ; facets
 FACETS, MU = 8, 0.7  # of exercise 06.2
@@ -125,15 +125,15 @@ def _in_balance(facets: int, room: float) -> Array:
     """The smallest forces on the hill, (12,) N, that carry go2, with room to polyhedra of so many facets."""
     state, contacts = on_hill()
     carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
-    rows = np.kron(np.eye(4), FrictionPolyhedron(uphill(HILL), MU, facets).rows)
-    balance = (com_wrench(state, contacts).A, carry)
+    rows = np.kron(np.eye(4), FrictionPolyhedron(uphill(HILL), MU, facets).face_matrix)
+    balance = (com_wrench_map(state, contacts).A, carry)
     return fb.solve(fb.QP(np.eye(12), np.zeros(12), *balance, rows, np.full(len(rows), -room))).x
 
 
 def _forces() -> list[Example]:
     state, contacts = on_hill()
     weight, n = state.robot.weight, uphill(HILL)
-    smallest = np.linalg.pinv(com_wrench(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
+    smallest = np.linalg.pinv(com_wrench_map(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
     squeeze = np.zeros(12)  # the left feet against the right ones: it changes neither sum nor moment
     squeeze[[7, 10]] = 1.0, -1.0
     return [
@@ -257,11 +257,11 @@ EXERCISES = (
         statement="Forces on a slope of 20°, shape (12,), N, world: in balance, each with a margin of 3 N to its true cone.",
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
-        "from floatbase.objectives import com_wrench\n\n"
+        "from floatbase.objectives import com_wrench_map\n\n"
         "state_on_hill, contacts_on_hill = on_hill()\n"
-        "G_hill = com_wrench(state_on_hill, contacts_on_hill).A\n"
+        "G_hill = com_wrench_map(state_on_hill, contacts_on_hill).A\n"
         "carry = np.array([0, 0, robot.weight, 0, 0, 0])\n"
-        "facets = [FrictionPolyhedron(n, 0.7, 8).rows for n in contacts_on_hill.normals]\n"
+        "facets = [FrictionPolyhedron(n, 0.7, 8).face_matrix for n in contacts_on_hill.normals]\n"
         "rows_on_hill = block_diag(*facets)\n"
         "room = np.full(len(rows_on_hill), -3.0)  # N: each facet with 3 N to spare\n"
         "least = (np.eye(12), np.zeros(12))\n"

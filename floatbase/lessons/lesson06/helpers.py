@@ -10,12 +10,12 @@ import pinocchio as pin
 from scipy.linalg import block_diag
 
 import floatbase as fb
-from floatbase._arrays import Array, of_kind
+from floatbase._validation import Array, as_instance
 from floatbase.dynamics import equations_of_motion
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.lessons.controllers import Torques
-from floatbase.objectives import desired_wrench, force_bias, rotational_inertia, torque_for_forces, wrench_objective
+from floatbase.objectives import desired_wrench, force_bias, centroidal_inertia, torques_from_forces, wrench_objective
 
 STIFFNESS, DAMPING = 100.0, 20.0  # 1/s² and 1/s of the centre of mass and of the base's rotation, as in lesson 05
 FACETS = 4  # of each foot's polyhedron, inside its cone
@@ -38,10 +38,10 @@ class ConeController:
     """
 
     def __init__(self, robot: fb.Robot, contacts: fb.Contacts, state: fb.State, moment_weight: float = 1.0):
-        self.robot, self.contacts, self.state = robot, contacts, of_kind("state", state, fb.State)
+        self.robot, self.contacts, self.state = robot, contacts, as_instance("state", state, fb.State)
         self.moment_weight = moment_weight
         cones = zip(contacts.normals, contacts.mus, strict=True)
-        self._rows = block_diag(*(FrictionPolyhedron(n, mu, FACETS).rows for n, mu in cones))
+        self._rows = block_diag(*(FrictionPolyhedron(n, mu, FACETS).face_matrix for n, mu in cones))
         self._bias = BIAS * force_bias(contacts, NORMAL_BIAS, robot.weight / contacts.n_points)
 
     def __call__(self, q: Array, v: Array, t: float = 0.0) -> Torques:
@@ -50,14 +50,14 @@ class ConeController:
         wish = self.wish(eom.state)
         cost = wrench_objective(eom.state, self.contacts, *wish, moment_weight=self.moment_weight) + self._bias
         forces = least_inside(cost, self._rows)
-        return Torques(torque_for_forces(eom).torque(forces), forces)
+        return Torques(torques_from_forces(eom).torque(forces), forces)
 
     def wish(self, now: fb.State) -> tuple[Array, Array]:
         """(f̃_c, τ̃_c) that brings centre of mass and base back, N and N·m."""
         a = -STIFFNESS * (now.com - self.state.com) - DAMPING * now.com_velocity
         R, R_desired = (state.frame_pose("base").rotation for state in (now, self.state))
         turn = -STIFFNESS * pin.log3(R @ R_desired.T) - DAMPING * now.frame_velocity("base")[3:]
-        return desired_wrench(now, a, rotational_inertia(now) @ turn)
+        return desired_wrench(now, a, centroidal_inertia(now) @ turn)
 
 
 def least_inside(cost: fb.Quadratic, rows: npt.ArrayLike) -> Array:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, wrench_set
 from floatbase.viewer import GREYS, MEASURED, PLANNED, View, Viewer, below, hexadecimal, roses, shapes
 

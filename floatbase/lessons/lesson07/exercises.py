@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.errors import InputError
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson07.helpers import LENGTH, MU, START, leaning, pushed, tuned
 from floatbase.lessons.rounding import about
-from floatbase.qp import RowLabel
+from floatbase.qp import ConstraintLabel
 from floatbase.simulation import Rollout
 
 INNER = MU * np.cos(np.pi / 4)  # of a pyramid inside the cone
@@ -113,7 +113,7 @@ def _changes() -> dict[str, Callable[[], Any]]:
             f = solution["forces"].reshape(4, 3)
             of = {"own": f[:, 2], "all": np.full(4, f[:, 2].sum()), "1": np.ones(4), "tangent": np.hypot(f[:, 0], f[:, 1])}
             names = standing_go2().contacts.names
-            rows = [(row, price) for row, price in solution.multipliers.items() if isinstance(row, RowLabel)]
+            rows = [(row, price) for row, price in solution.multipliers.items() if isinstance(row, ConstraintLabel)]
             room = {row: of[part][names.index(row.owner)] * np.cos(cos) * grows for row, _ in rows if row.kind == "friction"}
             return float(sign * sum(price * room.get(row, 0.0) for row, price in rows))
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.control import AnalyticController
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.controllers import Torques

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.errors import InputError
 from floatbase.friction import wrench_set
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.behaviours import Gait, Stand, Walk, support_margin
 from floatbase.lessons.lesson03 import standing_go2
 from floatbase.lessons.lesson06 import with_feet

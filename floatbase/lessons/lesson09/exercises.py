@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
@@ -82,7 +82,7 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
     corners = np.array([[sx * LENGTH / 2, sy * WIDTH / 2, 0.0] for sx in (1, -1) for sy in (1, -1)])
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets)
     limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), LOAD, np.full(4, np.inf))
-    return limits.reach([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, LOAD, 0.0, 0.0, 0.0])
+    return limits.max_scaling([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, LOAD, 0.0, 0.0, 0.0])
 
 
 # 09.4 ---------------------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 import floatbase as fb
-from floatbase._arrays import Array, read_only
+from floatbase._validation import Array, read_only
 from floatbase.behaviours import Gait, Stand, Swing
 from floatbase.dynamics import grasp_matrix
 from floatbase.friction import FrictionPolyhedron
@@ -87,7 +87,7 @@ def corner_forces(state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, fac
     facets: of each pyramid.
     """
     cones = zip(sole.normals, sole.mus, strict=True)
-    rows = block_diag(*(FrictionPolyhedron(n, mu, facets).rows for n, mu in cones))
+    rows = block_diag(*(FrictionPolyhedron(n, mu, facets).face_matrix for n, mu in cones))
     G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))
     weights = np.repeat([1.0, 10.0], 3)  # 1 N·m counts as 10 N: at the corners, 10 cm away, it is
     cost = fb.Quadratic.from_residual(weights[:, None] * G, weights * np.asarray(wrench))

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.behaviours import Step
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.lesson09.helpers import corner_forces, pressure
@@ -86,8 +86,8 @@ def show_sole(view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSe
         total = view.scale * forces.reshape(-1, 3).sum(axis=0)
         picture["planned/sum"] = shapes.arrow(at, total, PLANNED, _SIZE, halo=True)
     view.draw(_feet_only(view, picture, "left"))
-    missed = np.abs(contact_wrench(state, sole, forces, limits.about) - w)
-    possible = bool(np.max(limits.rows @ w) <= _BORDER * w[2])
+    missed = np.abs(contact_wrench(state, sole, forces, limits.reference_point) - w)
+    possible = bool(np.max(limits.face_matrix @ w) <= _BORDER * w[2])
     told = "corner forces exist" if possible else f"no corner forces make this: {_broken(limits, w)}"
     nearest = "" if possible else f"the nearest miss it by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
     return _slice(limits, w, told, nearest)
@@ -116,7 +116,7 @@ def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> 
 
 def _broken(limits: WrenchSet, wrench: Array) -> str:
     """Which kinds of rows a wrench breaks."""
-    broken = limits.rows[limits.rows @ wrench > _BORDER * wrench[2]]
+    broken = limits.face_matrix[limits.face_matrix @ wrench > _BORDER * wrench[2]]
     return ", ".join(dict.fromkeys(kinds_of(broken)))
 
 
@@ -135,7 +135,7 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     x = np.linspace(-half, half, _COLUMNS)
     many = np.tile(wrench, (len(x), 1))
     many[:, 4], many[:, 5] = -1e-3 * x * wrench[2], 0.0
-    room, by_twist = -many @ limits.rows.T, limits.rows[:, 5]  # each row says: by_twist · twist ≤ room
+    room, by_twist = -many @ limits.face_matrix.T, limits.face_matrix[:, 5]  # each row says: by_twist · twist ≤ room
     up, down, free = by_twist > _ZERO, by_twist < -_ZERO, np.abs(by_twist) <= _ZERO
     highest, lowest = (room[:, up] / by_twist[up]).min(axis=1), (room[:, down] / by_twist[down]).max(axis=1)
     there = (highest >= lowest) & np.all(room[:, free] >= -_ZERO * wrench[2], axis=1)

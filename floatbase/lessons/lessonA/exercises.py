@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, coriolis_matrix
 from floatbase.lessons.exercises import Exercise, Numeric
 

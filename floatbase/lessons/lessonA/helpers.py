@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.behaviours import pitch_and_yaw
 from floatbase.simulation import Rollout
 

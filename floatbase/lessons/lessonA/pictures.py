@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import floatbase as fb
-from floatbase._arrays import Array
-from floatbase.dynamics import bias_forces, seen_from_turning_frame
+from floatbase._validation import Array
+from floatbase.dynamics import bias_forces, view_from_rotating_frame
 from floatbase.lessons.exercises import vector_text
 from floatbase.simulation import Rollout
 from floatbase.viewer import GREYS, Picture, View, Viewer, geometry, hexadecimal, props, shapes
@@ -36,7 +36,7 @@ def show_ride(view: Viewer, omega: float, speed: float, time: float) -> str:
     omega: rad/s, of the table, to the left. speed: m/s, of the puck, along x. time: s, at least a moment.
     """
     times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
-    seen = seen_from_turning_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
+    seen = view_from_rotating_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
     top = np.array([0.0, 0.0, HEIGHT])
     straight = START + np.outer(times, [speed, 0.0, 0.0])
     chalk = seen.position @ seen.rotation[-1].T  # where the table has carried it by now

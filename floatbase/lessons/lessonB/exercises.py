@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict, numbers
 from floatbase.lessons.lessonB.helpers import comes_back
 from floatbase.lessons.rounding import about

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.actuators import VACUUM, Hydraulics
 from floatbase.lessons.lessonB.bench import Bench, Row, held_then_turned, run_loop
 from floatbase.lessons.rounding import about

@@ -233,7 +233,7 @@ def _kinds(names: Sequence[str]) -> str:
 
 def rounds_from(guess: Sequence[str]) -> int:
     """How many rounds `active_set` takes for the QP of exercise C.4 from a guess of its active rows."""
-    return active_set(braking(), working=tuple(guess)).solution.iterations
+    return active_set(braking(), working_set=tuple(guess)).solution.iterations
 
 
 STEP_STUB = '''def longest_step(x, p, G, h, W):

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._arrays import Array, checked
+from floatbase._validation import Array, as_array
 from floatbase.lessons.controllers import Torques
 from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.lesson03 import standing_go2
@@ -27,9 +27,9 @@ def corner_table(minimum: npt.ArrayLike = (-1.5, -1.5), curvature: npt.ArrayLike
 
     Rows: table up ≥ 0, ramp along - 3 up ≤ 2, roof 2 along + 3 up ≤ 2, wall along ≥ -3.
     """
-    H = np.diag(checked("curvature", curvature, (2,)))
+    H = np.diag(as_array("curvature", curvature, (2,)))
     G, h = np.array([[0.0, -1.0], [1.0, -3.0], [2.0, 3.0], [-1.0, 0.0]]), np.array([0.0, 2.0, 2.0, 3.0])
-    return fb.QP(H, -H @ checked("minimum", minimum, (2,)), *_NONE, G, h, inequality_names=("table", "ramp", "roof", "wall"))
+    return fb.QP(H, -H @ as_array("minimum", minimum, (2,)), *_NONE, G, h, inequality_names=("table", "ramp", "roof", "wall"))
 
 
 def six_edges() -> fb.QP:
@@ -67,7 +67,7 @@ class EveryTick:
     def __call__(self, q: Array, v: Array, t: float) -> Torques:
         """The torques for configuration q and velocity v."""
         qp = self.controller.qp(fb.State(self.robot, q, v), t)
-        x = checked("x", self.solver(qp), (qp.n,))
+        x = as_array("x", self.solver(qp), (qp.n,))
         return Torques(x[qp.blocks["tau"]], x[qp.blocks["forces"]])
 
 
@@ -83,8 +83,8 @@ class Stopped:
 
     def __call__(self, qp: fb.QP) -> Array:
         """x of one tick, shape (n,)."""
-        working: Sequence[str] = self.runs[-1].working if self.warm and self.runs else ()
-        self.runs.append(active_set(qp, working=working, most=self.most))
+        working: Sequence[str] = self.runs[-1].working_set if self.warm and self.runs else ()
+        self.runs.append(active_set(qp, working_set=working, max_iterations=self.most))
         return self.runs[-1].solution.x
 
 
@@ -117,8 +117,8 @@ def between_walls(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> l
     start: (n,), inside all rows. softness: (k,), from soft to hard, each begun where the last ended. This is the central path
     of interior-point methods. Source: Boyd and Vandenberghe, Convex Optimization, ch. 11.2.
     """
-    x, points = checked("start", start, (qp.n,)), []
-    for t in checked("softness", softness, (None,)):
+    x, points = as_array("start", start, (qp.n,)), []
+    for t in as_array("softness", softness, (None,)):
         for _ in range(60):
             slack = qp.h - qp.G @ x
             slope = qp.H @ x + qp.g + t * qp.G.T @ (1.0 / slack)

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.lessons.lessonC.helpers import corner_table
 from floatbase.lessons.rounding import about
 from floatbase.qp import QP, table_top

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict, numbers
 from floatbase.lessons.lessonP.helpers import BAG, HIDDEN, box_in_the_dark, on_two_feet, sinks
 

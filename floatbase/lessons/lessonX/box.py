@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array, Value, read_only, whole
+from floatbase._validation import Array, Value, read_only, as_integer
 from floatbase.robots import Robot
 
 
@@ -53,7 +53,7 @@ class BlackBox(Value):
 
     def state(self, i: int | np.integer[Any]) -> fb.State:
         """The state at row i."""
-        row = whole("row", i, -len(self), len(self) - 1)
+        row = as_integer("row", i, -len(self), len(self) - 1)
         return fb.State(self.robot, self.q[row], self.v[row])
 
     def equations(self, i: int | np.integer[Any]) -> fb.EquationsOfMotion:

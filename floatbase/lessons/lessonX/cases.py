@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 import floatbase as fb
-from floatbase._arrays import Array, whole
+from floatbase._validation import Array, as_integer
 from floatbase.actuators import FirstOrderLag
 from floatbase.control import Belief, Command
 from floatbase.errors import InfeasibleError, unknown_name
@@ -217,14 +217,14 @@ class Case:
 
 def drawn_cases(seed: int) -> tuple[Case, ...]:
     """Six cases by chance, one of each fault, in an order by chance. The same for the same seed, a whole number."""
-    rng = np.random.default_rng([whole("seed", seed, 0, LARGEST_SEED), 6])
+    rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 6])
     order = [FAULTS[i] for i in rng.permutation(len(FAULTS))]
     return tuple(Case(name, twists(rng), Mistake.drawn(fault, rng)) for name, fault in zip("ABCDEF", order, strict=True))
 
 
 def innocent_cases(seed: int) -> tuple[Case, ...]:
     """Two cases by chance without a fault: in the second somebody kicks the robot over."""
-    rng = np.random.default_rng([whole("seed", seed, 0, LARGEST_SEED), 2])
+    rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 2])
     return Case("N", twists(rng), Mistake()), Case("K", twists(rng), Mistake(), (drawn_kick(rng),))
 
 

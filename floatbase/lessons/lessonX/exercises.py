@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict
 from floatbase.lessons.lessonX import program
 from floatbase.lessons.lessonX.box import BlackBox

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from floatbase._arrays import Array
+from floatbase._validation import Array
 from floatbase.lessons.lessonX.box import BlackBox
 from floatbase.lessons.lessonX.tools import lagged
 from floatbase.simulation import Rollout

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._arrays import Array, cross
+from floatbase._validation import Array, cross
 from floatbase.lessons.lessonX.box import BlackBox
 
 _STANDS = 5.0  # N of a foot that bears on the ground

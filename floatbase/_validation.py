@@ -16,14 +16,14 @@ import numpy.typing as npt
 from floatbase.errors import InputError
 
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
-Kind = TypeVar("Kind")
+T = TypeVar("T")
 _FLOAT64 = np.dtype(np.float64)
-LARGEST = 1e30  # in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
-_NO_LENGTH = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
-_SEVERAL = ("Contacts", "EquationsOfMotion", "Limits", "HydraulicActuators")  # names that take no article
-_SHORT = 60  # characters of a value that a message repeats
+MAX_MAGNITUDE = 1e30  # in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
+_ZERO_NORM = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
+_NO_ARTICLE = ("Contacts", "EquationsOfMotion", "Limits", "HydraulicActuators")  # names that take no article
+_MAX_REPR = 60  # characters of a value that a message repeats
 
-# how to get one, by class: for the messages of `of_kind`
+# how to get one, by class: for the messages of `as_instance`
 _EXAMPLES = {
     "Robot": 'fb.load("go2")',
     "State": "robot.standing()",
@@ -41,7 +41,7 @@ _EXAMPLES = {
 }
 
 
-class cached_property(functools.cached_property[Kind]):
+class cached_property(functools.cached_property[T]):
     """What a value computes of itself when it is first asked for, and keeps; where threads ask at once, what the first found.
 
     It takes no lock, as that of functools does in Python 3.11: values find the same whenever they compute it, and in a forked
@@ -51,12 +51,12 @@ class cached_property(functools.cached_property[Kind]):
     @overload
     def __get__(self, value: None, owner: type | None = None) -> Self: ...
     @overload
-    def __get__(self, value: object, owner: type | None = None) -> Kind: ...
-    def __get__(self, value: object, owner: type | None = None) -> Self | Kind:
+    def __get__(self, value: object, owner: type | None = None) -> T: ...
+    def __get__(self, value: object, owner: type | None = None) -> Self | T:
         if value is None:
             return self
-        found: Kind = value.__dict__.setdefault(self.attrname, self.func(value))  # type: ignore[arg-type]  # it has a name
-        return found
+        computed: T = value.__dict__.setdefault(self.attrname, self.func(value))  # type: ignore[arg-type]  # it has a name
+        return computed
 
 
 class Value:
@@ -90,86 +90,86 @@ class Value:
             object.__setattr__(self, name, MappingProxyType(value) if type(value) is dict else value)
 
 
-class Fixed:
-    """Base of objects that keep what they were made with: once they have `_made`, no public attribute takes another value.
+class FixedAttributes:
+    """Base of objects that keep what they were made with: once they are `_initialised`, no public attribute changes.
 
     A class derived from one of them may set attributes of its own; properties that can be set stay so.
     """
 
-    _instead: ClassVar[dict[str, str]] = {}  # by public name: what to do instead of assigning to it
+    _hints: ClassVar[dict[str, str]] = {}  # by public name: what to do instead of assigning to it
 
     def __setattr__(self, name: str, value: object) -> None:
-        known = name in self._instead
-        own = name.startswith("_") or getattr(getattr(type(self), name, None), "fset", None) is not None
-        if own or "_made" not in vars(self) or not (known or Fixed in type(self).__bases__):
+        has_hint = name in self._hints
+        settable = name.startswith("_") or getattr(getattr(type(self), name, None), "fset", None) is not None
+        if settable or "_initialised" not in vars(self) or not (has_hint or FixedAttributes in type(self).__bases__):
             object.__setattr__(self, name, value)
             return
-        kind = type(self).__name__
-        if known:
-            raise InputError(f"{name} of a {kind} cannot be set once it is made: {self._instead[name]}.")
-        near = get_close_matches(name, self._instead, n=1)
-        raise InputError(f"a {kind} has no {name!r} to set{f'; {near[0]}? {self._instead[near[0]]}' if near else ''}.")
+        cls = type(self).__name__
+        if has_hint:
+            raise InputError(f"{name} of a {cls} cannot be set once it is made: {self._hints[name]}.")
+        close = get_close_matches(name, self._hints, n=1)
+        raise InputError(f"a {cls} has no {name!r} to set{f'; {close[0]}? {self._hints[close[0]]}' if close else ''}.")
 
 
-def of_kind(name: str, value: object, kind: type[Kind], example: str = "") -> Kind:
+def as_instance(name: str, value: object, cls: type[T], example: str = "") -> T:
     """`value`, after checking that it is a `kind`. example: how to get one, where the table above has none."""
-    if isinstance(value, kind):
+    if isinstance(value, cls):
         return value
-    example = example or _EXAMPLES.get(kind.__name__, "")
-    raise InputError(f"{name} must be {_one(kind)}{f', as {example}' if example else ''}, not {said(value)}.")
+    example = example or _EXAMPLES.get(cls.__name__, "")
+    raise InputError(f"{name} must be {_with_article(cls)}{f', as {example}' if example else ''}, not {short_repr(value)}.")
 
 
-def text(name: str, value: object) -> str:
+def as_string(name: str, value: object) -> str:
     """`value`, after checking that it is a text."""
     if isinstance(value, str):
         return value
-    raise InputError(f"{name} must be a text, not {said(value)}.")
+    raise InputError(f"{name} must be a text, not {short_repr(value)}.")
 
 
-def texts(name: str, value: Any) -> tuple[str, ...]:
+def as_strings(name: str, value: Any) -> tuple[str, ...]:
     """`value` as a tuple, after checking that it is a list of texts, and not one text."""
     if isinstance(value, Sequence) and not isinstance(value, str) and all(isinstance(entry, str) for entry in value):
         return tuple(value)
     example = value if isinstance(value, str) else "…"
-    raise InputError(f'{name} must be a list of names, as in {name}=["{example}"], not {said(value)}.')
+    raise InputError(f'{name} must be a list of names, as in {name}=["{example}"], not {short_repr(value)}.')
 
 
-def flag(name: str, value: object) -> bool:
+def as_bool(name: str, value: object) -> bool:
     """`value` as a bool, after checking that it is one: "no" would count as true."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise InputError(f"{name} must be True or False, not {said(value)}.")
+    raise InputError(f"{name} must be True or False, not {short_repr(value)}.")
 
 
-def function(name: str, value: Any, call: str) -> Any:
+def as_callable(name: str, value: Any, usage: str) -> Any:
     """`value`, after checking that it can be called as `call` says, such as "rows(state, t)"."""
     if not callable(value) or isinstance(value, type):
-        raise InputError(f"{name} must be a function, called as {call}, not {said(value)}.")
-    given = [part for part in call.partition("(")[2].strip(")").split(",") if part]
-    if fault := misfit(value, *given):
-        raise InputError(f"{name} must be a function that can be called as {call}; {fault}.")
+        raise InputError(f"{name} must be a function, called as {usage}, not {short_repr(value)}.")
+    arguments = [part for part in usage.partition("(")[2].strip(")").split(",") if part]
+    if error := signature_error(value, *arguments):
+        raise InputError(f"{name} must be a function that can be called as {usage}; {error}.")
     return value
 
 
-def misfit(function: Any, *given: object, **named: object) -> str:
+def signature_error(function: Any, *args: object, **kwargs: object) -> str:
     """What a function takes, and why it cannot be called like this; "" where it can, or hides it, as compiled ones do."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):
         return ""
     try:
-        signature.bind(*given, **named)
+        signature.bind(*args, **kwargs)
     except TypeError as error:
         return f"{getattr(function, '__name__', type(function).__name__)} takes {signature}: {error}"
     return ""
 
 
-def whole(name: str, value: Any, least: int, most: int, why: str = "") -> int:
+def as_integer(name: str, value: Any, minimum: int, maximum: int, reason: str = "") -> int:
     """`value` as an int, after checking that it is a whole number from `least` to `most`. why: the reason for the bounds."""
-    plain = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    if plain and least <= value <= most and value == int(value):
+    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if is_number and minimum <= value <= maximum and value == int(value):
         return int(value)
-    raise InputError(f"{name} is {said(value)}; it must be a whole number ≥ {least} and ≤ {most}{f': {why}' if why else ''}.")
+    raise InputError(f"{name} is {short_repr(value)}; it must be a whole number ≥ {minimum} and ≤ {maximum}" + (f": {reason}." if reason else "."))
 
 
 def read_only(value: Any) -> Array:
@@ -179,10 +179,10 @@ def read_only(value: Any) -> Array:
     """
     if _is_read_only(value):
         return value
-    return sealed(np.array(value, dtype=np.float64))
+    return frozen(np.array(value, dtype=np.float64))
 
 
-def sealed(array: Array) -> Array:
+def frozen(array: Array) -> Array:
     """An array that nobody else has, which cannot be written to any more."""
     array.setflags(write=False)
     return array
@@ -196,7 +196,7 @@ def _is_read_only(value: Any) -> bool:
     return flags.c_contiguous and (base is None or (type(base) is np.ndarray and not base.flags.writeable))
 
 
-def plain_numbers(value: Any) -> Array | None:
+def numeric_copy(value: Any) -> Array | None:
     """A float64 copy of numbers; None for anything else: complex or masked numbers, texts, truth values, dates, objects."""
     if type(value) is np.ndarray and value.dtype is _FLOAT64:
         return value.copy("K")  # most of them, and in the controller's loop
@@ -209,101 +209,101 @@ def plain_numbers(value: Any) -> Array | None:
     return array.astype(np.float64, copy=False)
 
 
-def checked(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
+def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
     """`value`, `read_only`, after checking that it holds plain numbers of `shape` (None = any length), finite ones.
 
     Raises `InputError` with the name, the shape found and the shape required.
     """
-    array = value if _is_read_only(value) else plain_numbers(value)
+    array = value if _is_read_only(value) else numeric_copy(value)
     if array is None:
-        required = f"numbers of shape {_text(shape)}" if shape else "a number"
-        raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {said(value)}.")
-    if array.shape != shape and not _fits(array.shape, shape):
-        required = f"have shape {_text(shape)}" if shape else "be one number"
-        one_row = ": one row alone is rows[:1], not rows[0]" if array.ndim == 1 and shape[:-1] in ((None,), (1,)) else ""
-        raise InputError(f"{name} has shape {array.shape}; it must {required}{f' ({unit})' if unit else ''}{one_row}.")
+        required = f"numbers of shape {_shape_str(shape)}" if shape else "a number"
+        raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {short_repr(value)}.")
+    if array.shape != shape and not _shape_matches(array.shape, shape):
+        required = f"have shape {_shape_str(shape)}" if shape else "be one number"
+        hint = ": one row alone is rows[:1], not rows[0]" if array.ndim == 1 and shape[:-1] in ((None,), (1,)) else ""
+        raise InputError(f"{name} has shape {array.shape}; it must {required}{f' ({unit})' if unit else ''}{hint}.")
     # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger, the entries decide
-    if not (np.vdot(array, array) <= LARGEST**2 or (usual := np.abs(array) <= LARGEST).all()):
-        at = tuple(np.argwhere(~usual)[0].tolist())
+    if not (np.vdot(array, array) <= MAX_MAGNITUDE**2 or (bounded := np.abs(array) <= MAX_MAGNITUDE).all()):
+        at = tuple(np.argwhere(~bounded)[0].tolist())
         place = f"holds {array[at]:g} at index {list(at)}; every entry must be" if shape else f"is {array[at]:g}; it must be"
-        raise InputError(f"{name} {place} a finite number{f' of at most {LARGEST:g}' if np.isfinite(array[at]) else ''}.")
-    return sealed(array)
+        raise InputError(f"{name} {place} a finite number{f' of at most {MAX_MAGNITUDE:g}' if np.isfinite(array[at]) else ''}.")
+    return frozen(array)
 
 
-def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
-    for have, n in zip(found, shape, strict=False):
-        if n is not None and n != have:
+def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    for size, required in zip(found, shape, strict=False):
+        if required is not None and required != size:
             return False
     return len(found) == len(shape)
 
 
-def flat_forces(forces: Any, k: int | None, name: str = "forces") -> Array:
+def as_forces(forces: Any, k: int | None, name: str = "forces") -> Array:
     """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked. k: None for any."""
-    found = plain_numbers(forces)
-    rows = found is not None and found.ndim == 2 and found.shape[1] == 3  # (3, k / 3) would come out in another order
-    return checked(name, found.ravel() if found is not None and rows else forces, (k,), "N")
+    array = numeric_copy(forces)
+    one_row_per_point = array is not None and array.ndim == 2 and array.shape[1] == 3  # not (3, k / 3): another order
+    return as_array(name, array.ravel() if array is not None and one_row_per_point else forces, (k,), "N")
 
 
-def number(name: str, value: Any, unit: str = "", least: float = -LARGEST, most: float = LARGEST) -> float:
+def as_number(name: str, value: Any, unit: str = "", minimum: float = -MAX_MAGNITUDE, maximum: float = MAX_MAGNITUDE) -> float:
     """`value` as a float, after checking that it is a plain number from `least` to `most`."""
-    found = float(value if isinstance(value, float) else checked(name, value, (), unit))
-    if least <= found <= most:
-        return found
-    bounds = "a finite number" if least == -LARGEST and most == LARGEST else f"from {least:g} to {most:g}"
-    raise InputError(f"{name} is {found:g}; it must be {bounds}{f' ({unit})' if unit else ''}.")
+    result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
+    if minimum <= result <= maximum:
+        return result
+    bounds = "a finite number" if minimum == -MAX_MAGNITUDE and maximum == MAX_MAGNITUDE else f"from {minimum:g} to {maximum:g}"
+    raise InputError(f"{name} is {result:g}; it must be {bounds}{f' ({unit})' if unit else ''}.")
 
 
-def positive(name: str, value: Any, unit: str = "", allow_zero: bool = False, most: float = LARGEST) -> float:
+def as_positive(name: str, value: Any, unit: str = "", allow_zero: bool = False, maximum: float = MAX_MAGNITUDE) -> float:
     """`value` as a float, after checking that it is above zero (or not below, with `allow_zero`) and at most `most`."""
-    found = float(value if isinstance(value, float) else checked(name, value, (), unit))
-    if 0.0 < found <= most or (found == 0.0 and allow_zero):
-        return found
-    bound = f"at most {most:g}" if found > 0.0 else "≥ 0" if allow_zero else "> 0"
-    raise InputError(f"{name} is {found:g}; it must be {bound}{f' {unit}' if unit else ''}.")
+    result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
+    if 0.0 < result <= maximum or (result == 0.0 and allow_zero):
+        return result
+    bound = f"at most {maximum:g}" if result > 0.0 else "≥ 0" if allow_zero else "> 0"
+    raise InputError(f"{name} is {result:g}; it must be {bound}{f' {unit}' if unit else ''}.")
 
 
-def said(value: object) -> str:
+def short_repr(value: object) -> str:
     """A value as a message repeats it: short, and by its kind where it is not a plain one."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
     if isinstance(value, np.ndarray) and value.ndim:
-        return f"{_one(type(value))} of {value.dtype} of shape {value.shape}"
-    if isinstance(value, int) and abs(value) > LARGEST:
-        return f"a whole number beyond {LARGEST:g}"
+        return f"{_with_article(type(value))} of {value.dtype} of shape {value.shape}"
+    if isinstance(value, int) and abs(value) > MAX_MAGNITUDE:
+        return f"a whole number beyond {MAX_MAGNITUDE:g}"
     if value is None or isinstance(value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray):
-        plain = " ".join(repr(value).split())
-        return plain if len(plain) <= _SHORT else f"{plain[:_SHORT]}…"
-    return _one(type(value))
+        text = " ".join(repr(value).split())
+        return text if len(text) <= _MAX_REPR else f"{text[:_MAX_REPR]}…"
+    return _with_article(type(value))
 
 
-def _one(kind: type) -> str:
+def _with_article(kind: type) -> str:
     """A class with its article."""
     name = {"ndarray": "array"}.get(kind.__name__, kind.__name__)
-    return name if name in _SEVERAL else f"{'an' if name[0].lower() in 'aeio' else 'a'} {name}"
+    return name if name in _NO_ARTICLE else f"{'an' if name[0].lower() in 'aeio' else 'a'} {name}"
 
 
 def unit_vector(name: str, value: Any) -> Array:
     """`value` scaled to unit length, shape (3,); a zero vector is an `InputError`."""
-    vector = checked(name, value, (3,))
+    vector = as_array(name, value, (3,))
     length = float(np.linalg.norm(vector))
-    if length < _NO_LENGTH:
+    if length < _ZERO_NORM:
         raise InputError(f"{name} is the zero vector; it must have a direction.")
     return read_only(vector / length)
 
 
-def half_spaces(name: str, normal: Any, offset: Any) -> tuple[Array, Array]:
+def as_half_spaces(name: str, normal: Any, offset: Any) -> tuple[Array, Array]:
     """Planes normal · x = offset as unit normals, shape (n, 3), and offsets, shape (n,), m, checked.
 
     normal: (3,) for one plane, (n, 3) for several. offset: m, one number for all, or (n,).
     """
-    found = plain_numbers(normal)
-    if found is None or found.ndim != 2 or found.shape[1] != 3 or not len(found):
+    array = numeric_copy(normal)
+    if array is None or array.ndim != 2 or array.shape[1] != 3 or not len(array):
         normals = unit_vector(f"normal of {name}", normal)[None]
     else:
-        normals = np.array([unit_vector(f"normal {i} of {name}", row) for i, row in enumerate(found)])
-    distance = plain_numbers(offset)
+        normals = np.array([unit_vector(f"normal {i} of {name}", row) for i, row in enumerate(array)])
+    distance = numeric_copy(offset)
     shape = () if distance is None or distance.ndim == 0 else (len(normals),)
-    offsets = np.broadcast_to(checked(f"offset of {name}", offset, shape, "m"), len(normals))
+    offsets = np.broadcast_to(as_array(f"offset of {name}", offset, shape, "m"), len(normals))
     return read_only(normals), read_only(offsets)
 
 
@@ -313,5 +313,5 @@ def cross(a: Array, b: Array) -> Array:
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
-def _text(shape: tuple[int | None, ...]) -> str:
+def _shape_str(shape: tuple[int | None, ...]) -> str:
     return str(tuple(n if n is None else int(n) for n in shape)).replace("None", "any")

@@ -12,7 +12,7 @@ from floatbase.robots.robot import Foot
 
 
 @dataclass(frozen=True)
-class Entry:
+class CatalogueEntry:
     """What the catalogue adds to a robot of example-robot-data.
 
     description: what the robot is for.
@@ -29,15 +29,15 @@ class Entry:
     sources: Mapping[str, str] = field(default_factory=dict)
 
 
-def _balls(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Foot, ...]:
+def _ball_feet(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Foot, ...]:
     return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
 
 
-_SOLE = np.array([[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]])  # of talos
-_SOLE_OF_G1 = np.array([[0.12, 0.03, -0.035], [0.12, -0.03, -0.035], [-0.05, -0.025, -0.035], [-0.05, 0.025, -0.035]])
+_TALOS_SOLE = np.array([[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]])  # of talos
+_G1_SOLE = np.array([[0.12, 0.03, -0.035], [0.12, -0.03, -0.035], [-0.05, -0.025, -0.035], [-0.05, 0.025, -0.035]])
 _solo = partial(
-    Entry,
-    feet=_balls(("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"), 0.016),
+    CatalogueEntry,
+    feet=_ball_feet(("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"), 0.016),
     torque_limit=2.7,
     sources={
         "foot radius": "half the width of the foot's mesh in example-robot-data",
@@ -46,32 +46,32 @@ _solo = partial(
     },
 )
 
-CATALOGUE: Mapping[str, Entry] = {
-    "go2": Entry(
+CATALOGUE: Mapping[str, CatalogueEntry] = {
+    "go2": CatalogueEntry(
         "quadruped with 3 joints a leg: as many leg torques as contact forces",
-        _balls(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022),
+        _ball_feet(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022),
         sources={"foot radius": "the foot's mesh in example-robot-data", "torque limits": "URDF"},
     ),
     "solo12": _solo("small quadruped with 3 joints a leg, weak motors: torque limits are near"),
     "solo8": _solo("small quadruped with 2 joints a leg: fewer torques than contact forces"),
-    "anymal_kinova": Entry(
+    "anymal_kinova": CatalogueEntry(
         "quadruped with an arm: more torques than contact forces",
-        _balls(("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), 0.031, (0.0, 0.0, 0.02325)),
+        _ball_feet(("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), 0.031, (0.0, 0.0, 0.02325)),
         sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
     ),
-    "talos": Entry(
+    "talos": CatalogueEntry(
         "humanoid with flat feet: each foot carries a wrench through its corners",
-        tuple(Foot(frame, corners=_SOLE) for frame in ("left_sole_link", "right_sole_link")),
+        tuple(Foot(frame, corners=_TALOS_SOLE) for frame in ("left_sole_link", "right_sole_link")),
         sources={"sole": "20 cm × 12 cm, within the ankle's collision mesh", "torque limits": "URDF"},
     ),
-    "hyq": Entry(
+    "hyq": CatalogueEntry(
         "hydraulic quadruped of 80 kg with 3 joints a leg",
-        _balls(("lf_foot", "rf_foot", "lh_foot", "rh_foot"), 0.02175),
+        _ball_feet(("lf_foot", "rf_foot", "lh_foot", "rh_foot"), 0.02175),
         sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
     ),
-    "g1": Entry(
+    "g1": CatalogueEntry(
         "humanoid of 33 kg with flat feet",
-        tuple(Foot(frame, corners=_SOLE_OF_G1) for frame in ("left_ankle_roll_link", "right_ankle_roll_link")),
+        tuple(Foot(frame, corners=_G1_SOLE) for frame in ("left_ankle_roll_link", "right_ankle_roll_link")),
         joints={
             f"{side}_{joint}_joint": angle
             for side in ("left", "right")
@@ -83,7 +83,7 @@ CATALOGUE: Mapping[str, Entry] = {
             "torque limits": "URDF",
         },
     ),
-    "ur5": Entry(
+    "ur5": CatalogueEntry(
         "arm bolted to the ground: the fixed-base equations (1)",
         joints={"shoulder_lift_joint": -1.3, "elbow_joint": 1.6, "wrist_1_joint": -0.3, "wrist_2_joint": 0.0},
         sources={"torque limits": "URDF"},
