@@ -5,7 +5,7 @@ Common to all: keep standing on all feet (centre of mass, base orientation, post
 the peers cannot say, the problem does without:
 
 - contacts are at the foot frames themselves, not at the balls' lowest points; normals point up;
-- the peers' friction pyramids touch the cone from outside (`inside=False`) and turn with a flat foot, so Talos' soles are level
+- the peers' friction pyramids touch the cone from outside (`inner_approximation=False`) and turn with a flat foot, so Talos' soles are level
   and straight in every state, as they are on level ground;
 - TSID (from Python) has no torque regularisation, and for flat feet only one of the foot's wrench rather than of the corner
   forces. It adds 1e-8 to the diagonal of its Hessian: that is a force regularisation, and on flat feet the only one;
@@ -28,7 +28,7 @@ import floatbase as fb
 ROBOTS = ("go2", "solo12", "talos")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 MU = 0.7
-WAYS = ("compiled", "own", "readable")  # floatbase's answers; own: compiled, with a task as a user writes it
+WAYS = ("compiled", "own", "reference")  # floatbase's answers; own: compiled, with a task as a user writes it
 POSTURE = 0.1  # weight; with that of standing_tasks, 1e-3, the peers' solver loses the digits in which torques are compared
 HESSIAN = 1e-8  # DEFAULT_HESSIAN_REGULARIZATION of TSID
 
@@ -93,8 +93,8 @@ class Problem:
         """
         com, *others = self.tasks
         tasks = [OwnCoM(com.position) if way == "own" else com, *others]
-        path = "compiled" if way == "own" else way
-        return fb.WholeBodyController(self.robot, self.contacts, tasks, facets=4, inside=False, path=path)
+        backend = "compiled" if way == "own" else way
+        return fb.WholeBodyController(self.robot, self.contacts, tasks, facets=4, inner_approximation=False, backend=backend)
 
     def states(self, label: str, n: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """Random configurations and velocities, the same ones every time."""

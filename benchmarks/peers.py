@@ -29,7 +29,7 @@ PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
 PLANAR = "placo planar"  # placo's own flat foot, an easier problem
 SIDES = {"tsid": "peer_tsid.py", "placo": "peer_placo.py", PLANAR: "peer_placo.py"}
 RUNS = {  # our way, whom it is measured beside, robots
-    "tsid": (("compiled", "tsid", ROBOTS), ("own", "tsid", ROBOTS), ("readable", "tsid", ("go2",))),
+    "tsid": (("compiled", "tsid", ROBOTS), ("own", "tsid", ROBOTS), ("reference", "tsid", ("go2",))),
     "placo": (("compiled", "placo", ROBOTS), ("compiled", PLANAR, ("talos",))),
 }
 
@@ -39,7 +39,7 @@ class Row:
     """One of our ways (`peer_problems.WAYS`), one robot, one peer, one kind of states.
 
     differences: of the torques, for each state, N·m; those up to tolerance count as none. within: the largest between
-    the path measured and the readable one on every fifth state, N·m. ours, theirs: times, µs. ratios: of the medians of each
+    the path measured and the reference one on every fifth state, N·m. ours, theirs: times, µs. ratios: of the medians of each
     block.
     """
 
@@ -116,11 +116,11 @@ def _differences(ours: Sequence[np.ndarray], theirs: Sequence[np.ndarray]) -> np
 
 
 def _within(problem: peer_problems.Problem, ours: Sequence[np.ndarray], states: Sequence) -> float:
-    """The largest difference from floatbase's readable path on some of the states, N·m, where that says who rounds."""
+    """The largest difference from floatbase's reference backend on some of the states, N·m, where that says who rounds."""
     if problem.peer == PLANAR or not states:
         return np.nan
-    readable = problem.controller("readable")
-    return float(np.max(_differences(ours[::5], [readable(q, v).tau for q, v in states[::5]])))
+    reference = problem.controller("reference")
+    return float(np.max(_differences(ours[::5], [reference(q, v).tau for q, v in states[::5]])))
 
 
 def ours(way: str) -> Process:
@@ -132,7 +132,7 @@ def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
     """Every row of one peer."""
     for way, name, robot in [(way, name, robot) for way, name, robots in RUNS[peer] for robot in robots]:
         pair = [ours(way), Process(python, HERE / SIDES[name])]
-        some = (max(1, n // 6), min(20, rounds)) if way == "readable" else (n, rounds)  # it takes long
+        some = (max(1, n // 6), min(20, rounds)) if way == "reference" else (n, rounds)  # it takes long
         yield from compare(pair, way, robot, name, *some)
         for process in pair:
             process.close()
@@ -142,7 +142,7 @@ def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
 
 
 def torque_table(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| our way | robot | peer | states | compared | no answer: ours, peer | largest difference | from our readable path |"
+    yield "| our way | robot | peer | states | compared | no answer: ours, peer | largest difference | from our reference |"
     yield "|---" * 8 + "|"
     for row in rows:
         missing, size = " and ".join(map(str, row.unanswered)), f"{row.difference:.1e} N·m | {row.within:.1e} N·m"
@@ -207,7 +207,7 @@ its `TaskComEquality`."""
 
 SAMENESS = """\
 Torques are compared before times are: they count as the same up to a millionth of the strongest motor's limit. What is left is
-rounding in the peers' solver, as floatbase's compiled and readable paths, which share no solver, agree more closely (on every
+rounding in the peers' solver, as floatbase's compiled and reference backends, which share no solver, agree more closely (on every
 fifth state)."""
 
 
@@ -215,7 +215,7 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
     """The text of peers.md."""
     equal = [row for row in rows if row.peer != PLANAR]
     other = [row for row in equal if not row.is_same]
-    compiled, own, readable = ([row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS)
+    compiled, own, reference = ([row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS)
     peers = "; ".join(f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items())
     lines = ["# The tick against C++ peers, measured", "", f"`python benchmarks/peers.py` on {machine()}. {peers}.", ""]
     lines += [f"**Not measured: {why}**\n" for why in lacking]
@@ -223,8 +223,8 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
     lines += ["## The same optimum", "", (peer_problems.__doc__ or "").strip(), "", SAMENESS, "", *torque_table(equal), ""]
     lines += [f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}, {row.way}.\n" for row in other]
     lines += ["## Times", "", *time_table(compiled), ""]
-    if readable:
-        lines += ['The readable path, `path="readable"`:', "", *time_table(readable, "readable"), ""]
+    if reference:
+        lines += ['The reference backend, `backend="reference"`:', "", *time_table(reference, "reference"), ""]
     lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(compiled), ""]
     if own:
         lines += ["## A task of one's own", "", OWN, "", *time_table(own, "own task"), ""]

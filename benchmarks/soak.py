@@ -33,7 +33,7 @@ from soak_kills import kills, sweeps
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Walk
-from floatbase.control import Rows
+from floatbase.control import LinearInequality
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.simulation import Live
 
@@ -84,8 +84,12 @@ def own() -> Soak:
     """The controller with a task, rows and a bound of one's own."""
     robot = fb.load("go2")
     at, contacts = robot.standing(), fb.Contacts.feet(robot)
-    rows = Rows("acceleration", "qdd", lambda eom, t: (np.eye(eom.nv)[6:], np.full(eom.d, 50.0)))
-    options: dict[str, Any] = {"rows": [rows], "max_normal_force": {"FL_foot": lambda t: 40.0}, "path": "compiled"}
+    inequality = LinearInequality("acceleration", "qdd", lambda eom, t: (np.eye(eom.nv)[6:], np.full(eom.d, 50.0)))
+    options: dict[str, Any] = {
+        "inequalities": [inequality],
+        "max_normal_force": {"FL_foot": lambda t: 40.0},
+        "backend": "compiled",
+    }
     controller = fb.WholeBodyController(robot, contacts, [Height(at.com[2]), *fb.standing_tasks(at)], **options)
     states = cycle([robot.random_state(seed, 0.05) for seed in range(1000)])
 

@@ -1,9 +1,9 @@
-"""How fast the controller's tick is, and that its paths agree: one command, a table and a plot.
+"""How fast the controller's tick is, and that its backends agree: one command, a table and a plot.
 
     python benchmarks/tick.py                      times, growth -> benchmarks/tick.md, benchmarks/tick.png
-    python benchmarks/tick.py --agreement 2000     compares the paths on that many random states for each robot and stance
+    python benchmarks/tick.py --agreement 2000     compares the backends on that many random states for each robot and stance
 
-Both paths take turns within one run, on the same states. Times are ratios to be trusted, microseconds to be taken with salt.
+Both backends take turns within one run, on the same states. Times are ratios to be trusted, microseconds to be taken with salt.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from pathlib import Path
 import numpy as np
 
 import floatbase as fb
-from floatbase.control import Rows
+from floatbase.control import LinearInequality
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint
 from floatbase.errors import InfeasibleError
 
 HERE = Path(__file__).parent
 ROBOTS = ("go2", "solo12", "talos")
-PATHS = ("compiled", "readable")
+BACKENDS = ("compiled", "reference")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 
 
@@ -37,10 +37,10 @@ def two_points(robot: fb.Robot) -> fb.Contacts:
     return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:2]])
 
 
-def controller(robot: fb.Robot, path: str = "compiled", **options: object) -> fb.WholeBodyController:
+def controller(robot: fb.Robot, backend: str = "compiled", **options: object) -> fb.WholeBodyController:
     """Keep standing on all feet."""
     contacts = options.pop("contacts") if "contacts" in options else fb.Contacts.feet(robot)
-    return fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), path=path, **options)
+    return fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), backend=backend, **options)
 
 
 def states(robot: fb.Robot, n: int, spread: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -71,12 +71,12 @@ def interleaved(
 
 
 def tick_times(n: int) -> Iterator[str]:
-    """Both paths, by robot and difficulty."""
-    yield "| robot | states | active rows | compiled median | compiled p99 | readable median | readable p99 | times faster |"
+    """Both backends, by robot and difficulty."""
+    yield "| robot | states | active rows | compiled median | compiled p99 | reference median | reference p99 | times faster |"
     yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
-        controllers = [controller(robot, path) for path in PATHS]
+        controllers = [controller(robot, backend) for backend in BACKENDS]
         for label, spread in SPREADS.items():
             at = states(robot, n, spread)
             active = np.mean([len(controllers[0](q, v).active) for q, v in at[:50]])
@@ -94,13 +94,13 @@ def parts(n: int) -> Iterator[str]:
     for name in ROBOTS:
         robot = fb.load(name)
         command = controller(robot)
-        compiled, numbers = command.compiled, command.compiled.empty_answer()
+        compiled, numbers = command.compiled, command.compiled.empty_result()
         for label, spread in SPREADS.items():
             spent = []
             for q, v in states(robot, n, spread):
                 update = clock(compiled.dynamics.update, [(q, v)] * 5)
-                given = (q, v, compiled.given.numbers, *compiled.arguments, numbers)
-                ticks = [clock(tick.tick, [(*given, last)] * 5) for last in range(1, tick.PARTS + 1)]
+                given = (q, v, compiled.default_inputs.packed, *compiled.arguments, numbers)
+                ticks = [clock(tick.tick, [(*given, last)] * 5) for last in range(1, tick.N_STAGES + 1)]
                 ends = [np.min(times) for times in (update, *ticks, clock(command, [(q, v)] * 5))]
                 spent.append([ends[0], *np.diff([0.0, *ends[1:-1]]), ends[-1] - ends[0] - ends[-2]])
             yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0)) + " |"
@@ -122,7 +122,7 @@ class OwnCoM:
 
 def own(n: int) -> Iterator[str]:
     """The same problem with the package's task for the centre of mass, with a user's, and with rows and a constraint beside."""
-    yield "| robot | states | package's tasks | own task | own task and 2 rows | own constraint | own task, readable |"
+    yield "| robot | states | package's tasks | own task | own task and 2 rows | own constraint | own task, reference |"
     yield "|---" * 7 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
@@ -130,14 +130,14 @@ def own(n: int) -> Iterator[str]:
         joint = np.eye(robot.nv)[-1:]
         tasks = fb.standing_tasks(at)
         mine = [OwnCoM(at.com), *tasks[1:]]
-        rows = Rows("acceleration", "qdd", (np.vstack([joint, -joint]), np.full(2, 50.0)))
+        inequality = LinearInequality("acceleration", "qdd", (np.vstack([joint, -joint]), np.full(2, 50.0)))
         held = feet + fb.Contacts([LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))])
         ways = [
-            fb.WholeBodyController(robot, feet, tasks, path="compiled"),
-            fb.WholeBodyController(robot, feet, mine, path="compiled"),
-            fb.WholeBodyController(robot, feet, mine, rows=[rows], path="compiled"),
-            fb.WholeBodyController(robot, held, tasks, path="compiled"),
-            fb.WholeBodyController(robot, feet, mine, path="readable"),
+            fb.WholeBodyController(robot, feet, tasks, backend="compiled"),
+            fb.WholeBodyController(robot, feet, mine, backend="compiled"),
+            fb.WholeBodyController(robot, feet, mine, inequalities=[inequality], backend="compiled"),
+            fb.WholeBodyController(robot, held, tasks, backend="compiled"),
+            fb.WholeBodyController(robot, feet, mine, backend="reference"),
         ]
         for label in ("easy", "saturated"):
             medians = [np.median(times) for times in interleaved(ways, states(robot, n, SPREADS[label]), 3)]
@@ -178,7 +178,7 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(1, len(curves), figsize=(11, 3.4), constrained_layout=True, sharey=True)
-    figure.suptitle("A tick of the compiled path")
+    figure.suptitle("A tick of the compiled backend")
     top = 1.1 * max(max(row[1:]) for rows in curves.values() for row in rows)
     for ax, (family, rows) in zip(axes, curves.items(), strict=True):
         x, easy, saturated = np.array(rows).T
@@ -195,26 +195,26 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
 
 
 def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
-    """Largest torque difference between the paths, on n random states of every robot and stance."""
-    yield "| robot | feet | states | infeasible | left to the readable path | largest difference |"
+    """Largest torque difference between the backends, on n random states of every robot and stance."""
+    yield "| robot | feet | states | infeasible | left to the reference backend | largest difference |"
     yield "|---" * 6 + "|"
     for name in names or fb.catalogue():
         robot = fb.load(name)
         feet = fb.Contacts.feet(robot)
         for count in range(min(1, len(feet)), len(feet) + 1):
             contacts = feet.only(*feet.names[:count]) if count else feet
-            compiled, readable = (controller(robot, path, contacts=contacts) for path in PATHS)
+            compiled, reference = (controller(robot, backend, contacts=contacts) for backend in BACKENDS)
             worst, left, infeasible = 0.0, 0, 0
             for seed in range(n):
                 state = robot.random_state(seed, tuple(SPREADS.values())[seed % 3])
                 try:
-                    expected = readable(state.q, state.v)
+                    expected = reference(state.q, state.v)
                 except InfeasibleError as error:
                     infeasible += 1
                     check_verdict(compiled, state, error.constraints, f"{name}, state {seed}")
                     continue
                 found = compiled(state.q, state.v)
-                left += found.path == "readable"
+                left += found.backend == "reference"
                 worst = max(worst, float(np.max(np.abs(found.tau - expected.tau))))
             yield f"| {name} | {count} | {n} | {infeasible} | {left} | {worst:.1e} N·m |"
 
@@ -225,9 +225,9 @@ def check_verdict(compiled: fb.WholeBodyController, state: fb.State, rows: Seque
         compiled(state.q, state.v)
     except InfeasibleError as error:
         if error.constraints != rows:
-            raise SystemExit(f"{where}: other rows on the compiled path") from None
+            raise SystemExit(f"{where}: other rows on the compiled backend") from None
         return
-    raise SystemExit(f"{where}: not infeasible on the compiled path")
+    raise SystemExit(f"{where}: not infeasible on the compiled backend")
 
 
 def long_run(ticks: int) -> Iterator[str]:
@@ -256,7 +256,7 @@ def machine() -> str:
 def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--states", type=int, default=400, help="random states for each row of the table")
-    ask.add_argument("--agreement", type=int, default=0, help="compare the paths on so many states, and measure no times")
+    ask.add_argument("--agreement", type=int, default=0, help="compare the backends on so many states, and measure no times")
     ask.add_argument("--long", type=int, default=0, help="run so many ticks, and measure nothing else")
     options = ask.parse_args()
     if options.agreement or options.long:

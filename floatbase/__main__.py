@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "compile":
         go2 = fb.load("go2")
         controller = fb.WholeBodyController(go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing()))
-        print(f"The controller takes its {controller.path} path: {controller.path_reason}.")
+        print(f"The controller uses its {controller.backend} backend: {controller.backend_reason}.")
         return 0
     try:
         return _view(options, sys.argv[1:] if arguments is None else arguments)

@@ -169,7 +169,10 @@ def as_integer(name: str, value: Any, minimum: int, maximum: int, reason: str = 
     is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
     if is_number and minimum <= value <= maximum and value == int(value):
         return int(value)
-    raise InputError(f"{name} is {short_repr(value)}; it must be a whole number ≥ {minimum} and ≤ {maximum}" + (f": {reason}." if reason else "."))
+    raise InputError(
+        f"{name} is {short_repr(value)}; it must be a whole number ≥ {minimum} and ≤ {maximum}"
+        + (f": {reason}." if reason else ".")
+    )
 
 
 def read_only(value: Any) -> Array:

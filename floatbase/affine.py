@@ -10,7 +10,19 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import MAX_MAGNITUDE, Array, Value, as_array, as_number, as_instance, numeric_copy, as_positive, read_only, short_repr, as_integer
+from floatbase._validation import (
+    MAX_MAGNITUDE,
+    Array,
+    Value,
+    as_array,
+    as_instance,
+    as_integer,
+    as_number,
+    as_positive,
+    numeric_copy,
+    read_only,
+    short_repr,
+)
 from floatbase.errors import InputError
 
 MAX_VARIABLES = 10_000  # a matrix with as many rows and columns takes 0.8 GB

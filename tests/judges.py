@@ -67,12 +67,12 @@ def controller_of(name: str, **options: object) -> fb.WholeBodyController:
 def pair(
     robot: Robot, contacts: fb.Contacts, tasks: list[object] | None = None, **options: object
 ) -> tuple[fb.WholeBodyController, fb.WholeBodyController]:
-    """The compiled and the readable controller of one problem; without tasks, of standing."""
+    """The compiled and the reference controller of one problem; without tasks, of standing."""
     tasks = list(fb.standing_tasks(robot.standing())) if tasks is None else tasks
-    compiled, readable = (
-        fb.WholeBodyController(robot, contacts, tasks, path=path, **options) for path in ("compiled", "readable")
+    compiled, reference = (
+        fb.WholeBodyController(robot, contacts, tasks, backend=backend, **options) for backend in ("compiled", "reference")
     )
-    return compiled, readable
+    return compiled, reference
 
 
 def near_and_far(name: str, n: int) -> list[State]:
@@ -90,7 +90,7 @@ def difference(one: fb.WholeBodyController, other: fb.WholeBodyController, state
         assert caught.value.constraints == error.constraints
         return 0.0
     found = one(state.q, state.v, t)
-    assert found.path == one.path, "the compiled tick left this state to the readable path"
+    assert found.backend == one.backend, "the compiled tick left this state to the reference backend"
     return float(np.max(np.abs(found.tau - expected.tau)))
 
 

@@ -23,7 +23,7 @@ import soak  # noqa: E402
 
 
 def test_the_friction_rows_are_those_of_the_peers():
-    qp = peer_problems.problem("go2", "tsid").controller("readable").qp(peer_problems.problem("go2", "tsid").robot.standing())
+    qp = peer_problems.problem("go2", "tsid").controller("reference").qp(peer_problems.problem("go2", "tsid").robot.standing())
     rows = qp.G[:4, qp.blocks["forces"]][:, :3]
     mu = peer_problems.MU
     expected = [[1, 0, -mu], [0, 1, -mu], [-1, 0, -mu], [0, -1, -mu]]
@@ -34,10 +34,10 @@ def test_the_friction_rows_are_those_of_the_peers():
 def test_a_process_gives_the_torques_of_its_controller():
     problem = peer_problems.problem("go2", "tsid")
     states = problem.states("medium", 2)
-    process = peers.ours("readable")
+    process = peers.ours("reference")
     assert process.ask("problem", problem.description) == "done"
     process.ask("states", {"some": [(q.tolist(), v.tolist()) for q, v in states]})
-    controller = problem.controller("readable")
+    controller = problem.controller("reference")
     assert np.allclose(process.ask("torques", "some"), [controller(q, v).tau for q, v in states], atol=1e-9)
     assert len(process.ask("clock", "some")) == 2 and min(process.ask("clock", "some")) > 0
     process.close()

@@ -102,7 +102,7 @@ def right() -> dict[str, Any]:
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2, "Mapping": {"a": 0.0},
         "A": np.eye(12), "H": np.eye(12), "G": np.eye(12), "b": ZERO, "g": ZERO, "h": ZERO, "x": ZERO, "r": ZERO,
         "N": np.eye(12)[:, :3], "tau": ZERO, "tau_desired": ZERO, "q_joints": state.q[7:], "v_joints": ZERO,
-        "size": np.ones(12), "centre": ZERO, "Cylinders.pose.q": ZERO, "q": state.q, "v": state.v, "dv": np.zeros(18),
+        "size": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q, "v": state.v, "dv": np.zeros(18),
         "qdd": np.zeros(18), "forces": forces, "plots.friction_used.forces": record().measured,
         "beta": np.zeros(space.dimension), "wrench": np.ones(6), "direction": np.ones(6),
         "points": contacts.positions(state), "max_normal_force": np.full(4, 200.0), "a": 10.0,
@@ -117,7 +117,7 @@ def right() -> dict[str, Any]:
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3, "alpha": 0.1, "rate": 30.0,
         "high": 1.0, "low": 0.0, "lift": 0.0, "omega": 5.0, "centripetal_acceleration.omega": UP,
-        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP, "Rows.rows": (np.eye(18), np.ones(18)),
+        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP, "LinearInequality.coefficients": (np.eye(18), np.ones(18)),
         "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2", "solver": "daqp",
         "column": "force", "status": "inside", "root": "/robot", "lesson": "07", "path": "floatbase-view.html",
         "load_urdf.path": str(judges.load("ur5").urdf),
@@ -127,7 +127,7 @@ def right() -> dict[str, Any]:
 # what only the package makes
 RESULTS = """
     EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorquesFromForces Pose
-    Power Robot PushRose Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation OilState
+    Power Robot PushRose Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live"),
@@ -139,10 +139,10 @@ LEFT_OUT = {
         "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian", "below_the_body",
         "target_shapes", "targets_at",
-        "QP.objective", "Belief.program", "Belief.check",
-        "Rows.labels", "Rows.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
-        "recording.lifted_at", "Cylinders.force", "Cylinders.line", "Cylinders.edge_flow", "Cylinders.flows",
-        "Cylinders.leak", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
+        "QP.objective", "ModelMismatch.assumed_qp", "ModelMismatch.check_names",
+        "LinearInequality.labels", "LinearInequality.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
+        "recording.lifted_at", "Cylinders.force", "Cylinders.line_pressures", "Cylinders.orifice_flow", "Cylinders.valve_flows",
+        "Cylinders.leakage_flow", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
         "recording.checked_rollout", "Ground.clearances", "with_image", "hear_at_once",
     ),
     "needs trimesh": ("urdf_visuals",),

@@ -21,7 +21,18 @@ from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
 from floatbase.control import AnalyticController
 from floatbase.dynamics import PointContact
 
-WITHOUT_ARRAYS = ("ActiveSetRun", "Belief", "FeasibleSpace", "Gains", "Gait", "Problem", "Residuals", "Rows", "Table", "World")
+WITHOUT_ARRAYS = (
+    "ActiveSetRun",
+    "ModelMismatch",
+    "FeasibleSpace",
+    "Gains",
+    "Gait",
+    "Problem",
+    "Residuals",
+    "LinearInequality",
+    "Table",
+    "World",
+)
 NO_VALUES = {
     "physics that changes": "AlteredSimulation",
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators Simulation WholeBodyController",

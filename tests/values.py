@@ -11,7 +11,7 @@ import numpy as np
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.behaviours import LIPM, Gains, Gait, Swing
-from floatbase.control import AnalyticController, Belief, Rows
+from floatbase.control import AnalyticController, LinearInequality, ModelMismatch
 from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_frame, moving_frame, view_from_rotating_frame
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torques_from_forces
@@ -38,7 +38,7 @@ def values() -> dict[str, Any]:
     state, contacts = robot.random_state(1, 0.1), judges.stance(robot)
     eom, command = fb.equations_of_motion(state, contacts), control(state.q, state.v)
     hydraulic, run = HydraulicActuators(robot), active_set(table_top())
-    pose = hydraulic.cylinders.pose(state.q[7:])
+    pose = hydraulic.cylinders.geometry(state.q[7:])
     plan = LIPM([(0.0, 1.0, np.zeros(2), np.full(2, 0.1))], np.zeros(2), 5.0)
     return {
         "Robot": robot, "Foot": talos.feet[0], "State": state, "Contacts": contacts,
@@ -57,12 +57,12 @@ def values() -> dict[str, Any]:
         "Command": command, "AnalyticCommand": AnalyticController(robot, contacts, state)(state.q, state.v),
         "Rollout": record(),
         "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(), "Hydraulics": hydraulic.cylinders.hydraulics,
-        "OilState": hydraulic.state, "Pose": pose,
-        "Power": hydraulic.cylinders.power(np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)),
+        "HydraulicState": hydraulic.state, "CylinderGeometry": pose,
+        "PowerBalance": hydraulic.cylinders.power(np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)),
         "bias forces": bias_forces(state), "contact space": contact_space(eom), "drive": moving_frame("base", np.zeros_like),
-        "Rows": Rows("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
+        "LinearInequality": LinearInequality("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
         "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
         "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan, "Gains": Gains(),
-        "Belief": Belief(mass=1.2), "World": World(mass=1.2),
+        "ModelMismatch": ModelMismatch(mass=1.2), "World": World(mass=1.2),
         "turning view": view_from_rotating_frame([0.0, 0.1], UP, UP),
     }  # fmt: skip

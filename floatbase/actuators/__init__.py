@@ -1,17 +1,17 @@
 """Hydraulic actuators between the torque that a controller desires and the one that a joint gets (App. B of the document)."""
 
-from floatbase.actuators.hydraulics import Cylinders, Hydraulics, Pose, Power
+from floatbase.actuators.hydraulic_actuators import VACUUM, HydraulicActuators, HydraulicState
+from floatbase.actuators.hydraulics import CylinderGeometry, Cylinders, Hydraulics, PowerBalance
 from floatbase.actuators.lags import Delay, FirstOrderLag
-from floatbase.actuators.loop import VACUUM, HydraulicActuators, OilState
 
 __all__ = [
     "VACUUM",
+    "CylinderGeometry",
     "Cylinders",
     "Delay",
     "FirstOrderLag",
     "HydraulicActuators",
+    "HydraulicState",
     "Hydraulics",
-    "OilState",
-    "Pose",
-    "Power",
+    "PowerBalance",
 ]

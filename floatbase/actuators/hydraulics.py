@@ -10,9 +10,9 @@ import numpy.typing as npt
 from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
 from floatbase.errors import InputError
 
-_LAMINAR = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
-_LEAST_GAIN = 1e-9  # N/s: least change of force by an open valve. Chambers at line pressure have none; they get the valve's all
-_SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
+_LAMINAR_DROP = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
+_MIN_GAIN = 1e-9  # N/s: least change of force by an open valve. Chambers at line pressure have none; they get the valve's all
+_CHAMBER_SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Hydraulics:
     supply_pressure, tank_pressure: Pa over the air outside.
     bulk_modulus: Pa, β_e.
     leakage: m³/(s Pa), past the piston.
-    rated_flow, rated_drop: m³/s through the valve, all open, when its two edges together take that drop, Pa.
+    rated_flow, rated_pressure_drop: m³/s through the valve, all open, when its two edges together take that drop, Pa.
     valve_bandwidth: Hz, where the spool's amplitude has fallen by 3 dB.
     loop_bandwidth: Hz, of the force loop: turn it down to make the actuator slow.
 
@@ -46,17 +46,17 @@ class Hydraulics:
     bulk_modulus: float = 1.3e9
     leakage: float = 2e-14
     rated_flow: float = 1.25e-4
-    rated_drop: float = 70e5
+    rated_pressure_drop: float = 70e5
     valve_bandwidth: float = 250.0
     loop_bandwidth: float = 50.0
 
     def __post_init__(self) -> None:
-        parts = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
-        for name, value in parts.items():
+        values = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
+        for name, value in values.items():
             as_positive(f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage"))
         for small, large in (("rod", "bore"), ("crank", "base"), ("tank pressure", "supply pressure")):
-            if parts[small] >= parts[large]:
-                size, bound = parts[small], parts[large]
+            if values[small] >= values[large]:
+                size, bound = values[small], values[large]
                 raise InputError(f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}.")
         if self.weakest_torque <= 0.0:
             raise InputError("the tank pressure on the bore holds off the supply on the ring: it must be lower.")
@@ -69,7 +69,7 @@ class Hydraulics:
     @property
     def valve_gain(self) -> float:
         """C_d w x_max √(2/ρ), m³/(s √Pa): flow per root of drop through one edge, all open; it takes half the rated drop."""
-        return self.rated_flow / float(np.sqrt(0.5 * self.rated_drop))
+        return self.rated_flow / float(np.sqrt(0.5 * self.rated_pressure_drop))
 
     @property
     def weakest_torque(self) -> float:
@@ -79,7 +79,7 @@ class Hydraulics:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose(Value):
+class CylinderGeometry(Value):
     """Where d cylinders stand at given joint angles.
 
     length: (d,) m, ℓ, from foot to rod end.
@@ -97,7 +97,7 @@ class Pose(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Power(Value):
+class PowerBalance(Value):
     """Where the power goes, each of shape (d,), W: pump = joint + valve + leakage + stored.
 
     pump: what the supply line gives less what the tank line takes.
@@ -128,41 +128,41 @@ class Cylinders(Value):
     x > 0 joins A to the supply and B to the tank, x < 0 the other way. Where Δp turns round, flow turns round.
     Source: Merritt, Hydraulic Control Systems, 1967; the triangle is HyQ's.
 
-    hydraulics: the cylinder of size 1.
-    size: (d,), each cylinder's torque as a multiple of that one's. Lengths are multiplied by size^(1/3), hence volumes, flow,
-        leakage and torque by size.
-    centre: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and cylinder stand square. L is zero
+    hydraulics: the cylinder of scale 1.
+    scale: (d,), each cylinder's torque as a multiple of that one's. Lengths are multiplied by scale^(1/3), hence volumes, flow,
+        leakage and torque by scale.
+    max_lever_angle: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and cylinder stand square. L is zero
         where they line up. The stroke 2 b lets a joint turn full circle.
 
     In the methods x is the valves' opening, shape (d,), -1 to 1; pressures those of the chambers A and B, shape (2, d), Pa;
-    pose from `pose(q)`; v the joints' velocities, shape (d,), rad/s.
+    geometry from `geometry(q)`; v the joints' velocities, shape (d,), rad/s.
     """
 
     hydraulics: Hydraulics
-    centre: Array
+    max_lever_angle: Array
     areas: Array
     crank: Array
     base: Array
-    _dead: Array
-    _flow: Array
+    _dead_volume: Array
+    _valve_gain: Array
     _leakage: Array
-    _best: float
+    _best_gamma: float
 
-    def __init__(self, hydraulics: Hydraulics, size: npt.ArrayLike, centre: npt.ArrayLike):
+    def __init__(self, hydraulics: Hydraulics, scale: npt.ArrayLike, max_lever_angle: npt.ArrayLike):
         as_instance("hydraulics", hydraulics, Hydraulics)
-        size = as_array("size", size, (None,))
-        if np.any(size <= 0.0):
-            raise InputError(f"size of a cylinder is {size.min():g}; it must be > 0.")
+        scale = as_array("scale", scale, (None,))
+        if np.any(scale <= 0.0):
+            raise InputError(f"scale of a cylinder is {scale.min():g}; it must be > 0.")
         vars(self).update(
             hydraulics=hydraulics,
-            centre=as_array("centre", centre, size.shape, "rad"),
-            areas=read_only(np.outer(hydraulics.areas, size ** (2.0 / 3.0))),
-            crank=read_only(hydraulics.crank * size ** (1.0 / 3.0)),
-            base=read_only(hydraulics.base * size ** (1.0 / 3.0)),
-            _dead=hydraulics.dead_volume * size,
-            _flow=hydraulics.valve_gain * size,
-            _leakage=hydraulics.leakage * size,
-            _best=float(np.arccos(hydraulics.crank / hydraulics.base)),  # γ with crank and cylinder square
+            max_lever_angle=as_array("max_lever_angle", max_lever_angle, scale.shape, "rad"),
+            areas=read_only(np.outer(hydraulics.areas, scale ** (2.0 / 3.0))),
+            crank=read_only(hydraulics.crank * scale ** (1.0 / 3.0)),
+            base=read_only(hydraulics.base * scale ** (1.0 / 3.0)),
+            _dead_volume=hydraulics.dead_volume * scale,
+            _valve_gain=hydraulics.valve_gain * scale,
+            _leakage=hydraulics.leakage * scale,
+            _best_gamma=float(np.arccos(hydraulics.crank / hydraulics.base)),  # γ with crank and cylinder square
         )
 
     @property
@@ -170,15 +170,15 @@ class Cylinders(Value):
         """Number of cylinders."""
         return int(self.crank.size)
 
-    def pose(self, q: npt.ArrayLike) -> Pose:
+    def geometry(self, q: npt.ArrayLike) -> CylinderGeometry:
         """Lengths, levers and chambers at joint angles q, shape (d,), rad."""
-        gamma = self._best + as_array("q", q, (self.d,), "rad") - self.centre
+        gamma = self._best_gamma + as_array("q", q, (self.d,), "rad") - self.max_lever_angle
         length = np.sqrt(self.base**2 + self.crank**2 - 2.0 * self.base * self.crank * np.cos(gamma))
-        out = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
-        volumes = self._dead + self.areas * np.array([out, 2.0 * self.crank - out])
+        extension = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
+        volumes = self._dead_volume + self.areas * np.array([extension, 2.0 * self.crank - extension])
         compliance = volumes / self.hydraulics.bulk_modulus
         lever, stiffness = self.base * self.crank * np.sin(gamma) / length, np.sum(self.areas**2 / compliance, axis=0)
-        return Pose(*map(read_only, (length, lever, volumes, compliance, stiffness)))
+        return CylinderGeometry(*map(read_only, (length, lever, volumes, compliance, stiffness)))
 
     def force(self, pressures: Array) -> Array:
         """F = p_A A_A - p_B A_B, shape (d,), N."""
@@ -189,47 +189,49 @@ class Cylinders(Value):
         lines = np.array([[self.hydraulics.tank_pressure], [self.hydraulics.supply_pressure]])
         return np.array([self.force(lines), self.force(lines[::-1])])
 
-    def line(self, x: Array) -> Array:
+    def line_pressures(self, x: Array) -> Array:
         """Pressure of the line that each chamber is open to, shape (2, d), Pa, when the valve opens towards x."""
-        return np.where(_SIGN * x >= 0.0, self.hydraulics.supply_pressure, self.hydraulics.tank_pressure)
+        return np.where(_CHAMBER_SIGN * x >= 0.0, self.hydraulics.supply_pressure, self.hydraulics.tank_pressure)
 
-    def edge_flow(self, drop: Array) -> Array:
+    def orifice_flow(self, drop: Array) -> Array:
         """Flow through an edge, all open, for a drop of pressure, shape (2, d), m³/s: √Δp, but smooth through zero."""
-        return self._flow * drop / np.sqrt(np.hypot(drop, _LAMINAR))
+        return self._valve_gain * drop / np.sqrt(np.hypot(drop, _LAMINAR_DROP))
 
-    def flows(self, x: Array, pressures: Array) -> Array:
+    def valve_flows(self, x: Array, pressures: Array) -> Array:
         """Q into the chambers A and B, shape (2, d), m³/s."""
-        return np.abs(x) * self.edge_flow(self.line(x) - pressures)
+        return np.abs(x) * self.orifice_flow(self.line_pressures(x) - pressures)
 
-    def leak(self, pressures: Array) -> Array:
+    def leakage_flow(self, pressures: Array) -> Array:
         """Flow past the piston out of the chambers A and B, shape (2, d), m³/s."""
         return self._leakage * (pressures - pressures[::-1])
 
-    def pressure_rates(self, x: Array, pressures: Array, pose: Pose, v: Array) -> Array:
+    def pressure_rates(self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array) -> Array:
         """ṗ of the chambers A and B, shape (2, d), Pa/s."""
-        into = self.flows(x, pressures) - self.leak(pressures) - _SIGN * self.areas * (pose.lever * v)
-        return into / pose.compliance
+        inflow = (
+            self.valve_flows(x, pressures) - self.leakage_flow(pressures) - _CHAMBER_SIGN * self.areas * (geometry.lever * v)
+        )
+        return inflow / geometry.compliance
 
-    def pressure_decay(self, x: Array, pressures: Array, pose: Pose) -> Array:
+    def pressure_decay(self, x: Array, pressures: Array, geometry: CylinderGeometry) -> Array:
         """-∂ṗ/∂p of each chamber by itself, shape (2, d), 1/s, never negative: how stiff the oil's equations are."""
-        drop = self.line(x) - pressures
-        slope = self._flow * (0.5 * drop**2 + _LAMINAR**2) / np.hypot(drop, _LAMINAR) ** 2.5
-        return (np.abs(x) * slope + self._leakage) / pose.compliance
+        drop = self.line_pressures(x) - pressures
+        slope = self._valve_gain * (0.5 * drop**2 + _LAMINAR_DROP**2) / np.hypot(drop, _LAMINAR_DROP) ** 2.5
+        return (np.abs(x) * slope + self._leakage) / geometry.compliance
 
-    def opening_for(self, force_rate: Array, pressures: Array, pose: Pose, v: Array) -> Array:
+    def opening_for(self, force_rate: Array, pressures: Array, geometry: CylinderGeometry, v: Array) -> Array:
         """The opening, shape (d,), that makes the force change by force_rate, (d,) N/s, while the joints move with v.
 
         Ḟ = x g - k ℓ̇ with k the oil's stiffness and g the change of force at the valve all open, so x = (Ḟ + k ℓ̇) / g: it
         feeds the piston's velocity forward. Leakage is left to the loop's integral. x may be beyond -1 to 1.
         """
-        by_valve = force_rate + pose.stiffness * pose.lever * v
-        full = self.edge_flow(self.line(by_valve) - pressures) / pose.compliance
-        return by_valve / np.maximum(np.sign(by_valve) * self.force(full), _LEAST_GAIN)
+        valve_force_rate = force_rate + geometry.stiffness * geometry.lever * v
+        full_opening_rate = self.orifice_flow(self.line_pressures(valve_force_rate) - pressures) / geometry.compliance
+        return valve_force_rate / np.maximum(np.sign(valve_force_rate) * self.force(full_opening_rate), _MIN_GAIN)
 
-    def power(self, x: Array, pressures: Array, pose: Pose, v: Array) -> Power:
-        """Where the power goes at an instant: see `Power`."""
-        flows, line = self.flows(x, pressures), self.line(x)
-        stored = pose.compliance * pressures * self.pressure_rates(x, pressures, pose, v)
-        lost = pressures * self.leak(pressures)
-        pump, valve, leakage, stored = (np.sum(p, axis=0) for p in (line * flows, (line - pressures) * flows, lost, stored))
-        return Power(*map(read_only, (pump, self.force(pressures) * pose.lever * v, valve, leakage, stored)))
+    def power(self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array) -> PowerBalance:
+        """Where the power goes at an instant: see `PowerBalance`."""
+        flows, line = self.valve_flows(x, pressures), self.line_pressures(x)
+        stored = geometry.compliance * pressures * self.pressure_rates(x, pressures, geometry, v)
+        leaked = pressures * self.leakage_flow(pressures)
+        pump, valve, leakage, stored = (np.sum(p, axis=0) for p in (line * flows, (line - pressures) * flows, leaked, stored))
+        return PowerBalance(*map(read_only, (pump, self.force(pressures) * geometry.lever * v, valve, leakage, stored)))

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from floatbase._validation import Array, as_array, as_instance, as_positive, read_only
 from floatbase.robots import Robot
 
-_TICK = 1e-9  # s: times are counted in whole nanoseconds, so that no rounding adds up from step to step
-_LONGEST = 10.0  # s, of a delay and of a step: longer is a slip of units
+_TIME_UNIT = 1e-9  # s: times are counted in whole nanoseconds, so that no rounding adds up from step to step
+_MAX_TIME = 10.0  # s, of a delay and of a step: longer is a slip of units
 
 
 class Delay:
@@ -23,7 +23,7 @@ class Delay:
 
     def __init__(self, robot: Robot, delay: float):
         self.robot = as_instance("robot", robot, Robot)
-        self.delay = as_positive("delay", delay, "s", allow_zero=True, maximum=_LONGEST)
+        self.delay = as_positive("delay", delay, "s", allow_zero=True, maximum=_MAX_TIME)
         self.reset()
 
     def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
@@ -31,7 +31,7 @@ class Delay:
 
         q_joints: (d,) rad, not used: this actuator asks for no angles, but is called as the hydraulic ones are.
         """
-        self._line = deque([(round(self.delay / _TICK), _held(self.robot, tau, q_joints))])
+        self._queue = deque([(round(self.delay / _TIME_UNIT), _checked_reset(self.robot, tau, q_joints))])
 
     def step(self, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike, dt: float) -> Array:
         """The torques that arrive in the next dt s, shape (d,), N·m: their mean where they change meanwhile.
@@ -39,16 +39,16 @@ class Delay:
         tau_desired: (d,) N·m, from now on, for dt s.
         q_joints, v_joints: (d,) rad and rad/s, not used.
         """
-        step = left = _ticks(dt)
-        self._line.append((step, _given(self.robot, tau_desired, q_joints, v_joints)))
+        step = remaining = _time_units(dt)
+        self._queue.append((step, _checked_desired(self.robot, tau_desired, q_joints, v_joints)))
         tau = np.zeros(self.robot.d)
-        while left:
-            length, arriving = self._line.popleft()
-            part = min(length, left)
-            tau += part / step * arriving
-            left -= part
-            if part < length:
-                self._line.appendleft((length - part, arriving))
+        while remaining:
+            length, arriving = self._queue.popleft()
+            duration = min(length, remaining)
+            tau += duration / step * arriving
+            remaining -= duration
+            if duration < length:
+                self._queue.appendleft((length - duration, arriving))
         return tau
 
 
@@ -70,7 +70,7 @@ class FirstOrderLag:
 
         q_joints: (d,) rad, not used: this actuator asks for no angles, but is called as the hydraulic ones are.
         """
-        self.tau = _held(self.robot, tau, q_joints)
+        self.tau = _checked_reset(self.robot, tau, q_joints)
 
     def step(self, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike, dt: float) -> Array:
         """Let dt s pass, exactly for a τ_d that stays; the torques at their end, shape (d,), N·m.
@@ -78,26 +78,26 @@ class FirstOrderLag:
         tau_desired: (d,) N·m.
         q_joints, v_joints: (d,) rad and rad/s, not used.
         """
-        desired = _given(self.robot, tau_desired, q_joints, v_joints)
-        time = as_positive("dt", dt, "s", maximum=_LONGEST)
-        gone = -np.expm1(-2.0 * np.pi * self.bandwidth * time)
-        self.tau = read_only(self.tau + gone * (desired - self.tau))
+        desired = _checked_desired(self.robot, tau_desired, q_joints, v_joints)
+        time = as_positive("dt", dt, "s", maximum=_MAX_TIME)
+        fraction = -np.expm1(-2.0 * np.pi * self.bandwidth * time)
+        self.tau = read_only(self.tau + fraction * (desired - self.tau))
         return self.tau
 
 
-def _ticks(dt: float) -> int:
+def _time_units(dt: float) -> int:
     """A step's time in whole nanoseconds, at least one."""
-    return max(1, round(as_positive("dt", dt, "s", maximum=_LONGEST) / _TICK))
+    return max(1, round(as_positive("dt", dt, "s", maximum=_MAX_TIME) / _TIME_UNIT))
 
 
-def _held(robot: Robot, tau: npt.ArrayLike | None, q_joints: npt.ArrayLike | None) -> Array:
+def _checked_reset(robot: Robot, tau: npt.ArrayLike | None, q_joints: npt.ArrayLike | None) -> Array:
     """What a reset is given, looked at: torques, zero by default."""
     if q_joints is not None:
         as_array("q_joints", q_joints, (robot.d,), "rad")
     return read_only(as_array("tau", np.zeros(robot.d) if tau is None else tau, (robot.d,), "N·m"))
 
 
-def _given(robot: Robot, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike) -> Array:
+def _checked_desired(robot: Robot, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike) -> Array:
     """What a step is given, looked at: the desired torques."""
     as_array("q_joints", q_joints, (robot.d,), "rad")
     as_array("v_joints", v_joints, (robot.d,), "rad/s")

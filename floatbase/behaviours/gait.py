@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from floatbase._validation import Value, as_number, as_instance, as_positive, as_string, as_integer
+from floatbase._validation import Value, as_instance, as_integer, as_number, as_positive, as_string
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot
 

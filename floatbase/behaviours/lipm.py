@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from floatbase._validation import Array, Value, cached_property, as_array, as_number, as_positive, read_only, short_repr
+from floatbase._validation import Array, Value, as_array, as_number, as_positive, cached_property, read_only, short_repr
 from floatbase.errors import InputError
 
 Piece: TypeAlias = tuple[float, float, Array, Array]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_number, as_instance, as_positive
+from floatbase._validation import Array, as_instance, as_number, as_positive
 from floatbase.behaviours.footholds import capture_point, support_margin
 from floatbase.behaviours.gait import Gait, check_that_one_stands
 from floatbase.behaviours.walk import Walk

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, FixedAttributes, as_array, as_callable, as_number, as_instance, as_positive
+from floatbase._validation import Array, FixedAttributes, as_array, as_callable, as_instance, as_number, as_positive
 from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
 from floatbase.behaviours.gait import SAME_TIME, Gait, check_that_one_stands
 from floatbase.behaviours.lipm import LIPM, Piece

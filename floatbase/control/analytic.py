@@ -12,7 +12,7 @@ from floatbase._validation import Array, Value, as_array, as_instance, as_positi
 from floatbase.affine import Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, equations_of_motion, feasible_space
 from floatbase.errors import InputError
-from floatbase.objectives import cost_on_space, desired_wrench, force_bias, centroidal_inertia, wrench_objective
+from floatbase.objectives import centroidal_inertia, cost_on_space, desired_wrench, force_bias, wrench_objective
 from floatbase.robots import Robot, State
 
 
@@ -47,22 +47,22 @@ class AnalyticController(Value):
     kp: 1/s², stiffness.
     kd: 1/s, damping.
     bias_weight: weight of (23) beside (22).
-    posture: per (rad/s²)², weight of the joints' return to `state`.
-    torque: per (N·m)², weight of ‖τ‖².
+    posture_weight: per (rad/s²)², weight of the joints' return to `state`.
+    torque_weight: per (N·m)², weight of ‖τ‖².
 
-    `posture` and `torque` settle what (22)(23) leave open (d > k). Where nothing is left open they compete with the desired
+    `posture_weight` and `torque_weight` settle what (22)(23) leave open (d > k). Where nothing is left open they compete with the desired
     wrench; a light robot feels the weight of the posture more. Raises `InputError` for values that do not fit.
     """
 
     robot: Robot
     contacts: Contacts
     com: Array
-    _desired: State
-    _bias: Quadratic
+    _desired_state: State
+    _force_bias: Quadratic
     _kp: float
     _kd: float
-    _posture: float
-    _torque: float
+    _posture_weight: float
+    _torque_weight: float
 
     def __init__(
         self,
@@ -76,8 +76,8 @@ class AnalyticController(Value):
         kp: float = 100.0,
         kd: float = 20.0,
         bias_weight: float = 1e-3,
-        posture: float = 1e-3,
-        torque: float = 1e-6,
+        posture_weight: float = 1e-3,
+        torque_weight: float = 1e-6,
     ):
         as_instance("robot", robot, Robot)
         as_instance("contacts", contacts, Contacts)
@@ -85,17 +85,17 @@ class AnalyticController(Value):
         if state.robot != robot:
             raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
         equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
-        share = robot.weight / max(contacts.n_points, 1)
+        weight_share = robot.weight / max(contacts.n_points, 1)
         vars(self).update(
             robot=robot,
             contacts=contacts,
             com=as_array("com", state.com if com is None else com, (3,), "m"),
-            _desired=state,
-            _bias=as_positive("bias_weight", bias_weight) * force_bias(contacts, alpha, share if a is None else a),
+            _desired_state=state,
+            _force_bias=as_positive("bias_weight", bias_weight) * force_bias(contacts, alpha, weight_share if a is None else a),
             _kp=as_positive("kp", kp, "1/s²"),
             _kd=as_positive("kd", kd, "1/s"),
-            _posture=as_positive("posture", posture),
-            _torque=as_positive("torque", torque),
+            _posture_weight=as_positive("posture_weight", posture_weight),
+            _torque_weight=as_positive("torque_weight", torque_weight),
         )
 
     def objective(self, eom: EquationsOfMotion) -> tuple[Quadratic, Quadratic, Quadratic]:
@@ -104,13 +104,13 @@ class AnalyticController(Value):
         if state.robot != self.robot:
             raise InputError(f"the equations are of {state.robot.name}, the controller of another robot, {self.robot.name}.")
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
-        R, R_desired = state.frame_pose("base").rotation, self._desired.frame_pose("base").rotation
-        turn = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
-        wrench = desired_wrench(state, a, centroidal_inertia(state) @ turn)
-        on_forces = wrench_objective(state, eom.contacts, *wrench) + self._bias
-        joints = (-self._kp * state.difference(self._desired.q) - self._kd * state.v)[eom.nv - eom.d :]
-        on_qdd = Quadratic.from_residual(eom.S.T, joints, self._posture)
-        return on_qdd, Quadratic.from_residual(np.eye(eom.d), np.zeros(eom.d), self._torque), on_forces
+        R, R_desired = state.frame_pose("base").rotation, self._desired_state.frame_pose("base").rotation
+        angular_acceleration = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
+        wrench = desired_wrench(state, a, centroidal_inertia(state) @ angular_acceleration)
+        force_cost = wrench_objective(state, eom.contacts, *wrench) + self._force_bias
+        joint_acceleration = (-self._kp * state.difference(self._desired_state.q) - self._kd * state.v)[eom.nv - eom.d :]
+        qdd_cost = Quadratic.from_residual(eom.S.T, joint_acceleration, self._posture_weight)
+        return qdd_cost, Quadratic.from_residual(np.eye(eom.d), np.zeros(eom.d), self._torque_weight), force_cost
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> AnalyticCommand:
         """The tick: the minimum over β, mapped back to (q̈, τ, λ)."""

@@ -19,7 +19,7 @@ class Command(Value):
     qdd: (nv,), the acceleration planned with them: base linear m/s² and angular rad/s² in the base frame, then joints.
     forces: (k,) N, world, the contact forces planned with them, stacked as in `contacts`.
     contacts: the contacts that the forces act at.
-    path: which way answered, "compiled" or "readable".
+    backend: which backend answered, "compiled" or "reference".
     solution: what `solution` gives, or a function that makes it when it is first asked for.
 
     It does not change, and its arrays are read-only.
@@ -29,15 +29,21 @@ class Command(Value):
     qdd: Array
     forces: Array
     contacts: Contacts
-    path: str
+    backend: str
     _solution: Solution | Callable[[], Solution]
 
     def __init__(
-        self, tau: Array, qdd: Array, forces: Array, contacts: Contacts, path: str, solution: Solution | Callable[[], Solution]
+        self,
+        tau: Array,
+        qdd: Array,
+        forces: Array,
+        contacts: Contacts,
+        backend: str,
+        solution: Solution | Callable[[], Solution],
     ) -> None:
         values = self.__dict__  # written to directly: a frozen dataclass takes 0.4 µs more at every tick, this 0.1 µs
         values["tau"], values["qdd"], values["forces"] = tau, qdd, forces
-        values["contacts"], values["path"], values["_solution"] = contacts, path, solution
+        values["contacts"], values["backend"], values["_solution"] = contacts, backend, solution
 
     @cached_property
     def solution(self) -> Solution:
@@ -64,5 +70,5 @@ class Command(Value):
     def __repr__(self) -> str:
         return (
             f"Command(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N, "
-            f"{len(self.active)} rows active, {self.path})"
+            f"{len(self.active)} rows active, {self.backend})"
         )

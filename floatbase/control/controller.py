@@ -1,4 +1,4 @@
-"""`WholeBodyController`: (26)(27) solved at every tick, on the compiled way where it can be."""
+"""`WholeBodyController`: (26)(27) solved at every tick, on the compiled backend where it can be."""
 
 from __future__ import annotations
 
@@ -9,34 +9,43 @@ from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
 import numpy.typing as npt
 
-from floatbase._validation import MAX_MAGNITUDE, Array, FixedAttributes, as_array, as_number, as_instance, numeric_copy, read_only
-from floatbase.control.belief import TRUTH, Belief
+from floatbase._validation import (
+    MAX_MAGNITUDE,
+    Array,
+    FixedAttributes,
+    as_array,
+    as_instance,
+    as_number,
+    numeric_copy,
+    read_only,
+)
 from floatbase.control.command import Command
-from floatbase.control.limits import Limits, NormalForces, Rows
-from floatbase.control.problem import Problem, rehearsal
-from floatbase.control.soft import contact_weight_of, softened
-from floatbase.control.tick import Compiled, Given, cache_warning, obstacle
+from floatbase.control.limits import Limits, LinearInequality, NormalForces
+from floatbase.control.model_mismatch import NO_MISMATCH, ModelMismatch
+from floatbase.control.problem import Problem, dry_run
+from floatbase.control.soft import contact_weight_of, with_soft_contacts
+from floatbase.control.tick import CompiledTick, TickInputs, cache_warning, unsupported_reason
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver, solve
 from floatbase.robots import Robot, State, as_torque_limits
 
-Path: TypeAlias = Literal["auto", "compiled", "readable"]
+Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 
-_ANOTHER = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
+_MAKE_NEW = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
 _OPTIONS = (
     "facets",
-    "inside",
-    "turn",
+    "inner_approximation",
+    "facet_rotation",
     "min_normal_force",
     "max_normal_force",
     "torque_limits",
-    "rows",
+    "inequalities",
     "contact_weight",
-    "belief",
+    "mismatch",
     "solver",
-    "path",
+    "backend",
 )
 
 
@@ -47,27 +56,27 @@ class WholeBodyController(FixedAttributes):
     contacts: its contacts with the ground.
     tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`. Where none acts on forces, or
         none on torques, a `ForceTask()` or a `TorqueTask()` of small weight is added, so that the optimum is unique.
-    facets, inside, turn: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
+    facets, inner_approximation, facet_rotation: the friction polyhedron, see `floatbase.friction.FrictionPolyhedron`.
     min_normal_force, max_normal_force: N, at every contact point, so at each corner of a flat foot; one number, or a mapping
         from the name of a contact to a number or a function of t: a foot that is unloaded. The name of a foot that does not
         stand bounds nothing until it does, so that `replace(contacts=…)` may lift it; other names that are no contact's are
         errors.
     torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.
-    rows: inequality rows of one's own on q̈, τ or λ, see `floatbase.control.Rows`.
+    inequalities: inequality rows of one's own on q̈, τ or λ, see `floatbase.control.LinearInequality`.
     contact_weight: None holds the contacts by rows, (5). A number, such as 1e4, puts ½ contact_weight ‖A q̈ - b‖² into the
         objective instead: contacts give way where torques and friction do not suffice to hold them, and only rows of one's own
         and bounds of normal forces can make a tick infeasible.
-    belief: what is taken for (7), the truth by default, see `floatbase.control.Belief`; any other takes the readable path.
+    mismatch: what is taken for (7), the truth by default, see `floatbase.control.ModelMismatch`; any other takes the reference backend.
     solver: one of `floatbase.qp.solvers()`.
-    path: "readable" assembles and solves the QP as it is written. "compiled" solves the same problem many times faster
+    backend: "reference" assembles and solves the QP as it is written. "compiled" solves the same problem many times faster
         (`floatbase.control.tick`), with tasks, constraints and rows of one's own too. "auto" takes compiled where it can.
 
-    The attribute `path` says which way runs, `path_reason` why. `problem` is what is solved. The first compiled controller ever
+    The attribute `backend` says which backend runs, `backend_reason` why. `problem` is what is solved. The first compiled controller ever
     compiles for about a minute, unless the set-up did (`python -m floatbase compile`). Later ones load what was compiled,
     from the package's folder, the user's cache or NUMBA_CACHE_DIR, whichever can be written to; they answer alike to the bit,
-    and the process that compiled may differ by rounding. Where nothing can be kept, `path_reason` says why. A state that the
-    compiled tick cannot answer to the last digits, or that has no answer, is handed to the readable path, and its
-    `Command.path` says so.
+    and the process that compiled may differ by rounding. Where nothing can be kept, `backend_reason` says why. A state that the
+    compiled tick cannot answer to the last digits, or that has no answer, is handed to the reference backend, and its
+    `Command.backend` says so.
 
     Functions of t and objects of one's own are tried once when a controller is made with them, at t = 0, where the robot
     stands: a trajectory that begins later must give something at 0 too.
@@ -77,8 +86,8 @@ class WholeBodyController(FixedAttributes):
 
     _hints: ClassVar[dict[str, str]] = {
         **{name: f"controller.replace({name}=…) is a new one that has it" for name in ("contacts", "tasks", "limits")},
-        **{name: _ANOTHER.format(name) for name in _OPTIONS},
-        **dict.fromkeys(("robot", "problem", "compiled", "path_reason", "requested_path"), _ANOTHER.format("…")),
+        **{name: _MAKE_NEW.format(name) for name in _OPTIONS},
+        **dict.fromkeys(("robot", "problem", "compiled", "backend_reason", "requested_backend"), _MAKE_NEW.format("…")),
     }
 
     def __init__(
@@ -88,51 +97,53 @@ class WholeBodyController(FixedAttributes):
         tasks: Sequence[Task],
         *,
         facets: int = 4,
-        inside: bool = True,
-        turn: float = 0.0,
+        inner_approximation: bool = True,
+        facet_rotation: float = 0.0,
         min_normal_force: NormalForces = 0.0,
         max_normal_force: NormalForces | None = None,
         torque_limits: npt.ArrayLike | None = None,
-        rows: Sequence[Rows] = (),
+        inequalities: Sequence[LinearInequality] = (),
         contact_weight: float | None = None,
-        belief: Belief = TRUTH,
+        mismatch: ModelMismatch = NO_MISMATCH,
         solver: str = "daqp",
-        path: Path = "auto",
+        backend: Backend = "auto",
     ):
         as_instance("robot", robot, Robot)
         limits = robot.torque_limits if torque_limits is None else as_torque_limits(robot.d, torque_limits)
-        bounds = Limits(limits, facets, inside, min_normal_force, max_normal_force, rows, turn)
-        problem = Problem(robot, contacts, tasks, bounds, belief)
+        checked_limits = Limits(
+            limits, facets, inner_approximation, min_normal_force, max_normal_force, inequalities, facet_rotation
+        )
+        problem = Problem(robot, contacts, tasks, checked_limits, mismatch)
         if contact_weight is not None:
-            problem = Problem(robot, *softened(contacts, problem.tasks, contact_weight), bounds, belief)
-        belief.check(contacts)
-        bounds.check_names(contacts.names, _feet(robot))
-        with rehearsal():
+            problem = Problem(robot, *with_soft_contacts(contacts, problem.tasks, contact_weight), checked_limits, mismatch)
+        mismatch.check_names(contacts)
+        checked_limits.check_names(contacts.names, _foot_frames(robot))
+        with dry_run():
             problem.qp(robot.standing())  # names that do not exist and shapes that do not fit are told now, and not in the loop
-        self._prepare(problem, solver, path)
+        self._prepare(problem, solver, backend)
 
-    def _prepare(self, problem: Problem, solver: str, path: Path, warm_up: bool = True) -> None:
+    def _prepare(self, problem: Problem, solver: str, backend: Backend, warm_up: bool = True) -> None:
         """Keep a checked problem, and prepare the compiled tick where it can be had. warm_up: run it once, outside the loop."""
-        self.problem, self.solver, self.requested_path = problem, solver, path
+        self.problem, self.solver, self.requested_backend = problem, solver, backend
         check_solver(solver)
-        if not isinstance(path, str) or path not in get_args(Path):
-            raise unknown_name("path", path, get_args(Path))
-        reason = "it was requested" if path == "readable" else _obstacle(problem, solver)
-        compiled = None if reason else Compiled(problem)
+        if not isinstance(backend, str) or backend not in get_args(Backend):
+            raise unknown_name("backend", backend, get_args(Backend))
+        reason = "it was requested" if backend == "reference" else _unsupported_reason(problem, solver)
+        compiled = None if reason else CompiledTick(problem)
         if compiled is not None and warm_up:
             reason = compiled.warm_up()
-        if reason and path == "compiled":
-            raise InputError(f'path="compiled" is not possible: {reason}. path="auto" takes the fastest that is.')
+        if reason and backend == "compiled":
+            raise InputError(f'backend="compiled" is not possible: {reason}. backend="auto" takes the fastest that is.')
         self.compiled = None if reason else compiled
-        self.path: Literal["compiled", "readable"] = "readable" if reason else "compiled"
-        self.path_reason = reason or "nothing stands in its way" + cache_warning()
+        self.backend: Literal["compiled", "reference"] = "reference" if reason else "compiled"
+        self.backend_reason = reason or "nothing stands in its way" + cache_warning()
         self._initialised = True
 
-    def __getstate__(self) -> tuple[Problem, str, Path]:
+    def __getstate__(self) -> tuple[Problem, str, Backend]:
         """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory and is made anew."""
-        return self.problem, self.solver, self.requested_path
+        return self.problem, self.solver, self.requested_backend
 
-    def __setstate__(self, state: tuple[Problem, str, Path]) -> None:
+    def __setstate__(self, state: tuple[Problem, str, Backend]) -> None:
         self._prepare(*state)
 
     @property
@@ -170,27 +181,27 @@ class WholeBodyController(FixedAttributes):
             return command
         solution = solve(self.qp(State(self.robot, q, v), t), self.solver)
         tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
-        return Command(tau, qdd, forces, self.contacts, "readable", solution)
+        return Command(tau, qdd, forces, self.contacts, "reference", solution)
 
-    def _compiled_command(self, tick: Compiled, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
-        """The compiled tick's answer, or None where the readable path must answer, or say what is wrong."""
-        at, moving = numeric_copy(q), numeric_copy(v)
-        if at is None or moving is None:
+    def _compiled_command(self, tick: CompiledTick, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command | None:
+        """The compiled tick's answer, or None where the reference backend must answer, or say what is wrong."""
+        q_array, v_array = numeric_copy(q), numeric_copy(v)
+        if q_array is None or v_array is None:
             return None
-        answer = tick(at, moving, t)
+        answer = tick(q_array, v_array, t)
         if answer is None:
             return None
-        numbers = answer[0]
-        numbers.setflags(write=False)
-        solution = partial(self._solution_of, at, moving, t, *answer)
-        return Command(numbers[tick.tau], numbers[tick.qdd], numbers[tick.forces], self.contacts, "compiled", solution)
+        result = answer[0]
+        result.setflags(write=False)
+        solution = partial(self._solution_of, q_array, v_array, t, *answer)
+        return Command(result[tick.tau], result[tick.qdd], result[tick.forces], self.contacts, "compiled", solution)
 
-    def _solution_of(self, q: Array, v: Array, t: float, numbers: Array, n_active: int, given: Given) -> Solution:
-        """The readable problem at q, v and t, with what `Compiled.__call__` returned for them as its solution."""
+    def _solution_of(self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs) -> Solution:
+        """The reference problem at q, v and t, with what `CompiledTick.__call__` returned for them as its solution."""
         tick = self.compiled
         assert tick is not None  # it answered
-        x, mu = numbers[: tick.forces.stop], tick.multipliers(numbers, n_active, given)
-        return Solution(tick.qp(q, v, t, given), x, mu, "compiled", n_active)
+        x, mu = result[: tick.forces.stop], tick.multipliers(result, n_active, inputs)
+        return Solution(tick.qp(q, v, t, inputs), x, mu, "compiled", n_active)
 
     def replace(
         self, *, contacts: Contacts | None = None, tasks: Sequence[Task] | None = None, limits: Limits | None = None
@@ -201,30 +212,30 @@ class WholeBodyController(FixedAttributes):
         """
         weight = contact_weight_of(self.tasks)
         if weight is not None:
-            contacts, tasks = softened(
+            contacts, tasks = with_soft_contacts(
                 self.contacts if contacts is None else contacts, self.tasks if tasks is None else tasks, weight
             )
         new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
         problem = replace(self.problem, **{name: value for name, value in new.items() if value is not None})
         if limits is not None:
-            limits.check_names(problem.contacts.names, self.contacts.names, _feet(self.robot), before=self.limits)
+            limits.check_names(problem.contacts.names, self.contacts.names, _foot_frames(self.robot), before=self.limits)
         other = object.__new__(type(self))
-        other._prepare(problem, self.solver, self.requested_path, warm_up=self.compiled is None)
+        other._prepare(problem, self.solver, self.requested_backend, warm_up=self.compiled is None)
         if other.compiled is None:
             problem.check()
-        elif tasks is not None or limits is not None or other.compiled.own.any:  # what its tables have not found to fit
-            problem.check(other.compiled.unknown)
+        elif tasks is not None or limits is not None or other.compiled.user_terms.any:  # what its tables have not found to fit
+            problem.check(other.compiled.unchecked_tasks)
         return other
 
     def __repr__(self) -> str:
-        return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.path})"
+        return f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, {len(self.tasks)} tasks, {self.backend})"
 
 
-def _obstacle(problem: Problem, solver: str) -> str:
+def _unsupported_reason(problem: Problem, solver: str) -> str:
     """Why a problem cannot run compiled, or ""."""
-    return obstacle(problem, solver) if problem.belief.is_true else "its belief is not the truth"
+    return unsupported_reason(problem, solver) if problem.mismatch.is_exact else "its model mismatch is not zero"
 
 
-def _feet(robot: Robot) -> list[str]:
+def _foot_frames(robot: Robot) -> list[str]:
     """Frames of the feet, which are the names of contacts there."""
     return [foot.frame for foot in robot.feet]

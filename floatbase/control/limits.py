@@ -14,16 +14,16 @@ import numpy.typing as npt
 from floatbase._validation import (
     Array,
     Value,
-    cached_property,
     as_array,
     as_callable,
     as_instance,
-    numeric_copy,
     as_positive,
-    read_only,
-    short_repr,
     as_string,
     as_strings,
+    cached_property,
+    numeric_copy,
+    read_only,
+    short_repr,
 )
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
@@ -34,62 +34,68 @@ from floatbase.robots import Robot, as_torque_limits
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
 SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of each block: its name among the equations of motion
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
-RowsAt: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
+Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows(Value):
+class LinearInequality(Value):
     """Inequality rows of one's own, G x ≤ h, on one block x of (q̈, τ, λ).
 
     name: in messages; of the row, where there is one, else of "name 0", "name 1", …
     block: "qdd", "tau" or "forces".
-    rows: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives them; n is the size of the block, which
+    coefficients: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives them; n is the size of the block, which
         for forces goes with the contacts. The unit is that of the rows: N for forces, m/s² or rad/s² for accelerations.
-    owners: one text for each row instead of its number, such as the names of joints.
+    row_names: one text for each row instead of its number, such as the names of joints.
 
-    Bounds on joints' accelerations, with E = np.eye(robot.nv)[6:]: `Rows("acceleration", "qdd", (E, np.full(robot.d, 50.0)))`.
+    Bounds on joints' accelerations, with E = np.eye(robot.nv)[6:]: `LinearInequality("acceleration", "qdd", (E, np.full(robot.d, 50.0)))`.
     At most 500 N from all feet, however many stand:
-    `Rows("total", "forces", lambda eom, t: (np.tile([0.0, 0.0, 1.0], (1, eom.k // 3)), [500.0]))`.
+    `LinearInequality("total", "forces", lambda eom, t: (np.tile([0.0, 0.0, 1.0], (1, eom.k // 3)), [500.0]))`.
     Raises `InputError` for another block; `at` does so for shapes that do not fit.
     """
 
     name: str
     block: Block
-    rows: RowsAt | Callable[[EquationsOfMotion, float], RowsAt]
-    owners: Sequence[str] = ()
+    coefficients: Coefficients | Callable[[EquationsOfMotion, float], Coefficients]
+    row_names: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        as_string("name of the rows", self.name)
-        if as_string("block of the rows", self.block) not in BLOCKS:
-            raise InputError(f'rows {self.name!r} have block {short_repr(self.block)}; it must be "qdd", "tau" or "forces".')
-        object.__setattr__(self, "owners", as_strings(f"owners of {self.name}", self.owners))
-        if callable(self.rows) and not isinstance(self.rows, type):
-            as_callable(f"rows of {self.name}", self.rows, "rows(eom, t)")
+        as_string("name of the inequality", self.name)
+        if as_string("block of the inequality", self.block) not in BLOCKS:
+            raise InputError(
+                f'inequality {self.name!r} has block {short_repr(self.block)}; it must be "qdd", "tau" or "forces".'
+            )
+        object.__setattr__(self, "row_names", as_strings(f"row_names of {self.name}", self.row_names))
+        if callable(self.coefficients) and not isinstance(self.coefficients, type):
+            as_callable(f"coefficients of {self.name}", self.coefficients, "coefficients(eom, t)")
         else:
-            object.__setattr__(self, "rows", self._checked(self.rows, None))
+            object.__setattr__(self, "coefficients", self._checked(self.coefficients, None))
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
         """G, shape (m, n), and h, shape (m,), at a state and a time t in s, checked."""
         n = getattr(eom, SIZES[self.block])
-        if not callable(self.rows) and np.shape(self.rows[0])[1] == n:  # checked when they were made, but for that
-            return cast("tuple[Array, Array]", self.rows)
-        return self._checked(self.rows(eom, t) if callable(self.rows) else self.rows, n)
+        if (
+            not callable(self.coefficients) and np.shape(self.coefficients[0])[1] == n
+        ):  # checked when they were made, but for that
+            return cast("tuple[Array, Array]", self.coefficients)
+        return self._checked(self.coefficients(eom, t) if callable(self.coefficients) else self.coefficients, n)
 
     def labels(self, m: int) -> tuple[ConstraintLabel, ...]:
-        """A label for each of m rows. Raises `InputError` where there is another number of owners."""
-        if self.owners and len(self.owners) != m:
-            raise InputError(f"rows {self.name!r} have {len(self.owners)} owners and {m} rows; give one for each row.")
-        if self.owners:
-            return tuple(ConstraintLabel(f"{self.name} {owner}", self.name, owner) for owner in self.owners)
-        return tuple(ConstraintLabel(f"{self.name} {i}" if m > 1 else self.name, "rows", self.name, i) for i in range(m))
+        """A label for each of m rows. Raises `InputError` where there is another number of row names."""
+        if self.row_names and len(self.row_names) != m:
+            raise InputError(
+                f"inequality {self.name!r} has {len(self.row_names)} row names and {m} rows; give one for each row."
+            )
+        if self.row_names:
+            return tuple(ConstraintLabel(f"{self.name} {row_name}", self.name, row_name) for row_name in self.row_names)
+        return tuple(ConstraintLabel(f"{self.name} {i}" if m > 1 else self.name, "inequality", self.name, i) for i in range(m))
 
     def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
         if not isinstance(given, tuple | list) or len(given) != 2:
-            raise InputError(f"rows {self.name!r} must be G and h, as in (G, h), not {short_repr(given)}.")
+            raise InputError(f"inequality {self.name!r} must be G and h, as in (G, h), not {short_repr(given)}.")
         G = as_array(f"G of {self.name}", given[0], (None, None))
         if n is not None and G.shape[1] != n:
             follows = "; a function of (eom, t) can follow the contacts" if self.block == "forces" else ""
-            raise InputError(f"rows {self.name!r} take {G.shape[1]} numbers; their block {self.block!r} has {n}{follows}.")
+            raise InputError(f"inequality {self.name!r} takes {G.shape[1]} numbers; its block {self.block!r} has {n}{follows}.")
         return G, as_array(f"h of {self.name}", given[1], (len(G),))
 
 
@@ -99,60 +105,66 @@ class Limits(Value):
 
     torque_limits: shape (d,), N·m, +inf where there is none.
     facets: number of facets of the friction polyhedron (28) of every contact point.
-    inside: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
-    turn: rad, by which its facets are turned about the normal.
+    inner_approximation: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
+    facet_rotation: rad, by which its facets are turned about the normal.
     min_normal_force, max_normal_force: N, bounds of normal · f at every contact point, so at each corner of a flat foot: one
         number for all, or a mapping from the name of a contact to a number or a function of the time t in s; 0 and none where
         it has none. The bound of a name that is not among the contacts waits until it is: a foot that has lifted will stand
         again.
-    rows: rows of one's own.
+    inequalities: inequality rows of one's own.
 
     Raises `InputError` for values that do not fit.
     """
 
     torque_limits: Array
     facets: int = 4
-    inside: bool = True
+    inner_approximation: bool = True
     min_normal_force: NormalForces = 0.0
     max_normal_force: NormalForces | None = None
-    rows: Sequence[Rows] = ()
-    turn: float = 0.0
+    inequalities: Sequence[LinearInequality] = ()
+    facet_rotation: float = 0.0
 
     def __post_init__(self) -> None:
         limits = numeric_copy(self.torque_limits)
         object.__setattr__(self, "torque_limits", as_torque_limits(1 if limits is None else limits.size, self.torque_limits))
-        object.__setattr__(self, "min_normal_force", _kept("min_normal_force", self.min_normal_force))
+        object.__setattr__(self, "min_normal_force", _checked_bounds("min_normal_force", self.min_normal_force))
         object.__setattr__(
-            self, "max_normal_force", _kept("max_normal_force", {} if self.max_normal_force is None else self.max_normal_force)
+            self,
+            "max_normal_force",
+            _checked_bounds("max_normal_force", {} if self.max_normal_force is None else self.max_normal_force),
         )
-        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, *self.cut)
-        for name in ("facets", "inside", "turn"):
+        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, *self.polyhedron_options)
+        for name in ("facets", "inner_approximation", "facet_rotation"):
             object.__setattr__(self, name, getattr(polyhedron, name))
-        if isinstance(self.rows, Rows) or not isinstance(self.rows, Sequence):
-            raise InputError(f"rows must be a list of Rows, not {short_repr(self.rows)}.")
-        example = "floatbase.control.Rows(name, block, (G, h))"
-        object.__setattr__(self, "rows", tuple(as_instance("each of rows", rows, Rows, example) for rows in self.rows))
+        if isinstance(self.inequalities, LinearInequality) or not isinstance(self.inequalities, Sequence):
+            raise InputError(f"inequalities must be a list of LinearInequality, not {short_repr(self.inequalities)}.")
+        example = "floatbase.control.LinearInequality(name, block, (G, h))"
+        object.__setattr__(
+            self,
+            "inequalities",
+            tuple(as_instance("each of inequalities", each, LinearInequality, example) for each in self.inequalities),
+        )
 
     @property
-    def cut(self) -> tuple[int, bool, float]:
-        """How friction cones are cut into facets: what `FrictionPolyhedron` takes after normal and mu."""
-        return self.facets, self.inside, self.turn
+    def polyhedron_options(self) -> tuple[int, bool, float]:
+        """Options of the friction polyhedra: what `FrictionPolyhedron` takes after normal and mu."""
+        return self.facets, self.inner_approximation, self.facet_rotation
 
     @cached_property
-    def move(self) -> bool:
+    def time_varying(self) -> bool:
         """Whether a normal force is bounded by a function of time."""
-        return any(callable(value) for bound in self._by_name.values() for value in bound.values())
+        return any(callable(value) for bound in self._bounds_by_name.values() for value in bound.values())
 
     @property
-    def _by_name(self) -> dict[str, Mapping[str, Any]]:
+    def _bounds_by_name(self) -> dict[str, Mapping[str, Any]]:
         """The bounds of normal forces that are mappings, by the name of the argument."""
         both = {"min_normal_force": self.min_normal_force, "max_normal_force": self.max_normal_force}
         return {name: bound for name, bound in both.items() if isinstance(bound, Mapping)}
 
     def check_names(self, *known: Iterable[str], before: Limits | None = None) -> None:
         """Raise `UnknownNameError` where a normal force is bounded by a name that is neither known nor in the limits before."""
-        names = {name for some in (*known, *(before._by_name.values() if before else ())) for name in some}
-        for argument, bound in self._by_name.items():
+        names = {name for some in (*known, *(before._bounds_by_name.values() if before else ())) for name in some}
+        for argument, bound in self._bounds_by_name.items():
             for name in bound:
                 if name not in names:
                     raise unknown_name(f"contact in {argument}", name, names)
@@ -162,13 +174,13 @@ class Limits(Value):
 
         Raises `InputError` for a function's value that is no force.
         """
-        if not self.move:
-            return _still_normal_forces(contacts, self)
-        return _at("min_normal_force", self.min_normal_force, contacts, t, 0.0), self._largest(contacts, t)
+        if not self.time_varying:
+            return _constant_normal_forces(contacts, self)
+        return _bounds_at("min_normal_force", self.min_normal_force, contacts, t, 0.0), self._max_normal_forces(contacts, t)
 
-    def _largest(self, contacts: Contacts, t: float) -> Array:
+    def _max_normal_forces(self, contacts: Contacts, t: float) -> Array:
         assert self.max_normal_force is not None  # as it was made
-        return _at("max_normal_force", self.max_normal_force, contacts, t, np.inf)
+        return _bounds_at("max_normal_force", self.max_normal_force, contacts, t, np.inf)
 
     def bounded_points(self, contacts: Contacts) -> npt.NDArray[np.bool_]:
         """Which points have a largest normal force, shape (P,)."""
@@ -177,7 +189,7 @@ class Limits(Value):
         return np.array([contact.name in names for contact in contacts for _ in contact.point_names], dtype=np.bool_)
 
 
-def _kept(name: str, given: NormalForces) -> NormalForces:
+def _checked_bounds(name: str, given: NormalForces) -> NormalForces:
     """A checked copy of what bounds normal forces."""
     if not isinstance(given, Mapping):
         one = numeric_copy(given)
@@ -195,7 +207,7 @@ def _kept(name: str, given: NormalForces) -> NormalForces:
     )
 
 
-def _at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float) -> Array:
+def _bounds_at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float) -> Array:
     """Bounds of normal forces at time t, (P,)."""
     if not isinstance(given, Mapping):
         return np.full(contacts.n_points, given)
@@ -210,9 +222,9 @@ def _at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise:
 
 # what does not depend on the state is built once for each contacts, robot and limits (all immutable)
 @lru_cache(maxsize=64)
-def _still_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
-    least = _at("min_normal_force", limits.min_normal_force, contacts, 0.0, 0.0)
-    return read_only(least), read_only(limits._largest(contacts, 0.0))
+def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
+    least = _bounds_at("min_normal_force", limits.min_normal_force, contacts, 0.0, 0.0)
+    return read_only(least), read_only(limits._max_normal_forces(contacts, 0.0))
 
 
 @lru_cache(maxsize=64)
@@ -222,8 +234,10 @@ def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[Constra
     names: list[ConstraintLabel] = []
     G = np.zeros((per_point * contacts.n_points, contacts.k))
     for i, point in enumerate(contacts.point_names):
-        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], *limits.cut)
-        G[per_point * i : per_point * (i + 1), contacts.point_force_indices[3 * i : 3 * i + 3]] = np.vstack([cone.face_matrix, -cone.normal])
+        cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], *limits.polyhedron_options)
+        G[per_point * i : per_point * (i + 1), contacts.point_force_indices[3 * i : 3 * i + 3]] = np.vstack(
+            [cone.face_matrix, -cone.normal]
+        )
         names += [ConstraintLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
         names.append(ConstraintLabel(f"{point} normal force", "normal force", point))
     bounded = np.flatnonzero(limits.bounded_points(contacts))

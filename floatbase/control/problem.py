@@ -12,8 +12,8 @@ import numpy as np
 
 from floatbase._validation import Array, Value, as_callable, as_instance, as_positive, short_repr
 from floatbase.affine import Affine
-from floatbase.control.belief import TRUTH, Belief
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
+from floatbase.control.model_mismatch import NO_MISMATCH, ModelMismatch
 from floatbase.dynamics import CONSTRAINT_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_constraint
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
@@ -21,8 +21,8 @@ from floatbase.qp import QP, ConstraintLabel
 from floatbase.robots import Robot, State, as_torque_limits
 
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
-_PARTS_OF_A_TASK = ("block", "name", "weight", "residual")
-INCONSISTENT = 1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
+_TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
+INCONSISTENCY_TOLERANCE = 1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +36,10 @@ class Problem(Value):
     contacts: Contacts
     tasks: Sequence[Task]
     limits: Limits
-    belief: Belief = TRUTH
+    mismatch: ModelMismatch = NO_MISMATCH
 
     def __post_init__(self) -> None:
-        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits), ("belief", Belief)):
+        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits), ("mismatch", ModelMismatch)):
             as_instance(name, getattr(self, name), kind)
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         as_torque_limits(self.robot.d, self.limits.torque_limits)
@@ -48,23 +48,25 @@ class Problem(Value):
         """The QP at a state and a time t in s."""
         if isinstance(state, State) and state.robot != self.robot:
             raise InputError(f"the state belongs to another robot, {state.robot!r}, than the problem, {self.robot!r}.")
-        return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t, self.belief)
+        return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t, self.mismatch)
 
     def check(self, tasks: Sequence[Task] | None = None) -> None:
         """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and make no QP.
 
         tasks: those to check, all by default.
         """
-        with rehearsal():
-            eom = _standing(self.robot, self.contacts)
+        with dry_run():
+            eom = _standing_equations(self.robot, self.contacts)
             for task in self.tasks if tasks is None else tasks:
                 residual_of(task, eom)
             self.limits.normal_forces(self.contacts)
-            for rows in self.limits.rows:
-                rows.labels(len(rows.at(eom)[0]))
+            for inequality in self.limits.inequalities:
+                inequality.labels(len(inequality.at(eom)[0]))
 
 
-def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0, belief: Belief = TRUTH) -> QP:
+def build_qp(
+    eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0, mismatch: ModelMismatch = NO_MISMATCH
+) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
     Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: those of
@@ -74,7 +76,7 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is missing).
     limits: the inequalities.
     t: s, the time that tasks with moving targets are evaluated at.
-    belief: what is taken for (7) instead of eom; tasks and rows of one's own see eom.
+    mismatch: what is taken for (7) instead of eom; tasks and rows of one's own see eom.
 
     Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a measured velocity that the
     contacts do not quite allow makes them inconsistent. The rows therefore count along the directions that A resolves well
@@ -82,13 +84,13 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     """
     as_instance("eom", eom, EquationsOfMotion)
     as_instance("limits", limits, Limits)
-    as_instance("belief", belief, Belief)
+    as_instance("mismatch", mismatch, ModelMismatch)
     if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {short_repr(tasks)}.")
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
-    rows = [each.at(eom, t) for each in limits.rows]
-    qp = assemble_qp(belief.equations(eom), costs, limits, limits.normal_forces(eom.contacts, t), rows)
-    return belief.program(qp, eom)
+    inequalities = [each.at(eom, t) for each in limits.inequalities]
+    qp = assemble_qp(mismatch.assumed_equations(eom), costs, limits, limits.normal_forces(eom.contacts, t), inequalities)
+    return mismatch.assumed_qp(qp, eom)
 
 
 def assemble_qp(
@@ -96,13 +98,13 @@ def assemble_qp(
     costs: Costs,
     limits: Limits,
     normal_forces: tuple[Array, Array],
-    rows: Sequence[tuple[Array, Array]],
+    inequalities: Sequence[tuple[Array, Array]],
 ) -> QP:
     """`build_qp` from what is known at the state: one array or residual for each function.
 
     costs: block, weight and residual of each task.
     normal_forces: least and largest of every point, (P,), N.
-    rows: G and h of each of `limits.rows`.
+    inequalities: G and h of each of `limits.inequalities`.
     """
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
@@ -112,27 +114,27 @@ def assemble_qp(
         block = blocks[each]
         H[block, block] += weight * residual.A.T @ residual.A
         g[block] += weight * residual.A.T @ residual.b
-    motion, b = _motion_rows(eom)
+    motion, b = _resolved_motion_rows(eom)
     A = np.vstack([np.hstack([eom.M, -eom.S, -eom.J.T]), np.hstack([motion, np.zeros((len(motion), d + k))])])
     G_force, names = force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = torque_rows(eom.robot, limits)
-    parts: list[tuple[Block, Array, Array]] = [
+    blocks_of_G: list[tuple[Block, Array, Array]] = [
         ("forces", G_force, force_bounds(eom.contacts, limits, *normal_forces)),
         ("tau", G_torque, h_torque),
     ]
     names += torque_names
-    for own, (G_own, h_own) in zip(limits.rows, rows, strict=True):
-        parts.append((own.block, G_own, h_own))
-        names += own.labels(len(G_own))
-    G, h, first = np.zeros((len(names), n)), np.concatenate([part[2] for part in parts]), 0
-    for each, G_part, _ in parts:
-        G[first : first + len(G_part), blocks[each]] = G_part
-        first += len(G_part)
+    for inequality, (G_user, h_user) in zip(limits.inequalities, inequalities, strict=True):
+        blocks_of_G.append((inequality.block, G_user, h_user))
+        names += inequality.labels(len(G_user))
+    G, h, row = np.zeros((len(names), n)), np.concatenate([part[2] for part in blocks_of_G]), 0
+    for each, G_part, _ in blocks_of_G:
+        G[row : row + len(G_part), blocks[each]] = G_part
+        row += len(G_part)
     return QP(H, g, A, np.concatenate([-eom.h, b]), G, h, _equality_names(eom.robot, eom.contacts), names, blocks)
 
 
 @contextmanager
-def rehearsal() -> Iterator[None]:
+def dry_run() -> Iterator[None]:
     """Tells whose function raises while a controller is made that nothing moves yet."""
     try:
         yield
@@ -144,7 +146,7 @@ def rehearsal() -> Iterator[None]:
 
 
 @lru_cache(maxsize=64)
-def _standing(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
+def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
     """(7) where the robot stands."""
     return equations_of_motion(robot.standing(), contacts)
 
@@ -155,8 +157,8 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
         raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {short_repr(tasks)}.")
     tasks = tuple(tasks)
     for task in tasks:
-        lacks = [part for part in _PARTS_OF_A_TASK if not hasattr(task, part)]
-        if 0 < len(lacks) < len(_PARTS_OF_A_TASK):
+        lacks = [part for part in _TASK_ATTRIBUTES if not hasattr(task, part)]
+        if 0 < len(lacks) < len(_TASK_ATTRIBUTES):
             has = "a task has block, name, weight and residual(eom, t), as floatbase.objectives.Task says"
             raise InputError(f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; {has}.")
         if lacks or isinstance(task, type) or not callable(task.residual):
@@ -186,18 +188,18 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     return residual
 
 
-def _motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
+def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """(5) A (m, nv) and b (m,) along the directions that A resolves.
 
     Raises `InfeasibleError` with the rows where they are inconsistent by more than the contacts' own motion explains.
     """
     A, b = resolved_constraint(eom)
     gap = np.abs(eom.b - b)
-    motion = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
-    if np.max(gap, initial=0.0) > INCONSISTENT + CONSTRAINT_NOISE * motion:
-        rows = [_equality_names(eom.robot, eom.contacts)[eom.nv + i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
+    velocity = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
+    if np.max(gap, initial=0.0) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * velocity:
+        names = [_equality_names(eom.robot, eom.contacts)[eom.nv + i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
         raise InfeasibleError(
-            f"these motions are inconsistent: {', '.join(rows)}. At least one of their constraints has to go.", rows
+            f"these motions are inconsistent: {', '.join(names)}. At least one of their constraints has to go.", names
         )
     return A, b
 

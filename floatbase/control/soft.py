@@ -17,46 +17,46 @@ from floatbase.robots import State
 
 @dataclass(frozen=True, eq=False)
 class SoftContact(Value):
-    """A contact that holds no motion: forces act at its points, inside their cones, and `ContactTask` asks it to stand still.
+    """A contact that holds no motion: forces act at its points, inside their cones, and `ContactMotionTask` asks it to stand still.
 
-    held: the contact.
+    contact: the rigid contact.
     """
 
-    held: Contact
+    contact: Contact
     row_names: ClassVar[tuple[str, ...]] = ()
 
     @property
     def name(self) -> str:
         """The contact's name."""
-        return self.held.name
+        return self.contact.name
 
     @property
     def mu(self) -> float:
         """The contact's coefficient of friction."""
-        return self.held.mu
+        return self.contact.mu
 
     @property
     def normal(self) -> Array:
         """The contact's unit normal, shape (3,), world."""
-        return self.held.normal
+        return self.contact.normal
 
     @property
     def point_names(self) -> tuple[str, ...]:
         """The contact's points."""
-        return self.held.point_names
+        return self.contact.point_names
 
     @property
     def k(self) -> int:
         """The contact's number of force components."""
-        return self.held.k
+        return self.contact.k
 
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n, 3), m."""
-        return self.held.positions(state)
+        return self.contact.positions(state)
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """J of (4), shape (k, nv), at time t, s."""
-        return self.held.jacobian(state, t)
+        return self.contact.jacobian(state, t)
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) without rows."""
@@ -64,10 +64,10 @@ class SoftContact(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class ContactTask(Value):
+class ContactMotionTask(Value):
     """The motion that contacts hold, as a wish: residual A q̈ - b of (5), m/s² and rad/s².
 
-    contacts: as they would be held. weight: of ½‖residual‖² in the objective.
+    contacts: as if they were rigid. weight: of ½‖residual‖² in the objective.
     """
 
     contacts: Contacts
@@ -81,14 +81,14 @@ class ContactTask(Value):
         return Affine(A, -b)
 
 
-def softened(contacts: Contacts, tasks: Sequence[Task], weight: float) -> tuple[Contacts, tuple[Task, ...]]:
+def with_soft_contacts(contacts: Contacts, tasks: Sequence[Task], weight: float) -> tuple[Contacts, tuple[Task, ...]]:
     """Contacts and tasks, soft or not, as those of a controller whose contacts give way at this weight."""
-    held = Contacts([contact.held if isinstance(contact, SoftContact) else contact for contact in contacts])
-    kept = [task for task in tasks if not isinstance(task, ContactTask)]
-    soft = ContactTask(held, as_positive("contact_weight", weight))
-    return Contacts([SoftContact(contact) for contact in held]), (*kept, soft)
+    rigid = Contacts([contact.contact if isinstance(contact, SoftContact) else contact for contact in contacts])
+    other_tasks = [task for task in tasks if not isinstance(task, ContactMotionTask)]
+    motion_task = ContactMotionTask(rigid, as_positive("contact_weight", weight))
+    return Contacts([SoftContact(contact) for contact in rigid]), (*other_tasks, motion_task)
 
 
 def contact_weight_of(tasks: Sequence[Task]) -> float | None:
     """The weight of soft contacts among the tasks, None where there is none."""
-    return next((task.weight for task in tasks if isinstance(task, ContactTask)), None)
+    return next((task.weight for task in tasks if isinstance(task, ContactMotionTask)), None)

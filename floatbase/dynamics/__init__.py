@@ -1,18 +1,18 @@
 """Constrained equations of motion and the space of motions they leave (§2 and App. A of the document)."""
 
+from floatbase.dynamics.constraint_rank import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE, contact_space, resolved_constraint
 from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
 from floatbase.dynamics.contact import UP, Contact, FlatFootContact, PointContact, grasp_matrix
 from floatbase.dynamics.contacts import Contacts, constraint_and_jacobian
 from floatbase.dynamics.equations import Block, EquationsOfMotion, equations_of_motion
 from floatbase.dynamics.fictitious import (
     bias_forces,
+    centripetal_acceleration,
     coriolis_matrix,
     inertia_rate,
-    centripetal_acceleration,
     power_identity,
     view_from_rotating_frame,
 )
-from floatbase.dynamics.constraint_rank import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE, contact_space, resolved_constraint
 from floatbase.dynamics.subspace import (
     FeasibleSpace,
     accelerations_from_torques,

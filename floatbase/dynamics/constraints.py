@@ -9,7 +9,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from floatbase._validation import Array, Value, as_array, cross, as_callable, as_positive, short_repr, as_string, unit_vector, as_integer
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_callable,
+    as_integer,
+    as_positive,
+    as_string,
+    cross,
+    short_repr,
+    unit_vector,
+)
 from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact, check_contact
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -25,7 +36,7 @@ class LinearConstraint(Value):
     Holonomic constraints φ(q, t) = 0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6). The
     constraint's force is Aᵀ λ with one multiplier λ for each row, in the row's own unit; it has no point and no friction cone.
     Something must give that force, such as a hinge or a rope: a controller counts on it. What the motors alone should bring
-    about is a task, or a pair of `floatbase.control.Rows`.
+    about is a task, or a pair of `floatbase.control.LinearInequality`.
 
     A contact like others: `contacts + fb.Contacts([constraint])`.
 

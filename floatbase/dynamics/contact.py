@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_array, cross, as_positive, read_only, as_string, unit_vector
+from floatbase._validation import Array, Value, as_array, as_positive, as_string, cross, read_only, unit_vector
 from floatbase.robots import State, as_corners
 
 UP = read_only([0.0, 0.0, 1.0])
@@ -184,7 +184,10 @@ def grasp_matrix(points: Array, reference_point: Array) -> Array:
 
     Known as the grasp matrix in manipulation. N and N·m, world.
     """
-    points, reference_point = as_array("points", points, (None, 3), "m"), as_array("reference_point", reference_point, (3,), "m")
+    points, reference_point = (
+        as_array("points", points, (None, 3), "m"),
+        as_array("reference_point", reference_point, (3,), "m"),
+    )
     blocks = [np.vstack([np.eye(3), pin.skew(point - reference_point)]) for point in points]
     return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
 

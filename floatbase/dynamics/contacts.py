@@ -9,9 +9,20 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, cached_property, as_array, as_number, as_instance, numeric_copy, read_only, short_repr, as_strings
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_instance,
+    as_number,
+    as_strings,
+    cached_property,
+    numeric_copy,
+    read_only,
+    short_repr,
+)
 from floatbase.dynamics.constraints import LinearConstraint
-from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, SinglePointContact, PointContact
+from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, PointContact, SinglePointContact
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 
@@ -79,7 +90,9 @@ class Contacts(Value):
         mu, normals: as for `points`.
         """
         return Contacts(
-            [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)] if as_instance("robot", robot, Robot).feet else []
+            [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)]
+            if as_instance("robot", robot, Robot).feet
+            else []
         )
 
     @cached_property
@@ -186,7 +199,9 @@ class Contacts(Value):
         return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
-        return Contacts([*self.items, *as_instance("what is added to Contacts", other, Contacts, "fb.Contacts([contact])").items])
+        return Contacts(
+            [*self.items, *as_instance("what is added to Contacts", other, Contacts, "fb.Contacts([contact])").items]
+        )
 
     def __iter__(self) -> Iterator[Contact]:
         return iter(self.items)
@@ -205,7 +220,10 @@ def constraint_and_jacobian(contact: Contact, state: State, t: float) -> tuple[A
     """
     A, b = map(read_only, contact.constraint(state, t))  # one's own may write to its arrays again
     cls: Any = type(contact)  # one derived from ours may have another Jacobian
-    is_point = isinstance(contact, SinglePointContact) and (cls.jacobian, cls.constraint) == (SinglePointContact.jacobian, SinglePointContact.constraint)
+    is_point = isinstance(contact, SinglePointContact) and (cls.jacobian, cls.constraint) == (
+        SinglePointContact.jacobian,
+        SinglePointContact.constraint,
+    )
     is_linear = getattr(cls, "jacobian", None) is LinearConstraint.jacobian
     J = A if is_point or is_linear else read_only(contact.jacobian(state, t))
     m, nv = len(contact.row_names), state.robot.nv
@@ -221,7 +239,9 @@ def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Co
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
 
 
-def _selected_feet(robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals) -> list[tuple[Foot, float, Array]]:
+def _selected_feet(
+    robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals
+) -> list[tuple[Foot, float, Array]]:
     """The feet that touch, each with its coefficient of friction and its normal."""
     as_instance("robot", robot, Robot)
     feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in as_strings("frames", frames))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, cached_property, as_array, as_forces, as_instance, read_only
+from floatbase._validation import Array, Value, as_array, as_forces, as_instance, cached_property, read_only
 from floatbase.affine import Affine
-from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.dynamics.constraint_rank import contact_space
+from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.linear_algebra import null_space, rank
 
 

@@ -11,7 +11,18 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, cached_property, as_array, as_bool, as_number, as_positive, read_only, unit_vector, as_integer
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_bool,
+    as_integer,
+    as_number,
+    as_positive,
+    cached_property,
+    read_only,
+    unit_vector,
+)
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
 MAX_FACETS = 1000  # they miss the cone by 5e-6 of μ, which nobody knows as well

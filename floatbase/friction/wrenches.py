@@ -14,7 +14,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, cached_property, as_array, as_instance, numeric_copy, as_positive, read_only, as_integer
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_instance,
+    as_integer,
+    as_positive,
+    cached_property,
+    numeric_copy,
+    read_only,
+)
 from floatbase.dynamics import Contacts, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction.cones import FrictionPolyhedron
@@ -71,7 +81,9 @@ class WrenchSet(Value):
     @cached_property
     def rays(self) -> Array:
         """The edges of all cones as wrenches, shape (6, N), point after point, each with normal component 1 N."""
-        parts = [grasp_matrix(x[None], self.reference_point) @ cone.rays.T for x, cone in zip(self.points, self.cones, strict=True)]
+        parts = [
+            grasp_matrix(x[None], self.reference_point) @ cone.rays.T for x, cone in zip(self.points, self.cones, strict=True)
+        ]
         return read_only(np.hstack(parts))
 
     @cached_property

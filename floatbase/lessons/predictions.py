@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._validation import MAX_MAGNITUDE, numeric_copy, as_string
+from floatbase._validation import MAX_MAGNITUDE, as_string, numeric_copy
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.rounding import about

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._validation import numeric_copy, as_positive, short_repr, as_string, as_integer
+from floatbase._validation import as_integer, as_positive, as_string, numeric_copy, short_repr
 from floatbase.errors import InputError
 
 _PLAIN = range(-4, 6)  # exponents of ten that are written out; larger and smaller numbers are written as 1.6e7

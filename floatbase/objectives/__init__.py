@@ -2,15 +2,15 @@
 
 from floatbase.objectives.centroidal import (
     TorquesFromForces,
+    centroidal_inertia,
+    centroidal_momentum,
+    centroidal_momentum_rate,
     com_wrench_map,
     desired_wrench,
     force_bias,
     net_force_matrix,
     net_moment_matrix,
-    centroidal_momentum,
-    centroidal_momentum_rate,
     normal_bias,
-    centroidal_inertia,
     tangential_bias,
     torques_from_forces,
     wrench_objective,
@@ -19,9 +19,9 @@ from floatbase.objectives.pullback import (
     argmin_coordinates,
     cost_on_space,
     cost_on_torques,
-    partial_minimum,
-    minimum_norm_pullback,
     minimum_norm_coordinates,
+    minimum_norm_pullback,
+    partial_minimum,
 )
 from floatbase.objectives.tasks import (
     CoMTask,

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_array, as_forces, as_instance, numeric_copy, as_positive, read_only
+from floatbase._validation import Array, Value, as_array, as_forces, as_instance, as_positive, numeric_copy, read_only
 from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, grasp_matrix, resolved_constraint, torque_force_space
 from floatbase.errors import InputError
@@ -61,7 +61,9 @@ def com_wrench_map(state: State, contacts: Contacts) -> Affine:
     """
     as_instance("state", state, State)
     _require_point_forces(contacts)
-    return Affine.stack(force=Affine.linear(net_force_matrix(contacts)), moment=Affine.linear(net_moment_matrix(state, contacts)))
+    return Affine.stack(
+        force=Affine.linear(net_force_matrix(contacts)), moment=Affine.linear(net_moment_matrix(state, contacts))
+    )
 
 
 def wrench_objective(

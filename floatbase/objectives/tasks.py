@@ -22,16 +22,16 @@ from floatbase._validation import (
     Array,
     Value,
     as_array,
-    cross,
-    as_forces,
     as_callable,
-    as_number,
+    as_forces,
     as_instance,
-    numeric_copy,
+    as_number,
     as_positive,
-    read_only,
-    frozen,
     as_string,
+    cross,
+    frozen,
+    numeric_copy,
+    read_only,
 )
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
@@ -52,7 +52,7 @@ class Task(Protocol):
 
     name: in messages and tables. weight: of ½‖residual‖² in the objective.
 
-    An object of one's own of this form is a task too, on the compiled tick as on the readable path: this one keeps the height
+    An object of one's own of this form is a task too, on the compiled tick as on the reference backend: this one keeps the height
     of the centre of mass, as far as its acceleration may be 100 (h - z) - 20 ż, m/s².
 
         class Height:
@@ -116,7 +116,9 @@ def targets_at(task: Task, robot: Robot, k: int, t: float) -> list[Array]:
 
 def _split_target(name: str, value: Any, shape: tuple[int, ...], *derivative_shapes: tuple[int, ...]) -> list[Any]:
     """What a function of time gave, with zeros for velocity and acceleration unless it gave all three."""
-    is_sequence = derivative_shapes and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim)) and len(value) > 1
+    is_sequence = (
+        derivative_shapes and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim)) and len(value) > 1
+    )
     first = numeric_copy(value[0]) if is_sequence else None
     if first is None or first.ndim != len(shape):
         return [value, *map(_zeros, derivative_shapes)]
@@ -350,7 +352,12 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
 
 
 def _motion_residual(
-    task: CoMTask | OrientationTask | FrameTask | PostureTask, J: Array, drift: Array, feedforward: Array, e: Array, e_dot: Array
+    task: CoMTask | OrientationTask | FrameTask | PostureTask,
+    J: Array,
+    drift: Array,
+    feedforward: Array,
+    e: Array,
+    e_dot: Array,
 ) -> Affine:
     """J q̈ + J̇ q̇ - (a_ff - kp e - kd ė)."""
     assert task.kd is not None  # set when the task was made

@@ -15,13 +15,13 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.actuators import FirstOrderLag
 from floatbase.behaviours import Gait, Stand, Walk, pitch_and_yaw
-from floatbase.control import Belief, Command
+from floatbase.control import Command, ModelMismatch
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.playground.settings import Settings
 from floatbase.robots import Robot, State
 from floatbase.simulation import Actuators, AlteredSimulation, Controller, World
 
-PERIOD = 4e-3  # s between ticks: go2's readable QP takes 1.5 ms, so that half of the time is left for physics and pictures
+PERIOD = 4e-3  # s between ticks: go2's reference QP takes 1.5 ms, so that half of the time is left for physics and pictures
 _NOD_RATE = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
 _YAW_OVER_PITCH = 1.15  # the ellipse is a little wider in yaw
 _GROWING = 1.5  # s in which the ellipse grows from nothing
@@ -34,11 +34,11 @@ class BaseMotors:
     J
     as it believes them: zero, but for rounding, unless it believes in such motors.
 
-    belief: the controller's; the truth by default.
+    mismatch: the controller's; the truth by default.
     """
 
-    def __init__(self, controller: Controller, sim: AlteredSimulation, belief: Belief | None = None):
-        self.controller, self.sim, self.belief = controller, sim, Belief() if belief is None else belief
+    def __init__(self, controller: Controller, sim: AlteredSimulation, mismatch: ModelMismatch | None = None):
+        self.controller, self.sim, self.mismatch = controller, sim, ModelMismatch() if mismatch is None else mismatch
 
     @property
     def contacts(self) -> Contacts:
@@ -49,7 +49,7 @@ class BaseMotors:
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick."""
         command: Command = self.controller(q, v, t)  # type: ignore[arg-type]
-        eom = self.belief.equations(equations_of_motion(State(self.sim.robot, q, v), self.contacts))
+        eom = self.mismatch.assumed_equations(equations_of_motion(State(self.sim.robot, q, v), self.contacts))
         self.sim.base_wrench = (eom.M @ command.qdd + eom.h - eom.J.T @ command.forces)[:6]
         return command
 
@@ -79,7 +79,7 @@ def nodding(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callabl
 
 
 _NAMES: dict[str, Any] = {
-    "fb": fb, "AlteredSimulation": AlteredSimulation, "World": World, "Belief": Belief, "FirstOrderLag": FirstOrderLag,
+    "fb": fb, "AlteredSimulation": AlteredSimulation, "World": World, "ModelMismatch": ModelMismatch, "FirstOrderLag": FirstOrderLag,
     "Gait": Gait, "Stand": Stand, "Walk": Walk, "BaseMotors": BaseMotors, "nodding": nodding,
 }  # fmt: skip
 

@@ -93,8 +93,8 @@ class Settings(Value):
             parts.append(f"mass={self.mass[0]:g}")
         parts += [f"{term.belief}=False" for term in EQUATION if term.belief and term.name in off]
         if "forces" in off and self.leg not in self.lifted:
-            parts.append(f'unfelt=["{self.leg}"]')
-        return f"Belief({', '.join(parts)})" if parts else ""
+            parts.append(f'ignored_contacts=["{self.leg}"]')
+        return f"ModelMismatch({', '.join(parts)})" if parts else ""
 
     def world_lines(self, robot: Robot) -> list[str]:
         """Lines that make `sim`, `state` where it stands in it, and `actuators` for `robot`."""
@@ -121,7 +121,7 @@ class Settings(Value):
         options = f", facets={self.facets}" if self.facets != 4 else ""
         options += f", torque_limits={self.torque:g} * robot.torque_limits" if self.torque != 1.0 else ""
         options += f", min_normal_force={self.least_force:g}" if self.least_force else ""
-        options += f", belief={belief}" if belief else ""
+        options += f", mismatch={belief}" if belief else ""
         lines = [f"contacts = fb.Contacts.feet(robot, {self.friction[0]:g}{normals})"]
         n = len(robot.feet)
         if self.gait is not None:
@@ -185,7 +185,7 @@ _IMPORTS = (
     (("fb.",), "import floatbase as fb"),
     (("FirstOrderLag",), "from floatbase.actuators import FirstOrderLag"),
     (("Gait", "Walk", "Stand("), "from floatbase.behaviours import Gait, Stand, Walk"),
-    (("Belief",), "from floatbase.control import Belief"),
+    (("ModelMismatch",), "from floatbase.control import ModelMismatch"),
     (("BaseMotors", "nodding"), "from floatbase.playground import BaseMotors, nodding"),
     (("Altered",), "from floatbase.simulation import AlteredSimulation, World"),
 )

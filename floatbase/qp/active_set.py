@@ -38,7 +38,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_instance, read_only, as_strings, as_integer
+from floatbase._validation import Array, Value, as_array, as_instance, as_integer, as_strings, read_only
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space

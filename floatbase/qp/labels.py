@@ -24,7 +24,9 @@ class ConstraintLabel(str):
     owner: str
     number: int | None
 
-    def __new__(cls, text: str, kind: str = "other constraints", owner: str | None = None, number: int | None = None) -> ConstraintLabel:
+    def __new__(
+        cls, text: str, kind: str = "other constraints", owner: str | None = None, number: int | None = None
+    ) -> ConstraintLabel:
         label = super().__new__(cls, text)
         label.kind, label.owner, label.number = kind, text if owner is None else owner, number
         return label
@@ -38,7 +40,9 @@ def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[Cons
 
     kind: "equality" or "inequality". Raises `InputError` for another number of names, or one that stands twice.
     """
-    labels = tuple(name if isinstance(name, ConstraintLabel) else ConstraintLabel(name) for name in as_strings(f"{kind}_names", names))
+    labels = tuple(
+        name if isinstance(name, ConstraintLabel) else ConstraintLabel(name) for name in as_strings(f"{kind}_names", names)
+    )
     labels = labels or tuple(ConstraintLabel(f"{kind} {i}") for i in range(count))
     if len(labels) != count:
         raise InputError(f"{len(labels)} {kind} names for {count} rows; give one for each row, or none at all.")

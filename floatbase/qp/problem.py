@@ -24,10 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._validation import Array, Value, cached_property, as_array, read_only, as_strings
+from floatbase._validation import Array, Value, as_array, as_strings, cached_property, read_only
 from floatbase.affine import Affine, as_blocks
 from floatbase.errors import InfeasibleError, unknown_name
-from floatbase.linear_algebra import svd_with_rank, row_norms
+from floatbase.linear_algebra import row_norms, svd_with_rank
 from floatbase.qp.conflicts import conflicting_constraints
 from floatbase.qp.labels import constraint_labels
 

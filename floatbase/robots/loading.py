@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_bool, as_instance, as_positive, read_only, short_repr, as_string, as_strings
+from floatbase._validation import Array, as_bool, as_instance, as_positive, as_string, as_strings, read_only, short_repr
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
-from floatbase.robots.robot import Foot, Robot, as_posture, has_floating_base, clamp_to_limits
+from floatbase.robots.robot import Foot, Robot, as_posture, clamp_to_limits, has_floating_base
 from floatbase.robots.urdf import check_urdf, parse_urdf, read_urdf, with_locked_joints, without_world_link
 
 PLATE_SIZE = (0.4, 0.03)  # width and thickness, m, of the plate on which `with_floating_base` lets a robot stand
@@ -129,7 +129,9 @@ def load_urdf(
         urdf, directories = read_urdf(file), (*directories, file.resolve().parent)
     model = parse_urdf(name, urdf, floating)
     start = clamp_to_limits(model, pin.neutral(model)) if posture is None else posture
-    robot = _make_robot(name, urdf, model, start, locked, torque_limits, package_dirs=directories, feet=_as_feet(feet, foot_radius))
+    robot = _make_robot(
+        name, urdf, model, start, locked, torque_limits, package_dirs=directories, feet=_as_feet(feet, foot_radius)
+    )
     _warn_if_motors_are_weak(robot)
     return robot
 
@@ -203,7 +205,9 @@ def _warn_if_motors_are_weak(robot: Robot) -> None:
         if required > limit
     ]
     if weak:
-        message = f"{robot.name} sinks: its motors are too weak to hold its posture against gravity, N·m or N: {', '.join(weak)}."
+        message = (
+            f"{robot.name} sinks: its motors are too weak to hold its posture against gravity, N·m or N: {', '.join(weak)}."
+        )
         warnings.warn(message, RobotWarning, stacklevel=3)
 
 

@@ -18,14 +18,14 @@ from floatbase._validation import (
     MAX_MAGNITUDE,
     Array,
     Value,
-    cached_property,
     as_array,
-    numeric_copy,
+    as_integer,
     as_positive,
+    as_string,
+    cached_property,
+    numeric_copy,
     read_only,
     short_repr,
-    as_string,
-    as_integer,
 )
 from floatbase.errors import InputError, unknown_name
 
@@ -122,7 +122,9 @@ class Robot(Value):
         values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
         participation = np.abs(vectors[:, values < _SINGULAR_M]).max(axis=1, initial=0.0)
         names = [*["its base"] * (self.nv - self.d), *self.joint_names]
-        massless = list(dict.fromkeys(name for name, value in zip(names, participation, strict=True) if value > _PARTICIPATION_TOLERANCE))
+        massless = list(
+            dict.fromkeys(name for name, value in zip(names, participation, strict=True) if value > _PARTICIPATION_TOLERANCE)
+        )
         if massless:
             joints = [name for name in massless if name != "its base"]
             lock_hint = f", or hold joints still, as with locked={joints}" if joints else ""

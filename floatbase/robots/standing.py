@@ -44,7 +44,9 @@ def find_standing_state(
         at_limit = np.zeros(len(joints), dtype=bool)  # joints at a limit that the step would take beyond it
         while True:
             step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
-            newly_at_limit = ~at_limit & ((state.q[index] <= lower) & (step[v_index] < 0.0) | (state.q[index] >= upper) & (step[v_index] > 0.0))
+            newly_at_limit = ~at_limit & (
+                (state.q[index] <= lower) & (step[v_index] < 0.0) | (state.q[index] >= upper) & (step[v_index] > 0.0)
+            )
             if not np.any(newly_at_limit):
                 break
             at_limit |= newly_at_limit
@@ -53,10 +55,15 @@ def find_standing_state(
         q[index] = np.clip(q[index], lower, upper)
         state = State(robot, q)
     height_text = "" if height is None else f" with its base {height:g} m above it"
-    limited = [f"{robot.model.names[joint]} at {x:.3g}" for joint, x in zip(joints[at_limit].tolist(), state.q[index[at_limit]], strict=True)]
+    limited = [
+        f"{robot.model.names[joint]} at {x:.3g}"
+        for joint, x in zip(joints[at_limit].tolist(), state.q[index[at_limit]], strict=True)
+    ]
     reason = f", with joints at their limits: {', '.join(limited)}" if limited else ""
     advice = "Ask for another height, or load it with another posture."
-    raise InputError(f"{robot.name} cannot put all its feet on the ground{height_text}: {remaining:.2g} m remain{reason}. {advice}")
+    raise InputError(
+        f"{robot.name} cannot put all its feet on the ground{height_text}: {remaining:.2g} m remain{reason}. {advice}"
+    )
 
 
 def _standing_residual(state: State, posture: State, height: float | None, planes: _Planes) -> tuple[Array, Array]:

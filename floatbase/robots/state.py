@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, cached_property, as_array, as_instance, read_only, frozen
+from floatbase._validation import Array, Value, as_array, as_instance, cached_property, frozen, read_only
 from floatbase.robots.robot import Robot, check_unit_norms
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, cross, as_bool, as_instance, as_positive, as_strings
+from floatbase._validation import Array, Value, as_array, as_bool, as_instance, as_positive, as_strings, cross
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.build import Ground

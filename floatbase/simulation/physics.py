@@ -13,7 +13,19 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, FixedAttributes, Value, as_array, cross, as_bool, as_number, as_instance, as_positive, short_repr, as_string
+from floatbase._validation import (
+    Array,
+    FixedAttributes,
+    Value,
+    as_array,
+    as_bool,
+    as_instance,
+    as_number,
+    as_positive,
+    as_string,
+    cross,
+    short_repr,
+)
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State

@@ -12,7 +12,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
-from floatbase._validation import Array, Value, cached_property, as_array, signature_error, as_positive, read_only
+from floatbase._validation import Array, Value, as_array, as_positive, cached_property, read_only, signature_error
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, SimulationError
 from floatbase.friction import WrenchSet, wrench_set

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, cached_property, as_bool, read_only, frozen, as_integer
+from floatbase._validation import Array, Value, as_bool, as_integer, cached_property, frozen, read_only
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State

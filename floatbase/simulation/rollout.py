@@ -9,7 +9,18 @@ from typing import Any, Protocol
 import numpy as np
 from tqdm.auto import tqdm
 
-from floatbase._validation import MAX_MAGNITUDE, Array, as_array, as_bool, as_callable, as_instance, numeric_copy, as_positive, read_only, short_repr
+from floatbase._validation import (
+    MAX_MAGNITUDE,
+    Array,
+    as_array,
+    as_bool,
+    as_callable,
+    as_instance,
+    as_positive,
+    numeric_copy,
+    read_only,
+    short_repr,
+)
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.physics import Push, Simulation, acting, pushes_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from floatbase._validation import as_bool, as_callable, as_number, as_positive, as_string, as_strings, as_integer
+from floatbase._validation import as_bool, as_callable, as_integer, as_number, as_positive, as_string, as_strings
 from floatbase.errors import InputError
 from floatbase.viewer import wire
 from floatbase.viewer.window import Window
@@ -90,7 +90,9 @@ class Controls:
         part: "shown" for the symbol itself, else what is written on the switch.
         """
         changed = as_callable("changed", changed, "changed(value)")
-        self._control(name, changed, value=as_bool("value", value), term=as_string("symbol", symbol), part=as_string("part", part))
+        self._control(
+            name, changed, value=as_bool("value", value), term=as_string("symbol", symbol), part=as_string("part", part)
+        )
 
     def note(self, name: str, words: str, section: str = "", code: bool = False) -> None:
         """Write a text into the panel, or change it.
@@ -100,7 +102,9 @@ class Controls:
         code: whether it is a program, with a button that copies it.
         """
         place = _place(name, section)
-        self.window.put([wire.page_command("set_text", name=name, text=as_string("words", words), code=as_bool("code", code), **place)])
+        self.window.put(
+            [wire.page_command("set_text", name=name, text=as_string("words", words), code=as_bool("code", code), **place)]
+        )
 
     def strip(self, name: str, t: float, value: float, unit: str = "") -> None:
         """Add a point to the line of a number over the last seconds, at the top of the panel.

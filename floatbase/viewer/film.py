@@ -49,7 +49,9 @@ def pixels(size: npt.ArrayLike) -> tuple[int, int]:
     """Width and height of films, checked: films have even ones."""
     width, height = (int(n) if n % 2.0 == 0.0 else 0 for n in as_array("size", size, (2,), "pixels"))
     if not (_LEAST <= width <= _MOST and _LEAST <= height <= _MOST):
-        raise InputError(f"size is {short_repr(size)}; width and height must be even numbers of pixels from {_LEAST} to {_MOST}.")
+        raise InputError(
+            f"size is {short_repr(size)}; width and height must be even numbers of pixels from {_LEAST} to {_MOST}."
+        )
     return width, height
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
-from floatbase._validation import Array, cached_property, as_array, as_instance, numeric_copy, short_repr, as_strings
+from floatbase._validation import Array, as_array, as_instance, as_strings, cached_property, numeric_copy, short_repr
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
@@ -339,7 +339,9 @@ def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
 
 
 @lru_cache(maxsize=256)
-def _polyhedron(normal: tuple[float, ...], mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> FrictionPolyhedron:
+def _polyhedron(
+    normal: tuple[float, ...], mu: float, facets: int, inner_approximation: bool, facet_rotation: float
+) -> FrictionPolyhedron:
     """The polyhedron with these values. There are few different ones, so each is made once."""
     return FrictionPolyhedron(np.array(normal), mu, facets, inner_approximation, facet_rotation)
 

@@ -186,7 +186,9 @@ def _spans(times: Array, there: npt.NDArray[np.bool_]) -> list[tuple[float, floa
 
 
 def _axis(axis: Axes | None) -> Axes:
-    return plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else as_instance("axis", axis, Axes, "plt.gca()")
+    return (
+        plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else as_instance("axis", axis, Axes, "plt.gca()")
+    )
 
 
 def _finished(axis: Axes, rollout: Rollout, label: str, legend: Mapping[str, Any] = _INSIDE) -> Axes:

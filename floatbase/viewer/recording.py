@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
-from floatbase._validation import Array, as_array, as_bool, as_instance, as_positive, short_repr, as_string, as_integer
+from floatbase._validation import Array, as_array, as_bool, as_instance, as_integer, as_positive, as_string, short_repr
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.viewer import wire

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_bool, as_instance, as_positive, short_repr, as_string, unit_vector, as_integer
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_bool,
+    as_instance,
+    as_integer,
+    as_positive,
+    as_string,
+    short_repr,
+    unit_vector,
+)
 from floatbase.behaviours import Step, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
@@ -81,7 +91,9 @@ class Viewer(Controls):
         self.height = as_integer("height", height, 1, _MOST_PIXELS, "pixels")
         requested = None if scale is None else as_positive("scale", scale, "m/N")
         paper, _, lines, text = BACKGROUNDS[background]
-        self.painter = Painter(robot, requested, facets, cut.inner_approximation, cut.facet_rotation, _ground(ground), lines, text, paper)
+        self.painter = Painter(
+            robot, requested, facets, cut.inner_approximation, cut.facet_rotation, _ground(ground), lines, text, paper
+        )
         self.window = Window(port)
         self.canvas = Canvas(self.window)
         self._moving, self._follow = False, as_bool("follow", follow)

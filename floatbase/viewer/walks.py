@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_number, as_instance, short_repr
+from floatbase._validation import Array, as_instance, as_number, short_repr
 from floatbase.behaviours import LIPM, Step, Swing, Walk, capture_point
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State

@@ -29,7 +29,7 @@ def joints(hydraulics: Hydraulics = HYQ) -> HydraulicActuators:
 
 def run(actuators: HydraulicActuators, tau: np.ndarray, time: float, dt: float = 1e-3) -> np.ndarray:
     """Torques at the end of each step while the joints are held at their best angles, shape (n, d)."""
-    q, v = actuators.cylinders.centre, np.zeros(actuators.cylinders.d)
+    q, v = actuators.cylinders.max_lever_angle, np.zeros(actuators.cylinders.d)
     return np.array([actuators.step(tau, q, v, dt) for _ in range(round(time / dt))])
 
 
@@ -44,7 +44,7 @@ def test_hyqs_cylinder_gives_the_145_newton_metres_that_are_published() -> None:
 def test_the_crank_sweeps_120_degrees_with_a_stroke_of_80_millimetres() -> None:
     """HyQ's published stroke and joint range, from our crank."""
     swept = np.deg2rad([-60.0, 60.0])
-    short, long = (float(one().pose([angle]).length[0]) for angle in swept)
+    short, long = (float(one().geometry([angle]).length[0]) for angle in swept)
     assert long - short == pytest.approx(0.080, rel=0.04)
 
 
@@ -56,28 +56,28 @@ def test_the_length_is_the_distance_between_the_two_pivots() -> None:
     for q in np.linspace(-4.0, 4.0, 33):
         gamma = np.arccos(HYQ.crank / HYQ.base) + q
         foot, rod = np.array([HYQ.base, 0.0]), HYQ.crank * np.array([np.cos(gamma), np.sin(gamma)])
-        assert cylinder.pose([q]).length[0] == pytest.approx(np.linalg.norm(rod - foot), rel=1e-12)
+        assert cylinder.geometry([q]).length[0] == pytest.approx(np.linalg.norm(rod - foot), rel=1e-12)
 
 
 def test_the_lever_is_the_derivative_of_the_length_so_that_power_is_the_same_on_both_sides() -> None:
     cylinder = one()
     for q in np.linspace(-4.0, 4.0, 33):
-        slope = (cylinder.pose([q + 1e-6]).length - cylinder.pose([q - 1e-6]).length) / 2e-6
-        assert np.allclose(cylinder.pose([q]).lever, slope, atol=1e-9)
+        slope = (cylinder.geometry([q + 1e-6]).length - cylinder.geometry([q - 1e-6]).length) / 2e-6
+        assert np.allclose(cylinder.geometry([q]).lever, slope, atol=1e-9)
 
 
 def test_the_lever_is_longest_at_the_centre_and_zero_where_crank_and_cylinder_line_up() -> None:
     cylinder = one()
-    levers = np.array([cylinder.pose([q]).lever[0] for q in np.linspace(-np.pi, np.pi, 2001)])
+    levers = np.array([cylinder.geometry([q]).lever[0] for q in np.linspace(-np.pi, np.pi, 2001)])
     assert levers.max() == pytest.approx(HYQ.crank, rel=1e-6)
-    assert cylinder.pose([0.0]).lever[0] == pytest.approx(HYQ.crank, rel=1e-12)
-    assert cylinder.pose([-np.arccos(HYQ.crank / HYQ.base)]).lever[0] == pytest.approx(0.0, abs=1e-12)
+    assert cylinder.geometry([0.0]).lever[0] == pytest.approx(HYQ.crank, rel=1e-12)
+    assert cylinder.geometry([-np.arccos(HYQ.crank / HYQ.base)]).lever[0] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_chambers_take_up_what_the_piston_leaves_and_never_vanish() -> None:
     cylinder = one()
     for q in np.linspace(-np.pi, np.pi, 50):
-        before, after = cylinder.pose([q - 1e-6]), cylinder.pose([q + 1e-6])
+        before, after = cylinder.geometry([q - 1e-6]), cylinder.geometry([q + 1e-6])
         moved = after.length - before.length
         assert np.allclose(after.volumes - before.volumes, cylinder.areas * np.array([[1.0], [-1.0]]) * moved, atol=1e-18)
         assert np.all(before.volumes >= HYQ.dead_volume * (1.0 - 1e-9))
@@ -86,25 +86,25 @@ def test_chambers_take_up_what_the_piston_leaves_and_never_vanish() -> None:
 # valve
 
 
-def test_the_open_valve_passes_its_rated_flow_at_its_rated_drop() -> None:
+def test_the_open_valve_passes_its_rated_flow_at_its_rated_pressure_drop() -> None:
     """Half of it at each edge, turbulent, into A and out of B."""
     pressures = np.array([[HYQ.supply_pressure - 35e5], [HYQ.tank_pressure + 35e5]])
-    flows = one().flows(np.array([1.0]), pressures)
+    flows = one().valve_flows(np.array([1.0]), pressures)
     assert flows == pytest.approx(np.array([[HYQ.rated_flow], [-HYQ.rated_flow]]), rel=1e-3)
-    assert one().flows(np.array([0.25]), pressures) == pytest.approx(0.25 * flows)
+    assert one().valve_flows(np.array([0.25]), pressures) == pytest.approx(0.25 * flows)
 
 
 def test_flow_grows_with_the_root_of_the_drop_and_with_its_sign() -> None:
     cylinder = one()
-    flow = cylinder.edge_flow(np.array([[40e5], [-10e5]]))[:, 0]
+    flow = cylinder.orifice_flow(np.array([[40e5], [-10e5]]))[:, 0]
     assert flow == pytest.approx(HYQ.valve_gain * np.array([np.sqrt(40e5), -np.sqrt(10e5)]), rel=3e-3)
-    slope = cylinder.edge_flow(np.array([[1.0], [-1.0]]))[:, 0]
+    slope = cylinder.orifice_flow(np.array([[1.0], [-1.0]]))[:, 0]
     assert np.all(np.isfinite(slope)) and slope[0] == -slope[1] > 0.0
 
 
 @pytest.mark.parametrize(("x", "into"), [(0.5, (1, -1)), (-0.5, (-1, 1)), (0.0, (0, 0))])
 def test_the_spool_chooses_which_chamber_is_fed(x: float, into: tuple[int, int]) -> None:
-    flows = one().flows(np.array([x]), np.full((2, 1), 80e5))
+    flows = one().valve_flows(np.array([x]), np.full((2, 1), 80e5))
     assert tuple(np.sign(flows[:, 0]).astype(int)) == into
 
 
@@ -115,10 +115,10 @@ def test_a_blocked_piston_comes_to_rest_where_valve_and_leakage_pass_the_same_fl
     """Both edges and the gap in a row: K x √(p_s - p_A) = c (p_A - p_B) = K x √(p_B - p_t)."""
     leaky = replace(HYQ, leakage=5e-12)
     cylinder, x = one(leaky), np.array([0.3])
-    pose, still = cylinder.pose([0.0]), np.zeros(1)
+    geometry, still = cylinder.geometry([0.0]), np.zeros(1)
 
     def rates(t: float, p: np.ndarray) -> np.ndarray:
-        return cylinder.pressure_rates(x, p.reshape(2, 1), pose, still).ravel()
+        return cylinder.pressure_rates(x, p.reshape(2, 1), geometry, still).ravel()
 
     end = solve_ivp(rates, (0.0, 2.0), [50e5, 50e5], method="LSODA", rtol=1e-9, atol=1.0).y[:, -1]
     # equal drops s² at both edges: K x s = c (p_s - p_t - 2 s²)
@@ -131,14 +131,14 @@ def test_a_blocked_piston_comes_to_rest_where_valve_and_leakage_pass_the_same_fl
 def test_closed_chambers_are_a_spring_of_the_textbooks_frequency(q: float) -> None:
     """√(β (A_A²/V_A + A_B²/V_B) / m): a mass on the rod, valve shut, timed over 20 swings."""
     cylinder, mass = one(replace(HYQ, leakage=0.0)), 60.0
-    pose = cylinder.pose([q])
-    volume, area = pose.volumes[:, 0], HYQ.areas
+    geometry = cylinder.geometry([q])
+    volume, area = geometry.volumes[:, 0], HYQ.areas
     expected = np.sqrt(HYQ.bulk_modulus * (area[0] ** 2 / volume[0] + area[1] ** 2 / volume[1]) / mass)
     balanced = np.array([60e5, 60e5 * area[0] / area[1]])
 
     def motion(t: float, y: np.ndarray) -> np.ndarray:
         p, speed = y[:2].reshape(2, 1), y[2:]
-        rates = cylinder.pressure_rates(np.zeros(1), p, pose, speed / pose.lever)
+        rates = cylinder.pressure_rates(np.zeros(1), p, geometry, speed / geometry.lever)
         return np.concatenate([rates.ravel(), cylinder.force(p) / mass])
 
     time = np.linspace(0.0, 20.0 * 2.0 * np.pi / expected, 20001)
@@ -157,15 +157,15 @@ def test_the_pumps_power_is_work_and_heat_and_compressed_oil() -> None:
     for _ in range(200):
         cylinder = Cylinders(HYQ, rng.uniform(0.01, 3.0, 4), np.zeros(4))
         x, p = rng.uniform(-1.0, 1.0, 4), rng.uniform(0.0, 200e5, (2, 4))
-        pose, v = cylinder.pose(rng.uniform(-3.0, 3.0, 4)), rng.normal(size=4)
-        power, flows = cylinder.power(x, p, pose, v), cylinder.flows(x, p)
+        geometry, v = cylinder.geometry(rng.uniform(-3.0, 3.0, 4)), rng.normal(size=4)
+        power, flows = cylinder.power(x, p, geometry, v), cylinder.valve_flows(x, p)
         fed = np.where(x > 0.0, flows[0], flows[1])
         drained = np.where(x > 0.0, flows[1], flows[0])
         pump = HYQ.supply_pressure * fed + HYQ.tank_pressure * drained
-        volume, area = pose.volumes, cylinder.areas
-        rates = cylinder.pressure_rates(x, p, pose, v)
+        volume, area = geometry.volumes, cylinder.areas
+        rates = cylinder.pressure_rates(x, p, geometry, v)
         stored = np.sum(volume * p * rates, axis=0) / HYQ.bulk_modulus
-        joint = (p[0] * area[0] - p[1] * area[1]) * pose.lever * v
+        joint = (p[0] * area[0] - p[1] * area[1]) * geometry.lever * v
         scale = np.abs([pump, joint, power.valve, stored]).max(axis=0)
         for found, expected in ((power.pump, pump), (power.joint, joint), (power.stored, stored)):
             assert np.all(np.abs(found - expected) < 1e-9 * scale)
@@ -247,7 +247,7 @@ def test_a_sine_at_the_bandwidth_keeps_0_7_of_its_size_and_a_much_faster_one_doe
         dt, n = 1.0 / (200.0 * frequency), 200
         wave = np.sin(2.0 * np.pi * np.arange(6 * n) / n)
         amplitude = 0.02 * judges.load("go2").torque_limits
-        q, still = actuators.cylinders.centre, np.zeros(12)
+        q, still = actuators.cylinders.max_lever_angle, np.zeros(12)
         out = np.array([actuators.step(s * amplitude, q, still, dt) for s in wave])[-n:] / amplitude
         return float(np.ptp(out[:, 0]) / 2.0)
 
@@ -274,11 +274,11 @@ def test_a_joint_that_is_swung_keeps_its_torque_because_velocity_is_fed_forward(
     worst, dt = np.zeros(12), 1e-3
     for i in range(1000):
         phase = 2.0 * np.pi * 2.0 * i * dt
-        q, v = cylinders.centre + 0.3 * np.sin(phase), np.full(12, 0.3 * 4.0 * np.pi * np.cos(phase))
+        q, v = cylinders.max_lever_angle + 0.3 * np.sin(phase), np.full(12, 0.3 * 4.0 * np.pi * np.cos(phase))
         ramp = min(1.0, i / 100.0)  # set off gently
-        q, v = cylinders.centre + ramp * (q - cylinders.centre), ramp * v
+        q, v = cylinders.max_lever_angle + ramp * (q - cylinders.max_lever_angle), ramp * v
         worst = np.maximum(worst, np.abs(actuators.step(tau, q, v, dt) - tau) / robot.torque_limits)
-    spring = 0.3 * cylinders.crank**2 * cylinders.pose(cylinders.centre).stiffness / robot.torque_limits
+    spring = 0.3 * cylinders.crank**2 * cylinders.geometry(cylinders.max_lever_angle).stiffness / robot.torque_limits
     assert np.max(worst) < 0.06
     assert np.min(spring / worst) > 100.0
 
@@ -291,7 +291,7 @@ def test_at_the_standing_angles_the_supply_gives_each_joint_its_torque_limit(nam
     robot = judges.load(name)
     actuators = HydraulicActuators(robot)
     standing = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
-    pull, push = actuators.cylinders.pose(standing).lever * actuators.cylinders.force_limits()
+    pull, push = actuators.cylinders.geometry(standing).lever * actuators.cylinders.force_limits()
     assert np.allclose(-pull, robot.torque_limits)
     assert np.allclose(push / robot.torque_limits, 1.66, atol=0.01)
 
@@ -299,10 +299,10 @@ def test_at_the_standing_angles_the_supply_gives_each_joint_its_torque_limit(nam
 @pytest.mark.parametrize("turn", [-1.0, -0.5, 0.0, 0.5, 1.0])
 def test_torque_saturates_where_the_pressure_says_and_never_beyond(turn: float) -> None:
     actuators = joints(replace(HYQ, leakage=0.0))
-    q, still = actuators.cylinders.centre + turn, np.zeros(12)
+    q, still = actuators.cylinders.max_lever_angle + turn, np.zeros(12)
     high, low = HYQ.supply_pressure, HYQ.tank_pressure
     A, B = actuators.cylinders.areas
-    limits = actuators.cylinders.pose(q).lever * np.array([A * low - B * high, A * high - B * low])
+    limits = actuators.cylinders.geometry(q).lever * np.array([A * low - B * high, A * high - B * low])
     for sign, limit in zip((-1.0, 1.0), limits, strict=True):
         out = np.array([actuators.step(sign * 5.0 * np.abs(limits[1]), q, still, 1e-3) for _ in range(300)])
         assert np.allclose(out[-1], limit, rtol=2e-3)
@@ -311,7 +311,7 @@ def test_torque_saturates_where_the_pressure_says_and_never_beyond(turn: float) 
 
 def test_where_crank_and_cylinder_line_up_there_is_no_torque() -> None:
     actuators = joints()
-    q = actuators.cylinders.centre - np.arccos(HYQ.crank / HYQ.base)
+    q = actuators.cylinders.max_lever_angle - np.arccos(HYQ.crank / HYQ.base)
     out = np.array([actuators.step(judges.load("go2").torque_limits, q, np.zeros(12), 1e-3) for _ in range(50)])
     assert np.all(np.isfinite(out))
     assert np.max(np.abs(out)) < 1e-6
@@ -329,7 +329,7 @@ def test_all_joints_behave_alike_in_units_of_their_strength() -> None:
 
 def test_oil_that_is_pulled_apart_boils_instead_of_pulling() -> None:
     actuators = joints(replace(HYQ, loop_bandwidth=0.01, valve_bandwidth=0.01))
-    q = actuators.cylinders.centre
+    q = actuators.cylinders.max_lever_angle
     for i in range(400):
         actuators.step(np.zeros(12), q - 1e-3 * i, np.full(12, -1.0), 1e-3)
     assert np.min(actuators.state.pressures) == VACUUM
@@ -341,14 +341,14 @@ def test_oil_that_is_pulled_apart_boils_instead_of_pulling() -> None:
 def test_a_reset_puts_the_oil_under_the_desired_torques_and_forgets_the_rest() -> None:
     robot, actuators = judges.load("go2"), joints()
     run(actuators, robot.torque_limits, 0.02)
-    tau, q = 0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12), actuators.cylinders.centre + 0.3
+    tau, q = 0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12), actuators.cylinders.max_lever_angle + 0.3
     actuators.reset(tau, q)
     assert np.allclose(actuators.torques(q), tau)
     assert not np.any(actuators.state.opening) and not np.any(actuators.state.integral)
     held = np.array([actuators.step(tau, q, np.zeros(12), 1e-3) for _ in range(100)])
     assert np.max(np.abs(held - tau) / robot.torque_limits) < 0.01
     actuators.reset()
-    assert np.allclose(actuators.torques(actuators.cylinders.centre), 0.0, atol=1e-9)
+    assert np.allclose(actuators.torques(actuators.cylinders.max_lever_angle), 0.0, atol=1e-9)
 
 
 def test_two_steps_are_one_step_after_another_and_the_same_every_time() -> None:
@@ -388,7 +388,7 @@ def test_robots_that_cannot_have_cylinders_are_refused() -> None:
     panda = fb.load("panda", locked=["panda_finger_joint2"])
     refused(lambda: HydraulicActuators(endless), InputError, "RR_calf_joint", "go2")
     refused(lambda: HydraulicActuators(go2, 20.0), InputError, "hydraulics", 20.0)  # type: ignore[arg-type]
-    refused(lambda: HydraulicActuators(go2, centre=np.zeros(3)), InputError, "centre", 3, 12)
+    refused(lambda: HydraulicActuators(go2, max_lever_angle=np.zeros(3)), InputError, "centre", 3, 12)
     refused(lambda: Cylinders(HYQ, [0.0], [0.0]), InputError, 0)
     refused(lambda: HydraulicActuators(panda), InputError, "panda_finger_joint1")  # it slides
 

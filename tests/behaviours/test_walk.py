@@ -73,7 +73,7 @@ def test_the_momentum_of_a_walk_changes_by_what_the_ground_does() -> None:
 
 
 def test_every_tick_of_a_walk_is_compiled() -> None:
-    walk, paths = walk_of("go2", Gait.trot, (0.3, 0.0)), []
+    walk, backends = walk_of("go2", Gait.trot, (0.3, 0.0)), []
 
     class Told:
         robot = walk.robot
@@ -81,11 +81,11 @@ def test_every_tick_of_a_walk_is_compiled() -> None:
 
         def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> fb.control.Command:
             command = walk(q, v, t)
-            paths.append(command.path)
+            backends.append(command.backend)
             return command
 
     assert fb.rollout(fb.Simulation(walk.robot), Told(), 2.0, control_period=PERIOD).outcome == "completed"
-    assert set(paths) == {"compiled"}
+    assert set(backends) == {"compiled"}
 
 
 def test_a_trot_bears_pushes_from_the_side() -> None:
@@ -236,7 +236,7 @@ def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
         q[:3], q[3:7] = turn @ q[:3] + [1.0, -2.0, 0.0], [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
         sim = fb.Simulation(robot)
         sim.reset(robot.standing().replace(q=q))
-        walk = walk_of("go2", Gait.trot, (0.2, 0.0), turn=yaw)  # of the facets of friction
+        walk = walk_of("go2", Gait.trot, (0.2, 0.0), facet_rotation=yaw)  # of the facets of friction
         record = fb.rollout(sim, walk, 3.0, [fb.Push(turn @ [0.0, 200.0, 0.0], start=1.6)], PERIOD)
         assert record.outcome == "completed"
         ways.append((record.com - record.com[0]) @ turn)

@@ -198,7 +198,7 @@ def test_a_robot_that_leans_is_turned_back(axis: int) -> None:
     leaning = judges.along(state, lean, 1.0)
     expected = -100.0 * 0.05 * inertia_about_com(leaning)[axis, axis]
     for controller, gained in (
-        (AnalyticController(state.robot, contacts, state, posture=1e-7), pytest.approx(expected, rel=0.02)),
+        (AnalyticController(state.robot, contacts, state, posture_weight=1e-7), pytest.approx(expected, rel=0.02)),
         (controller_of("go2"), pytest.approx(0.65 * expected, rel=0.55)),  # the default posture term takes its share
     ):
         command = controller(leaning.q, leaning.v)

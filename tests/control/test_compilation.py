@@ -30,14 +30,14 @@ from numba.core.runtime import rtsys
 
 import floatbase as fb
 from floatbase.__main__ import main
-from floatbase.control.tick import Compiled, announce_if_slow, jit, tick
+from floatbase.control.tick import CompiledTick, announce_if_slow, jit, tick
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
 TICK = Path(tick.__file__).parent
 
 
-def tick_of(robot: Robot) -> Compiled:
+def tick_of(robot: Robot) -> CompiledTick:
     """The compiled tick of a controller that stands."""
     compiled = judges.controller_of(robot.name).compiled
     assert compiled is not None
@@ -47,16 +47,16 @@ def tick_of(robot: Robot) -> Compiled:
 # when it runs --------------------------------------------------------------------------------------------------------------
 
 
-READABLE = """
+WITHOUT_NUMBA = """
 import sys
 {obstacle}
 import floatbase as fb
 robot = fb.load("go2")
 state, contacts = robot.standing(), fb.Contacts.points(robot)
 controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
-print(controller.path, controller(state.q, state.v).path, controller.path_reason)
+print(controller.backend, controller(state.q, state.v).backend, controller.backend_reason)
 try:
-    fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), path="compiled")
+    fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), backend="compiled")
 except fb.FloatbaseError as error:
     print(error)
 """
@@ -69,25 +69,27 @@ except fb.FloatbaseError as error:
         ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, and numba compiles nothing"),
     ],
 )
-def test_without_numba_the_readable_path_answers_and_says_why(obstacle: str, environment: dict[str, str], reason: str) -> None:
-    command = [sys.executable, "-c", READABLE.format(obstacle=obstacle)]
+def test_without_numba_the_reference_backend_answers_and_says_why(
+    obstacle: str, environment: dict[str, str], reason: str
+) -> None:
+    command = [sys.executable, "-c", WITHOUT_NUMBA.format(obstacle=obstacle)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | environment)
     said = done.stdout.splitlines()
     reason = reason.replace("(.*)", r"\(.*\)")
-    assert re.fullmatch(f"readable readable {reason}", said[0])
-    assert re.match(f'path="compiled" is not possible: {reason}. path="auto"', said[1])
+    assert re.fullmatch(f"reference reference {reason}", said[0])
+    assert re.match(f'backend="compiled" is not possible: {reason}. backend="auto"', said[1])
 
 
-def test_another_layout_of_pinocchios_results_leaves_the_readable_path(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_layout_of_pinocchios_results_leaves_the_reference_backend(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = fb.load("go2", torque_limits=20.0)  # one that no other test has: what fits is remembered for each robot
-    monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "fits", False)
+    monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "layout_supported", False)
     controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
-    assert controller.path == "readable"
-    assert "Pinocchio" in controller.path_reason
+    assert controller.backend == "reference"
+    assert "Pinocchio" in controller.backend_reason
 
 
 def test_threads_may_share_a_controller() -> None:
-    controller, states = judges.controller_of("go2", path="compiled"), judges.states("go2", 40, 0.3)
+    controller, states = judges.controller_of("go2", backend="compiled"), judges.states("go2", 40, 0.3)
     expected, interval = [controller(state.q, state.v).tau for state in states], sys.getswitchinterval()
 
     def wrong(shift: int) -> list[int]:
@@ -104,10 +106,10 @@ def test_threads_may_share_a_controller() -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 @pytest.mark.filterwarnings("ignore:.*fork")  # Python 3.12 warns of just this
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_a_process_forked_while_threads_tick_ticks_on(path: str) -> None:
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_a_process_forked_while_threads_tick_ticks_on(backend: str) -> None:
     """The other threads, and the locks that they hold, stay behind in the middle of a tick."""
-    controller, state = judges.controller_of("go2", path=path), judges.load("go2").random_state(3, 0.1)
+    controller, state = judges.controller_of("go2", backend=backend), judges.load("go2").random_state(3, 0.1)
     expected, ended, answers = controller(state.q, state.v).tau.tobytes(), threading.Event(), []
 
     def answer(out: Any) -> None:
@@ -163,19 +165,25 @@ def test_a_long_compilation_is_announced_and_a_short_one_is_not(capsys: pytest.C
 
 def test_an_edit_in_any_file_of_the_tick_changes_the_key_of_its_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     copy = shutil.copytree(TICK, tmp_path / "tick", ignore=shutil.ignore_patterns("__pycache__"))
-    key, files = jit.digest(copy), sorted(copy.glob("*.py"))
-    assert len(files) == len(list(TICK.glob("*.py"))) and key == jit.digest()
+    key, files = jit.source_digest(copy), sorted(copy.glob("*.py"))
+    assert len(files) == len(list(TICK.glob("*.py"))) and key == jit.source_digest()
     assert inspect.getclosurevars(tick.tick.py_func).nonlocals == {"digest": key}  # numba's key holds the closure
     for file in files:
         text = file.read_text(encoding="utf-8")
         file.write_text(text.replace("0", "1", 1) if "0" in text else text + "x = 1\n", encoding="utf-8")
-        assert jit.digest(copy) != key, file.name
+        assert jit.source_digest(copy) != key, file.name
         file.write_text(text, encoding="utf-8")
-    assert jit.digest(copy) == key
-    for name in ("INCONSISTENT", "CONSTRAINT_RANK_TOLERANCE", "CONSTRAINT_NOISE", "FEASIBILITY_TOLERANCE", "UNIT_NORM_TOLERANCE"):
+    assert jit.source_digest(copy) == key
+    for name in (
+        "INCONSISTENCY_TOLERANCE",
+        "CONSTRAINT_RANK_TOLERANCE",
+        "CONSTRAINT_NOISE",
+        "FEASIBILITY_TOLERANCE",
+        "UNIT_NORM_TOLERANCE",
+    ):
         with monkeypatch.context() as patch:
             patch.setattr(jit, name, 2.0 * getattr(jit, name))
-            assert jit.digest() != key, name
+            assert jit.source_digest() != key, name
 
 
 ENTRY = '''
@@ -199,11 +207,11 @@ tick = jit_cached(make_tick)
 
 HITS = """
 from floatbase.control.tick.tick import tick
-print(tick(2.0), len(tick.stats.cache_hits), jit.cache_trouble)"""
+print(tick(2.0), len(tick.stats.cache_hits), jit.cache_error)"""
 NOWHERE = """
 def nowhere(function):
     raise RuntimeError("cannot cache function: no locator available")
-jit.Cache = nowhere"""
+jit.WritableCache = nowhere"""
 
 
 @pytest.fixture
@@ -266,7 +274,7 @@ def make_small(digest: int) -> Callable[[float], float]:
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
     """Makes `make_small` ready in a folder of its own, checks its answer, and says whether it was loaded from disk."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(jit, "cache_trouble", "")
+    monkeypatch.setattr(jit, "cache_error", "")
 
     def loaded() -> bool:
         function = jit.jit_cached(make_small)
@@ -299,12 +307,12 @@ def test_damaged_files_are_compiled_anew_and_replaced(suffix: str, small: Callab
     for name, damage in DAMAGES.items():
         file.write_bytes(damage(file.read_bytes()))
         assert not small() or suffix == ".nbi", name  # a bit of the index may say nothing; of code, every bit counts
-        assert small() and not jit.cache_trouble, name
+        assert small() and not jit.cache_error, name
     file.unlink()
     assert not small() and small()
     file.unlink()
     (file / "inside").mkdir(parents=True)
-    assert not small() and "Is a directory" in jit.cache_trouble
+    assert not small() and "Is a directory" in jit.cache_error
 
 
 def test_a_full_disk_leaves_a_compiled_tick_and_the_words(small: Callable[[], bool]) -> None:
@@ -314,9 +322,9 @@ def test_a_full_disk_leaves_a_compiled_tick_and_the_words(small: Callable[[], bo
         assert not small()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert "File too large" in jit.cache_trouble
+    assert "File too large" in jit.cache_error
     robot = judges.load("go2")
-    reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
+    reason = fb.WholeBodyController(robot, judges.stance(robot), []).backend_reason
     assert not missing(reason, "OSError", "File too large", "NUMBA_CACHE_DIR")
     assert not small() and small()  # there is room again
 
@@ -325,25 +333,25 @@ def test_the_tick_compiles_where_no_folder_can_be_written(small: Callable[[], bo
     def nowhere(function: object) -> None:
         raise RuntimeError("cannot cache function: no locator available")
 
-    monkeypatch.setattr(jit, "Cache", nowhere)
+    monkeypatch.setattr(jit, "WritableCache", nowhere)
     assert not small() and not small()
     robot = judges.load("go2")
-    reason = fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
+    reason = fb.WholeBodyController(robot, judges.stance(robot), []).backend_reason
     assert "NUMBA_CACHE_DIR" in reason
-    monkeypatch.setattr(jit, "cache_trouble", "")
-    assert "NUMBA_CACHE_DIR" not in fb.WholeBodyController(robot, judges.stance(robot), []).path_reason
+    monkeypatch.setattr(jit, "cache_error", "")
+    assert "NUMBA_CACHE_DIR" not in fb.WholeBodyController(robot, judges.stance(robot), []).backend_reason
 
 
-def test_where_numba_fails_the_readable_path_is_the_last_resort(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_numba_fails_the_reference_backend_is_the_last_resort(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*given: object) -> int:
         raise NotImplementedError("no such target")
 
     monkeypatch.setattr(tick, "tick", fails)
     controller = judges.controller_of("go2")
-    assert controller.path == controller(judges.load("go2").posture, np.zeros(18)).path == "readable"
-    assert not missing(controller.path_reason, "numba", "NotImplementedError: no such target")
-    with raises(InputError, "path", "NotImplementedError: no such target"):
-        judges.controller_of("go2", path="compiled")
+    assert controller.backend == controller(judges.load("go2").posture, np.zeros(18)).backend == "reference"
+    assert not missing(controller.backend_reason, "numba", "NotImplementedError: no such target")
+    with raises(InputError, "backend", "NotImplementedError: no such target"):
+        judges.controller_of("go2", backend="compiled")
 
 
 # memory --------------------------------------------------------------------------------------------------------------------
@@ -384,11 +392,11 @@ def test_a_tick_allocates_nothing_and_says_when_its_workspace_is_too_small() -> 
 
 
 @pytest.mark.parametrize("weight", [1e-10, 1e-15, 1e-20, 1e-25, 1e-30, 0.0])
-def test_an_answer_that_is_hardly_determined_is_left_to_the_readable_path(weight: float) -> None:
+def test_an_answer_that_is_hardly_determined_is_left_to_the_reference_backend(weight: float) -> None:
     """Forces inside the robot cost hardly anything: rounding may drive them anywhere, but no such answer comes out."""
     robot = judges.load("talos")
     tasks = [*fb.standing_tasks(robot.standing()), fb.ForceTask(weight=weight), fb.TorqueTask(weight=0.0)]
-    controller = fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot), tasks, path="compiled")
+    controller = fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot), tasks, backend="compiled")
     assert controller.compiled is not None
     for state in judges.states("talos", 5, 0.1):
         answer = controller.compiled(np.array(state.q), np.array(state.v), 0.0)

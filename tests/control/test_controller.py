@@ -158,37 +158,43 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
     ]
     for inside, reach in ((True, 0.5 * np.cos(np.pi / 4)), (False, 0.5)):
         contacts = fb.Contacts.points(robot, mu=0.5)
-        command = fb.WholeBodyController(robot, contacts, tasks, inside=inside, torque_limits=np.inf)(state.q, state.v)
+        command = fb.WholeBodyController(robot, contacts, tasks, inner_approximation=inside, torque_limits=np.inf)(
+            state.q, state.v
+        )
         total = command.forces.reshape(-1, 3).sum(axis=0)
         assert total[1] / total[2] == pytest.approx(reach, rel=1e-4)
         for point in contacts.point_names:
             assert f"{point} facet 1" in command.active or f"{point} normal force" in command.active
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(path: str) -> None:
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(backend: str) -> None:
     """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides, out of which forwards is one."""
     robot = judges.load("go2")
     state, contacts = robot.standing(), fb.Contacts.points(robot, mu=0.3)
     others = fb.standing_tasks(state)[1:]
 
-    def reached(direction: float, turn: float) -> float:
+    def reached(direction: float, rotation: float) -> float:
         towards = np.array([np.cos(direction), np.sin(direction), 0.0])
         wish = fb.CoMTask(state.com, acceleration=4.0 * towards)
-        forces = fb.WholeBodyController(robot, contacts, [wish, *others], turn=turn, path=path)(state.q, state.v).forces
+        forces = fb.WholeBodyController(robot, contacts, [wish, *others], facet_rotation=rotation, backend=backend)(
+            state.q, state.v
+        ).forces
         f = forces.reshape(-1, 3).sum(axis=0)
         return float(f @ towards / f[2])
 
     quarter = np.pi / 4
-    for turn in (0.0, quarter):
-        assert reached(turn, turn) == pytest.approx(0.3 * np.cos(quarter), abs=ASIDE)
-        assert reached(turn + quarter, turn) == pytest.approx(0.3, abs=ASIDE)
+    for rotation in (0.0, quarter):
+        assert reached(rotation, rotation) == pytest.approx(0.3 * np.cos(quarter), abs=ASIDE)
+        assert reached(rotation + quarter, rotation) == pytest.approx(0.3, abs=ASIDE)
 
 
 def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> None:
     """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges, neither holds the other."""
     for state in judges.states("go2", 5, 0.3):
-        outside = [solve(judges.controller_of("go2", facets=n, inside=False).qp(state)).objective for n in (4, 8, 16, 32)]
+        outside = [
+            solve(judges.controller_of("go2", facets=n, inner_approximation=False).qp(state)).objective for n in (4, 8, 16, 32)
+        ]
         slack = 1e-9 * abs(outside[0])
         assert all(coarse <= fine + slack for coarse, fine in pairwise(outside))
         inside = [solve(judges.controller_of("go2", facets=n).qp(state)).objective for n in (4, 8, 16, 32)]
@@ -270,12 +276,14 @@ def test_regularisation_is_added_where_it_is_missing_and_shown() -> None:
 
 def test_a_controller_is_replaced_rather_than_changed() -> None:
     robot = judges.load("go2")
-    controller = judges.controller_of("go2", facets=8, inside=False, min_normal_force=3.0, torque_limits=20.0, solver="cvxpy")
+    controller = judges.controller_of(
+        "go2", facets=8, inner_approximation=False, min_normal_force=3.0, torque_limits=20.0, solver="cvxpy"
+    )
     three = controller.replace(contacts=controller.contacts.without("FL_foot"))
     assert three.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
     assert controller.contacts.names == tuple(foot.frame for foot in robot.feet)
     assert three.tasks == controller.tasks
-    for field in ("facets", "inside", "min_normal_force"):
+    for field in ("facets", "inner_approximation", "min_normal_force"):
         assert getattr(three.limits, field) == getattr(controller.limits, field)
     assert np.array_equal(three.limits.torque_limits, controller.limits.torque_limits)
     assert three.solver == "cvxpy"
@@ -332,7 +340,7 @@ def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
 def test_any_solver_can_drive_a_controller() -> None:
     state, expected = judges.load("go2").random_state(1), judges.controller_of("go2")
     for solver in ("daqp", "cvxpy", "active_set"):
-        command = judges.controller_of("go2", solver=solver, path="readable")(state.q, state.v)
+        command = judges.controller_of("go2", solver=solver, backend="reference")(state.q, state.v)
         assert command.solution.solver == solver
         assert max(command.solution.residuals.equality, command.solution.residuals.inequality) < 1e-6
         assert np.allclose(command.tau, expected(state.q, state.v).tau, atol=1e-4)
@@ -387,15 +395,15 @@ def test_limits_keep_their_own_copy() -> None:
     assert np.all(limits.torque_limits == 20.0)
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(path: str) -> None:
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(backend: str) -> None:
     robot = judges.load("talos")
     contacts, state = fb.Contacts.flat_feet(robot), robot.standing()
-    command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), path=path)(state.q, state.v)
+    command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), backend=backend)(state.q, state.v)
     left, right = (command.force(name) for name in contacts.names)
     assert np.allclose(left + right, [0.0, 0.0, robot.weight], atol=SAG * robot.weight)
     assert np.allclose(left, command.forces[:12].reshape(4, 3).sum(axis=0))
     with raises(UnknownNameError, "left_sole_lnk", "left_sole_link"):
         command.force("left_sole_lnk")
     assert repr(command).startswith("Command(|tau|=") and "\n" not in repr(command)
-    assert path in repr(command)
+    assert backend in repr(command)

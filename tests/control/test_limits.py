@@ -1,4 +1,4 @@
-"""Rows of one's own and bounds of normal forces: kept on both paths, told when they conflict, refused where they do not fit."""
+"""Rows of one's own and bounds of normal forces: kept on both backends, told when they conflict, refused where they do not fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import Rows
+from floatbase.control import LinearInequality
 from floatbase.dynamics import PointContact
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.qp import solve
@@ -19,37 +19,37 @@ from floatbase.robots import Robot
 # rows ----------------------------------------------------------------------------------------------------------------------
 
 
-def own_rows(robot: Robot, contacts: fb.Contacts) -> list[Rows]:
+def user_inequalities(robot: Robot, contacts: fb.Contacts) -> list[LinearInequality]:
     """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with time."""
     E, up = np.eye(robot.nv)[robot.nv - robot.d :], np.zeros((1, contacts.k))
     up[0, contacts.point_force_indices[2::3]] = 1.0
     turns = np.resize([1.0, -1.0], (1, robot.d))
     sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
     return [
-        Rows("acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides),
-        Rows("total force", "forces", (up, [1.05 * robot.weight])),
-        Rows(
+        LinearInequality("acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides),
+        LinearInequality("total force", "forces", (up, [1.05 * robot.weight])),
+        LinearInequality(
             "joined torques", "tau", lambda eom, t: (np.vstack([turns, -turns]), np.full(2, (0.01 - 0.002 * t) * robot.weight))
         ),
     ]
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_rows_of_ones_own_hold_and_have_their_names_on_both_paths(name: str) -> None:
+def test_rows_of_ones_own_hold_and_have_their_names_on_both_backends(name: str) -> None:
     robot = judges.load(name)
     contacts = judges.stance(robot)
-    rows = own_rows(robot, contacts)
-    compiled, readable = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=rows)
+    inequalities = user_inequalities(robot, contacts)
+    compiled, reference = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), inequalities=inequalities)
     kinds: set[str] = set()
     for i, state in enumerate(judges.near_and_far(name, 6)):
         t = 0.1 * i
-        assert judges.difference(compiled, readable, state, t) < judges.agreement(robot)
+        assert judges.difference(compiled, reference, state, t) < judges.agreement(robot)
         try:
-            command, expected = compiled(state.q, state.v, t), readable(state.q, state.v, t)
+            command, expected = compiled(state.q, state.v, t), reference(state.q, state.v, t)
         except InfeasibleError:
             continue
         eom = fb.equations_of_motion(state, contacts)
-        for each in rows:
+        for each in inequalities:
             G, h = each.at(eom, t)
             assert np.all(G @ command.solution[each.block] <= h + 1e-6)
         if name != "talos":  # four corners share one wrench: rows can depend on one another
@@ -61,21 +61,23 @@ def test_rows_of_ones_own_hold_and_have_their_names_on_both_paths(name: str) -> 
 def test_rows_of_ones_own_against_cvxpy() -> None:
     robot = judges.load("go2")
     contacts = judges.stance(robot)
-    controller = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), rows=own_rows(robot, contacts))[0]
+    controller = judges.pair(
+        robot, contacts, list(fb.standing_tasks(robot.standing())), inequalities=user_inequalities(robot, contacts)
+    )[0]
     for state in judges.states("go2", 4, 0.1):
         command, judge = controller(state.q, state.v), solve(controller.qp(state), "cvxpy")
-        assert command.path == "compiled"
+        assert command.backend == "compiled"
         assert np.max(np.abs(command.tau - judge["tau"])) < 1e-4 * np.max(robot.torque_limits)
 
 
 def test_rows_in_conflict_are_told_by_their_names() -> None:
     robot = judges.load("go2")
-    light = Rows("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
-    for controller in judges.pair(robot, judges.stance(robot), [], rows=[light], min_normal_force=10.0):
+    light = LinearInequality("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
+    for controller in judges.pair(robot, judges.stance(robot), [], inequalities=[light], min_normal_force=10.0):
         with raises(InfeasibleError, "light feet") as caught:
             controller(robot.standing().q, np.zeros(18))
         row = next(row for row in caught.value.constraints if row == "light feet")
-        assert (row.kind, row.owner, row.number) == ("rows", "light feet", 0)
+        assert (row.kind, row.owner, row.number) == ("inequality", "light feet", 0)
         assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.constraints)
 
 
@@ -119,22 +121,22 @@ class Heel(PointContact):
     name = "heel"
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(path: str) -> None:
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend: str) -> None:
     robot = judges.load("go2")
     state, tasks = robot.random_state(1, 0.1), list(fb.standing_tasks(robot.standing()))
     stand = fb.Contacts.points(robot).without("RL_foot") + fb.Contacts([Heel("RL_foot", radius=0.022)])
     swing = stand.without("FL_foot", "heel")
 
     def torques(contacts: fb.Contacts, **bounds: object) -> np.ndarray:
-        return fb.WholeBodyController(robot, contacts, tasks, path=path, **bounds)(state.q, state.v, 0.1).tau
+        return fb.WholeBodyController(robot, contacts, tasks, backend=backend, **bounds)(state.q, state.v, 0.1).tau
 
     bounds = {"min_normal_force": {"heel": 15.0, "RR_foot": 12.0}, "max_normal_force": {"FL_foot": lambda t: 20.0 + t}}
-    standing = fb.WholeBodyController(robot, stand, tasks, path=path, **bounds)
+    standing = fb.WholeBodyController(robot, stand, tasks, backend=backend, **bounds)
     lifted = standing.replace(contacts=swing)
     other = lifted.replace(limits=replace(lifted.limits, torque_limits=robot.torque_limits))
     for each in (lifted, other):
-        assert each.path == path
+        assert each.backend == backend
         assert np.array_equal(each(state.q, state.v, 0.1).tau, torques(swing, min_normal_force={"RR_foot": 12.0}))
         back = each.replace(contacts=stand)(state.q, state.v, 0.1)
         assert np.array_equal(back.tau, standing(state.q, state.v, 0.1).tau)
@@ -144,12 +146,12 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(path: str) -
         torques(swing, **bounds)  # a new controller knows the robot's feet, and no other contact that is not there
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_a_bound_that_is_a_function_is_asked_once_at_a_time(path: str) -> None:
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_a_bound_that_is_a_function_is_asked_once_at_a_time(backend: str) -> None:
     robot = judges.load("go2")
     asked: list[float] = []
     bound = {"FL_foot": lambda t: asked.append(t) or 50.0}
-    controller = fb.WholeBodyController(robot, judges.stance(robot), [], max_normal_force=bound, path=path)
+    controller = fb.WholeBodyController(robot, judges.stance(robot), [], max_normal_force=bound, backend=backend)
     assert asked == [0.0]
     controller(robot.standing().q, np.zeros(18), 0.5)
     assert asked == [0.0, 0.5]
@@ -159,20 +161,22 @@ def test_a_bound_that_is_a_function_is_asked_once_at_a_time(path: str) -> None:
     assert asked == [0.0, 0.5, 0.0]
 
 
-def test_a_bound_that_goes_wrong_is_told_on_both_paths() -> None:
+def test_a_bound_that_goes_wrong_is_told_on_both_backends() -> None:
     robot = judges.load("go2")
     bound = {"FL_foot": lambda t: 50.0 if t < 1.0 else np.nan}
     for controller in judges.pair(robot, judges.stance(robot), [], max_normal_force=bound):
-        assert controller(robot.standing().q, np.zeros(18)).path == controller.path
+        assert controller(robot.standing().q, np.zeros(18)).backend == controller.backend
         with raises(InputError, "max_normal_force", "FL_foot", np.nan):
             controller(robot.standing().q, np.zeros(18), 1.0)
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_a_replaced_controller_is_checked(path: str) -> None:
-    controller = judges.controller_of("go2", path=path)
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_a_replaced_controller_is_checked(backend: str) -> None:
+    controller = judges.controller_of("go2", backend=backend)
     with raises(InputError, "r", "tau", 3, 12):
-        controller.replace(limits=replace(controller.limits, rows=[Rows("r", "tau", (np.eye(3), np.ones(3)))]))
+        controller.replace(
+            limits=replace(controller.limits, inequalities=[LinearInequality("r", "tau", (np.eye(3), np.ones(3)))])
+        )
     with raises(UnknownNameError, "max_normal_force", "FL_fot", "FL_foot"):
         controller.replace(limits=replace(controller.limits, max_normal_force={"FL_fot": 1.0}))
     with raises(InputError, "q", "arm", 5):

@@ -13,7 +13,7 @@ import pytest
 from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.control import AnalyticController, Belief, Limits, Rows
+from floatbase.control import AnalyticController, Limits, LinearInequality, ModelMismatch
 from floatbase.errors import InputError, UnknownNameError
 
 GO2, SOLO = judges.load("go2"), judges.load("solo12")
@@ -53,7 +53,7 @@ class Fixed(Own):
 
 
 def rows(block: str, n: int, m: int | None = None, owners: tuple[str, ...] = ()) -> Rows:
-    return Rows("r", block, (np.eye(n), np.ones(m or n)), owners)
+    return LinearInequality("r", block, (np.eye(n), np.ones(m or n)), owners)
 
 
 def analytic(**swap: object) -> AnalyticController:
@@ -64,7 +64,7 @@ def analytic(**swap: object) -> AnalyticController:
     "case",
     [
         (lambda: controller(facets=2), InputError, "facets", 2, 3),
-        (lambda: controller(turn=np.nan), InputError, "turn", np.nan),
+        (lambda: controller(facet_rotation=np.nan), InputError, "turn", np.nan),
         (lambda: controller().qp(STATE).without("frictions"), UnknownNameError, "frictions", "friction"),
         (lambda: controller(min_normal_force=-1.0), InputError, "min_normal_force", -1),
         (lambda: controller(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "min_normal_force", "FL_fot", "FL_foot"),
@@ -82,19 +82,19 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller(torque_limits="strong"), InputError, "torque_limits", "strong"),
         (lambda: controller(torque_limits=["strong"] * 12), InputError, "torque_limits", "strong"),
         (lambda: controller(solver="dapq"), UnknownNameError, "solver", "dapq", "daqp"),
-        (lambda: controller(path="quick"), UnknownNameError, "path", "quick", "compiled", "readable"),
-        (lambda: controller(rows=rows("tau", 12)), InputError, "rows", "Rows"),
-        (lambda: controller(rows=[np.eye(12)]), InputError, "rows", "Rows", 12),
+        (lambda: controller(backend="quick"), UnknownNameError, "backend", "quick", "compiled", "reference"),
+        (lambda: controller(rows=rows("tau", 12)), InputError, "rows", "LinearInequality"),
+        (lambda: controller(rows=[np.eye(12)]), InputError, "rows", "LinearInequality", 12),
         (lambda: controller(rows=[rows("tau", 3)]), InputError, "r", "tau", 3, 12),
         (lambda: controller(rows=[rows("forces", 9)]), InputError, "r", "forces", 9, 12),
-        (lambda: controller(rows=[Rows("r", "tau", lambda eom, t: 3.0)]), InputError, "r", "G", "h", 3),
+        (lambda: controller(rows=[LinearInequality("r", "tau", lambda eom, t: 3.0)]), InputError, "r", "G", "h", 3),
         (lambda: controller(rows=[rows("tau", 12, owners=("a",))]), InputError, "r", 1, 12),
         (lambda: controller(rows=2 * [rows("tau", 12)]), InputError, "r 0"),
         (lambda: rows("lambda", 12), InputError, "r", "lambda", "qdd", "tau", "forces"),
         (lambda: rows("tau", 12, 3), InputError, "h", "r", 3, 12),
-        (lambda: Rows("r", "tau", np.eye(12)), InputError, "r", "G", "h"),
-        (lambda: Rows("r", "tau", (np.ones(12), [1.0])), InputError, "G", "r", 12),
-        (lambda: Rows("r", "tau", lambda eom: 3.0), InputError, "r", "eom", "t"),
+        (lambda: LinearInequality("r", "tau", np.eye(12)), InputError, "r", "G", "h"),
+        (lambda: LinearInequality("r", "tau", (np.ones(12), [1.0])), InputError, "G", "r", 12),
+        (lambda: LinearInequality("r", "tau", lambda eom: 3.0), InputError, "r", "eom", "t"),
         (lambda: controller(Own(without="block")), InputError, "Own", "block"),
         (lambda: controller(Own(residual=np.ones(3))), InputError, "residual", "mine", "ndarray"),
         (lambda: controller(Own()), InputError, "residual", "mine", "NoneType"),
@@ -110,7 +110,7 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller("stand"), InputError, "tasks", "stand"),
         (lambda: controller().replace(tasks=3), InputError, "tasks", 3),
         (lambda: controller().replace(tasks=[Fixed()]), InputError, "residual", "mine", "qdd", 3, 18),
-        (lambda: controller(belief=Belief(unfelt=["FL_fot"])), UnknownNameError, "FL_fot", "FL_foot"),
+        (lambda: controller(mismatch=ModelMismatch(ignored_contacts=["FL_fot"])), UnknownNameError, "FL_fot", "FL_foot"),
         (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), InputError, "tasks", "CoMTask"),
         (lambda: fb.WholeBodyController(GO2, CONTACTS, None), InputError, "tasks", "None"),
         (lambda: fb.WholeBodyController(GO2, [1], []), InputError, "contacts", "Contacts", 1),
@@ -196,9 +196,9 @@ def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> 
     assert np.allclose(command.tau, expected.tau)
 
 
-@pytest.mark.parametrize("name", ["torque_limits", "path", "tasks", "task"])
+@pytest.mark.parametrize("name", ["torque_limits", "backend", "tasks", "task"])
 def test_what_a_controller_was_made_with_is_not_set_afterwards(name: str) -> None:
-    made = controller(fb.ForceTask(), path="readable")
+    made = controller(fb.ForceTask(), backend="reference")
     for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
         with raises(InputError, name, "WholeBodyController", *(["tasks"] if name == "task" else [])):
             setattr(one, name, 2.0)
@@ -208,7 +208,7 @@ def test_a_class_of_ones_own_sets_its_own_attributes() -> None:
     class Counting(fb.WholeBodyController):
         calls = 0
 
-    made = Counting(GO2, CONTACTS, [fb.ForceTask()], path="readable")
+    made = Counting(GO2, CONTACTS, [fb.ForceTask()], backend="reference")
     made.calls += 1
-    with raises(InputError, "path"):
-        made.path = "compiled"
+    with raises(InputError, "backend"):
+        made.backend = "compiled"

@@ -10,9 +10,9 @@ import scipy.integrate
 import floatbase as fb
 from floatbase.dynamics import (
     bias_forces,
+    centripetal_acceleration,
     coriolis_matrix,
     inertia_rate,
-    centripetal_acceleration,
     power_identity,
     view_from_rotating_frame,
 )

@@ -16,8 +16,8 @@ from floatbase.dynamics import (
     PointContact,
     RollingWheel,
     bias_forces,
-    fixed_frame,
     centripetal_acceleration,
+    fixed_frame,
     moving_frame,
     view_from_rotating_frame,
 )

@@ -124,7 +124,10 @@ def test_the_status_changes_at_the_friction_limit() -> None:
 
 def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it() -> None:
     force = [5.0, 0.0, 10.0]
-    inner, outer = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True), FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False)
+    inner, outer = (
+        FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True),
+        FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False),
+    )
     assert (inner.status(force), FrictionCone(UP, 0.6).status(force), outer.status(force)) == ("outside", "inside", "inside")
     assert (inner.active_facets(force), outer.active_facets(force)) == ((0,), ())
 

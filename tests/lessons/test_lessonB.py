@@ -46,7 +46,7 @@ def knee(hydraulics: Hydraulics) -> HydraulicActuators:
     """The package's actuators with another supply, the cylinders' size that of the first."""
     actuators = HydraulicActuators(ROBOT, hydraulics)
     size = ROBOT.torque_limits / Hydraulics().weakest_torque
-    actuators.cylinders = Cylinders(hydraulics, size, actuators.cylinders.centre)
+    actuators.cylinders = Cylinders(hydraulics, size, actuators.cylinders.max_lever_angle)
     actuators.reset()
     return actuators
 
@@ -62,7 +62,7 @@ def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
     hydraulics = Hydraulics(loop_bandwidth=bandwidth, supply_pressure=supply)
     actuators, motion = knee(hydraulics), held_then_turned(speed)
     rows = run_loop(Bench(motion, wanted, hydraulics), bandwidth, 0.4)
-    centre = actuators.cylinders.centre
+    centre = actuators.cylinders.max_lever_angle
     for row, after in pairwise(rows):
         angle, velocity = motion(row.time)
         actuators.step(np.full(12, wanted), centre + angle, np.full(12, velocity), 1e-3)
@@ -74,15 +74,15 @@ def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
 def test_the_benchs_spring_rate_and_reach_are_the_cylinders() -> None:
     actuators = HydraulicActuators(ROBOT)
     cylinders, angle = actuators.cylinders, 0.4
-    bench, pose = Bench(lambda t: (angle, 0.0)), cylinders.pose(cylinders.centre + angle)
-    assert bench.spring == pytest.approx(pose.lever[KNEE] ** 2 * pose.stiffness[KNEE], rel=1e-12)
-    assert bench.volumes == pytest.approx(tuple(pose.volumes[:, KNEE]), rel=1e-12)
-    assert bench.reach() == pytest.approx(tuple((pose.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12)
+    bench, geometry = Bench(lambda t: (angle, 0.0)), cylinders.geometry(cylinders.max_lever_angle + angle)
+    assert bench.spring == pytest.approx(geometry.lever[KNEE] ** 2 * geometry.stiffness[KNEE], rel=1e-12)
+    assert bench.volumes == pytest.approx(tuple(geometry.volumes[:, KNEE]), rel=1e-12)
+    assert bench.reach() == pytest.approx(tuple((geometry.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12)
     pressures = np.array([[bench.a], [bench.b]]) * np.ones(12)
     for side in (1.0, -1.0):
-        rates = cylinders.pressure_rates(np.full(12, side), pressures, pose, np.zeros(12))
-        leaking = cylinders.pressure_rates(np.zeros(12), pressures, pose, np.zeros(12))
-        change = pose.lever * cylinders.force(rates - leaking)
+        rates = cylinders.pressure_rates(np.full(12, side), pressures, geometry, np.zeros(12))
+        leaking = cylinders.pressure_rates(np.zeros(12), pressures, geometry, np.zeros(12))
+        change = geometry.lever * cylinders.force(rates - leaking)
         assert bench.rate(side) == pytest.approx(side * change[KNEE], rel=1e-9)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.control import Belief
+from floatbase.control import ModelMismatch
 from floatbase.lessons import all_exercises
 from floatbase.lessons.lessonX import (
     FAULTS,
@@ -105,7 +105,7 @@ def test_a_box_tells_nothing_but_the_record() -> None:
     for case, box in cases(1):
         assert set(vars(box)) <= names
         assert np.allclose(box.contacts.mus, 1.2)  # what was told, whatever it was
-        assert box.robot == fb.load("go2") and "Belief" not in repr(vars(box))
+        assert box.robot == fb.load("go2") and "ModelMismatch" not in repr(vars(box))
         text = pickle.dumps(box)
         assert not any(fault.encode() in text for fault in ("swapped", "slow motors", "FirstOrderLag", "Mistake"))
         assert str(case.mistake.size)[:6] not in repr(box)
@@ -161,7 +161,7 @@ def test_forgotten_drift_alone_fells_the_robot() -> None:
 def test_the_mistaken_controllers_are_those_of_belief() -> None:
     state = judges.load("go2").standing()
     tasks = fb.standing_tasks(state)
-    heavy = fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot), tasks, belief=Belief(mass=1.2))
+    heavy = fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot), tasks, mismatch=ModelMismatch(mass=1.2))
     assert heavy(state.q, state.v).forces[2::3].sum() == pytest.approx(1.2 * state.robot.weight, rel=1e-3)
     box = crash_test("mass", 1.2, seconds=0.01)
     assert box.planned[0, 2::3].sum() == pytest.approx(1.2 * box.robot.weight, rel=1e-3)

@@ -292,7 +292,9 @@ def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_ra
     desired = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
     rng = np.random.default_rng(0)
     near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).replace(v=0.1 * rng.normal(size=14))
-    there, here = (objectives.torques_from_forces(fb.equations_of_motion(s, contacts)).torque(desired) for s in (standing, near))
+    there, here = (
+        objectives.torques_from_forces(fb.equations_of_motion(s, contacts)).torque(desired) for s in (standing, near)
+    )
     assert np.max(np.abs(here - there)) < 0.3  # N·m
 
 

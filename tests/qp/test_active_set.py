@@ -155,7 +155,7 @@ def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP
     robot = judges.load(name)
     limits = torque * robot.torque_limits
     controller = fb.WholeBodyController(
-        robot, judges.stance(robot, mu), fb.standing_tasks(robot.standing()), torque_limits=limits, path="readable"
+        robot, judges.stance(robot, mu), fb.standing_tasks(robot.standing()), torque_limits=limits, backend="reference"
     )
     return [controller.qp(robot.random_state(seed, (0.05, 0.15)[seed % 2])) for seed in range(n)]
 
@@ -181,7 +181,7 @@ def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
     tasks = [com, *fb.standing_tasks(state)[1:]]
     contacts = judges.stance(robot, mu=0.25)
     limits = 0.6 * robot.torque_limits
-    controller = fb.WholeBodyController(robot, contacts, tasks, torque_limits=limits, path="readable")
+    controller = fb.WholeBodyController(robot, contacts, tasks, torque_limits=limits, backend="reference")
     qps: list[QP] = []
     for tick in range(ticks):
         qps.append(controller.qp(state, 0.2 + tick * dt))

@@ -23,8 +23,8 @@ from floatbase.qp import (
     OPTIMAL,
     QP,
     UNBOUNDED,
-    Residuals,
     ConstraintLabel,
+    Residuals,
     Solution,
     active_set,
     check_solver,
@@ -253,7 +253,10 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
         (lambda: check_solver("activeset"), UnknownNameError, "solver", "activeset", "active_set"),
         (lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), InputError, "start", 3, 2),
         (lambda: active_set(table_top(), working_set=["tabel"]), UnknownNameError, "tabel", "table"),
-        *[(lambda most=most: active_set(table_top(), max_iterations=most), InputError, "most", most) for most in (0, -1, 1.5, "3")],
+        *[
+            (lambda most=most: active_set(table_top(), max_iterations=most), InputError, "most", most)
+            for most in (0, -1, 1.5, "3")
+        ],
         (lambda: active_set(table_top(), max_iterations=True), InputError, "most", "True"),
     ],
 )

@@ -87,7 +87,7 @@ def judges_qp(name: str, seed: int) -> QP:
     robot = judges.load(name)
     limits = 0.4 * robot.torque_limits
     tasks = fb.standing_tasks(robot.standing())
-    controller = fb.WholeBodyController(robot, judges.stance(robot, 0.5), tasks, torque_limits=limits, path="readable")
+    controller = fb.WholeBodyController(robot, judges.stance(robot, 0.5), tasks, torque_limits=limits, backend="reference")
     return controller.qp(robot.random_state(seed, 0.1))
 
 
@@ -147,7 +147,7 @@ def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str
         contacts, tasks = judges.stance(robot, rng.choice([0.2, 0.7])), fb.standing_tasks(robot.standing())
         press = rng.choice([0.0, 2.0]) * robot.weight / contacts.n_points
         controller = fb.WholeBodyController(
-            robot, contacts, tasks, torque_limits=limits, min_normal_force=press, path="readable"
+            robot, contacts, tasks, torque_limits=limits, min_normal_force=press, backend="reference"
         )
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
@@ -246,7 +246,7 @@ def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method_to
     robot = judges.load("talos")
     at = robot.standing()
     tasks = [fb.CoMTask(at.com, weight=100.0), fb.OrientationTask("base", weight=100.0)]
-    controller = fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks, path="readable")
+    controller = fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks, backend="reference")
     answered = set()
     for state in (at, robot.random_state(1, 0.1), robot.random_state(2, 0.1)):
         found = controller(state.q, state.v).solution
@@ -264,7 +264,7 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
     answered = set()
     for share, seed in ((share, seed) for share in (0.4, 1.3) for seed in range(10)):
         press = share * robot.weight  # at every foot
-        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, min_normal_force=press, path="readable")
+        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, min_normal_force=press, backend="reference")
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
             found = solve(qp)

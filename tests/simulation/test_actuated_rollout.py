@@ -126,9 +126,9 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
     state = robot.standing()
     controller, sim = judges.controller_of(name), fb.Simulation(robot)
     actuators = HydraulicActuators(robot)
-    pose = actuators.cylinders.pose(actuators.cylinders.centre)
+    geometry = actuators.cylinders.geometry(actuators.cylinders.max_lever_angle)
     inertia = 1.0 / np.diag(np.linalg.inv(state.M))[-robot.d :]
-    assert np.max(np.sqrt(pose.lever**2 * pose.stiffness / inertia)) * sim.timestep < 1.75
+    assert np.max(np.sqrt(geometry.lever**2 * geometry.stiffness / inertia)) * sim.timestep < 1.75
     actuators.reset(controller(state.q, state.v).tau)
     rollout = fb.rollout(sim, controller, 0.5, actuators=actuators)
     assert rollout.outcome == "completed"

@@ -10,7 +10,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import Belief
+from floatbase.control import ModelMismatch
 from floatbase.errors import InputError, UnknownNameError
 from floatbase.simulation import AlteredSimulation, World
 
@@ -18,8 +18,8 @@ GO2 = judges.load("go2")
 G = 9.81  # m/s²
 
 
-def standing(sim: AlteredSimulation, belief: object = None, seconds: float = 0.6) -> fb.Rollout:
-    options = {} if belief is None else {"belief": belief}
+def standing(sim: AlteredSimulation, mismatch: object = None, seconds: float = 0.6) -> fb.Rollout:
+    options = {} if mismatch is None else {"mismatch": mismatch}
     controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), fb.standing_tasks(GO2.standing()), **options)
     return fb.rollout(sim, controller, seconds, control_period=2e-3)
 
@@ -98,8 +98,8 @@ def test_magnets_let_the_ground_pull() -> None:
     nets = {}
     for magnets in (0.0, GO2.weight):
         sim = AlteredSimulation(GO2, world=World(magnets=magnets))
-        tasks, belief = fb.standing_tasks(GO2.standing()), Belief(cones=False)
-        controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, belief=belief)
+        tasks, mismatch = fb.standing_tasks(GO2.standing()), ModelMismatch(cones=False)
+        controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, mismatch=mismatch)
         record = fb.rollout(sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3)
         nets[magnets] = float(record.measured.reshape(len(record), -1, 3)[-20:, :, 2].sum(axis=1).mean())
         stuck = sim.contact_positions()[:, 2].max() < 5e-3

@@ -69,13 +69,13 @@ def test_under_the_push_the_ground_pushes_back() -> None:
     assert np.all(sideways[during] @ [0.5, 0.87] < -5.0)
 
 
-@pytest.mark.parametrize(("path", "period"), [("compiled", 0.001), ("readable", 0.005)])
-def test_solo8_pushed_out_of_its_singular_stance_stands_on(path: str, period: float) -> None:
+@pytest.mark.parametrize(("backend", "period"), [("compiled", 0.001), ("reference", 0.005)])
+def test_solo8_pushed_out_of_its_singular_stance_stands_on(backend: str, period: float) -> None:
     """Beside the symmetric stance J has singular values that are small and of no use, and rows that are inconsistent by the
     noise of q and v. It does not come back: once it leans, its contacts hold the lean (J has one rank more)."""
     robot = judges.load("solo8")
     standing = robot.standing()
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(standing), path=path)
+    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(standing), backend=backend)
     push = fb.Push([0.0, 5.0, 0.0], start=0.1, duration=0.1)
     record = fb.rollout(fb.Simulation(robot), controller, 1.5, [push], control_period=period)
     away = np.linalg.norm(record.com - standing.com, axis=1)

@@ -264,7 +264,9 @@ def test_prices_stand_at_the_middle_of_their_facets(
     contacts = Contacts.points(go2, mu=0.6, normals=slopes)
     task = CoMTask(standing.com + [0.0, 0.05, 0.0], acceleration=[4.0, 3.0, 0.0])
     tasks = [task, *standing_tasks(standing)[1:]]
-    controller = WholeBodyController(go2, contacts, tasks, facets=facets, turn=turn, min_normal_force=20.0, path="readable")
+    controller = WholeBodyController(
+        go2, contacts, tasks, facets=facets, facet_rotation=turn, min_normal_force=20.0, backend="reference"
+    )
     answer = controller(standing.q, standing.v).solution
     picture = viewer.prices(standing, contacts, answer)
     shown = {name: price for name, price in answer.multipliers.items() if "torque" not in name}

@@ -1,6 +1,6 @@
 """The compiled tick: the quadratic program of (26)(27) solved by numba over plain arrays."""
 
-from floatbase.control.tick.compiled import Compiled, announce_if_slow, cache_warning, obstacle
-from floatbase.control.tick.own import Given
+from floatbase.control.tick.compiled import CompiledTick, announce_if_slow, cache_warning, unsupported_reason
+from floatbase.control.tick.user_terms import TickInputs
 
-__all__ = ["Compiled", "Given", "announce_if_slow", "cache_warning", "obstacle"]
+__all__ = ["CompiledTick", "TickInputs", "announce_if_slow", "cache_warning", "unsupported_reason"]

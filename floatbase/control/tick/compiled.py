@@ -18,8 +18,8 @@ import numpy as np
 
 from floatbase._validation import Array
 from floatbase.control.problem import Problem, assemble_qp, residual_of
-from floatbase.control.tick.own import Given, Own
-from floatbase.control.tick.tables import TASK_KINDS, dynamics_of, tables_of
+from floatbase.control.tick.problem_arrays import TASK_KINDS, dynamics_of, pack_problem
+from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.objectives import target_shapes, targets_at
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
@@ -45,24 +45,24 @@ def cache_warning() -> str:
     from floatbase.control.tick import jit
 
     remedy = "set NUMBA_CACHE_DIR to a folder that has room and can be written to"
-    return f"; what is compiled cannot be kept ({jit.cache_trouble}): {remedy}" if jit.cache_trouble else ""
+    return f"; what is compiled cannot be kept ({jit.cache_error}): {remedy}" if jit.cache_error else ""
 
 
-def obstacle(problem: Problem, solver: str) -> str:
-    """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP back end."""
+def unsupported_reason(problem: Problem, solver: str) -> str:
+    """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP solver."""
     if solver != "daqp":
         return f"solver {solver!r} was requested, and the compiled tick has its own"
     try:
         from floatbase.control.tick import jit, tick  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
         return f"numba cannot be loaded ({error}); pip install numba may mend it"
-    if not jit.compiles:
+    if not jit.jit_enabled:
         return "NUMBA_DISABLE_JIT is set, and numba compiles nothing"
-    return _robot_obstacle(problem.robot)
+    return _unsupported_robot_reason(problem.robot)
 
 
 @lru_cache(maxsize=16)
-def _robot_obstacle(robot: Robot) -> str:
+def _unsupported_robot_reason(robot: Robot) -> str:
     if robot.d == 0:
         return f"{robot.name} has no joints to drive"
     if robot.nv == 1:  # Pinocchio drops one dimension of its Jacobians
@@ -71,19 +71,19 @@ def _robot_obstacle(robot: Robot) -> str:
         kind = joint.shortname()
         if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
             return f"joint {robot.model.names[i]!r} is a {kind}; the compiled tick takes revolute and prismatic joints"
-    return "" if dynamics_of(robot).fits else "this Pinocchio lays its results out in another way in memory"
+    return "" if dynamics_of(robot).layout_supported else "this Pinocchio lays its results out in another way in memory"
 
 
-class Compiled:
-    """The compiled tick of one problem, for which `obstacle` is "".
+class CompiledTick:
+    """The compiled tick of one problem, for which `unsupported_reason` is "".
 
-    A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the readable path must decide, else
+    A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the reference backend must decide, else
     the array of numbers that `tick.tick` fills, how many rows are active, and what else the tick was given.
 
     qdd, tau, forces: where these are among the numbers.
-    unknown: tasks of which the tables cannot tell whether they fit: those of one's own, and moving ones.
-    arguments: what `tick.tick` takes after q, v and `Given.numbers`, but for the answer and the parts to run.
-    given: as it is without a state, zeros for what moves and nothing of one's own.
+    unchecked_tasks: tasks of which the tables cannot tell whether they fit: those of one's own, and moving ones.
+    arguments: what `tick.tick` takes after q, v and `TickInputs.packed`, but for the answer and the stages to run.
+    default_inputs: as they are without a state, zeros for what moves and nothing of one's own.
     workspace: real and whole numbers, memory of the tick.
 
     Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
@@ -94,34 +94,39 @@ class Compiled:
 
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics = problem, dynamics_of(robot)
-        *tables, targets, self._moving = tables_of(problem)
-        self.own, moving = Own(problem, self.dynamics), {each.number for each in self._moving}
-        self.unknown = [task for i, task in enumerate(problem.tasks) if i in moving or type(task) not in TASK_KINDS]
-        self.given, self.n_targets = self.own.nothing(targets), targets.size
+        *tables, targets, self._time_varying_tasks = pack_problem(problem)
+        self.user_terms, time_varying = (
+            UserTerms(problem, self.dynamics),
+            {each.task_index for each in self._time_varying_tasks},
+        )
+        self.unchecked_tasks = [
+            task for i, task in enumerate(problem.tasks) if i in time_varying or type(task) not in TASK_KINDS
+        ]
+        self.default_inputs, self.n_targets = self.user_terms.zero_inputs(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        self._sizes, self._tables, self._tick, self._parts = tick.workspace_sizes, tables, tick.tick, tick.PARTS
-        self._changes, self._rows = bool(self._moving) or self.own.changes, -1
+        self._workspace_sizes, self._tables, self._tick, self._n_stages = tick.workspace_sizes, tables, tick.tick, tick.N_STAGES
+        self._varies, self._n_user_rows = bool(self._time_varying_tasks) or self.user_terms.varies, -1
         self._make_workspace(0)
 
-    def _make_workspace(self, rows: int) -> None:
+    def _make_workspace(self, n_user_rows: int) -> None:
         """Memory for one tick at a time, the dynamics' lock sees to it, whose tasks of one's own have so many rows."""
-        if rows > self._rows:
-            n_floats, n_ints = self._sizes(self._tables[0], rows)
-            self.workspace, self._rows = (np.empty(n_floats), np.empty(n_ints, np.int64)), rows
+        if n_user_rows > self._n_user_rows:
+            n_floats, n_ints = self._workspace_sizes(self._tables[0], n_user_rows)
+            self.workspace, self._n_user_rows = (np.empty(n_floats), np.empty(n_ints, np.int64)), n_user_rows
             self.arguments = *self.dynamics.views, *self._tables, *self.workspace
 
-    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, Given] | None:
+    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, TickInputs] | None:
         if q.shape != self._q_shape or v.shape != self._v_shape:
             return None
-        given = self.given_at(q, v, t) if self._changes else self.given
-        if given is None:
+        inputs = self.inputs_at(q, v, t) if self._varies else self.default_inputs
+        if inputs is None:
             return None
-        dynamics, answer = self.dynamics, self.empty_answer()
+        dynamics, result = self.dynamics, self.empty_result()
         with dynamics.lock:
             dynamics.update(q, v)
-            n_active = self._tick(q, v, given.numbers, *self.arguments, answer, self._parts)
-        return (answer, n_active, given) if n_active >= 0 else None
+            n_active = self._tick(q, v, inputs.packed, *self.arguments, result, self._n_stages)
+        return (result, n_active, inputs) if n_active >= 0 else None
 
     def warm_up(self) -> str:
         """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it.
@@ -134,62 +139,62 @@ class Compiled:
             try:
                 with self.dynamics.lock:
                     self.dynamics.update(q, v)
-                    self._tick(q, v, self.given.numbers, *self.arguments, self.empty_answer(), self._parts)
-            except Exception as error:  # whatever numba raises, the readable path does without; no code of the user's runs
+                    self._tick(q, v, self.default_inputs.packed, *self.arguments, self.empty_result(), self._n_stages)
+            except Exception as error:  # whatever numba raises, the reference backend does without; no code of the user's runs
                 return f"numba could not compile the tick ({type(error).__name__}: {error})"
         return ""
 
-    def empty_answer(self) -> Array:
+    def empty_result(self) -> Array:
         """An array for the numbers of one tick."""
         return np.empty(self.forces.stop + 2 * self._n_multipliers)
 
-    def qp(self, q: Array, v: Array, t: float, given: Given) -> QP:
-        """The readable QP of a tick, with what its functions returned then: called again, they may return something else."""
+    def qp(self, q: Array, v: Array, t: float, inputs: TickInputs) -> QP:
+        """The reference QP of a tick, with what its functions returned then: called again, they may return something else."""
         values: dict[int, dict[str, Any]] = {}
-        for number, task, first in self._moving:
-            values[number] = {}
+        for index, task, first in self._time_varying_tasks:
+            values[index] = {}
             for name, shape in target_shapes(task, self._problem.robot, self._problem.contacts.k).items():
-                values[number][name] = given.numbers[first : first + prod(shape)].reshape(shape)
+                values[index][name] = inputs.packed[first : first + prod(shape)].reshape(shape)
                 first += prod(shape)
-        eom, costs = self.own.equations(State(self._problem.robot, q, v), t, given), []
+        eom, costs = self.user_terms.equations(State(self._problem.robot, q, v), t, inputs), []
         for i, task in enumerate(self._problem.tasks):
-            still = replace(cast(Any, task), **values[i]) if i in values else task
+            fixed = replace(cast(Any, task), **values[i]) if i in values else task
             costs.append(
-                (task.block, *(given.residuals[i] if i in given.residuals else (task.weight, residual_of(still, eom, t))))
+                (task.block, *(inputs.residuals[i] if i in inputs.residuals else (task.weight, residual_of(fixed, eom, t))))
             )
-        return assemble_qp(eom, costs, self._problem.limits, given.normal_forces, given.inequalities)
+        return assemble_qp(eom, costs, self._problem.limits, inputs.normal_forces, inputs.inequalities)
 
-    def multipliers(self, numbers: Array, n_active: int, given: Given) -> Array:
-        """Multipliers of all inequality rows of the readable QP, from what a call returned."""
+    def multipliers(self, result: Array, n_active: int, inputs: TickInputs) -> Array:
+        """Multipliers of all inequality rows of the reference QP, from what a call returned."""
         limits, contacts = self._problem.limits, self._problem.contacts
-        limited = np.isfinite(limits.torque_limits)  # the readable QP has rows for these joints only
+        limited = np.isfinite(limits.torque_limits)  # the reference QP has rows for these joints only
         friction = np.full(contacts.n_points * (limits.facets + 1), True)
-        own = np.full(sum(len(G) for G, _ in given.inequalities), True)
-        has_row = np.concatenate([friction, limits.bounded_points(contacts), limited, limited, own])
-        mu, active = numbers[self.forces.stop :].reshape(2, -1)[:, :n_active]
+        user_rows = np.full(sum(len(G) for G, _ in inputs.inequalities), True)
+        has_row = np.concatenate([friction, limits.bounded_points(contacts), limited, limited, user_rows])
+        mu, active = result[self.forces.stop :].reshape(2, -1)[:, :n_active]
         multipliers = np.zeros(has_row.size)
         multipliers[active.astype(np.int64)] = np.maximum(mu, 0.0)
         return multipliers[has_row]
 
-    def given_at(self, q: Array, v: Array, t: float) -> Given | None:
+    def inputs_at(self, q: Array, v: Array, t: float) -> TickInputs | None:
         """What the tick is given at time t, in arrays of its own, as other threads may run ticks too.
 
-        None where something is wrong with it: the readable path finds the same, and says so.
+        None where something is wrong with it: the reference backend finds the same, and says so.
         """
         try:
-            targets = self._targets_at(t) if self._moving else self.given.numbers[: self.n_targets]
-            given = self.own.given(targets, q, v, t)
+            targets = self._targets_at(t) if self._time_varying_tasks else self.default_inputs.packed[: self.n_targets]
+            inputs = self.user_terms.inputs(targets, q, v, t)
         except Exception:  # code of the user's, which may raise anything
             return None
-        if given.rows > self._rows:
+        if inputs.n_user_rows > self._n_user_rows:
             with self.dynamics.lock:
-                self._make_workspace(given.rows)
-        return given
+                self._make_workspace(inputs.n_user_rows)
+        return inputs
 
     def _targets_at(self, t: float) -> Array:
         """All targets at time t. Raises `InputError` for a bad one."""
-        targets, robot, k = self.given.numbers[: self.n_targets].copy(), self._problem.robot, self._problem.contacts.k
-        for _, task, first in self._moving:
+        targets, robot, k = self.default_inputs.packed[: self.n_targets].copy(), self._problem.robot, self._problem.contacts.k
+        for _, task, first in self._time_varying_tasks:
             for value in targets_at(task, robot, k, t):
                 targets[first : first + value.size] = value.ravel()
                 first += value.size

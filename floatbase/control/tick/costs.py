@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.tick.elimination import Space, add_entry, add_product
+from floatbase.control.tick.elimination import Parametrisation, add_entry, add_product
 from floatbase.control.tick.jit import jit
 from floatbase.control.tick.kinematics import Bodies, body_jacobian, centre_of_mass, frame_pose, point_velocity
-from floatbase.control.tick.memory import clear, take_matrix, take_vector
-from floatbase.control.tick.tables import COM, FORCE, FORCES, FRAME, ORIENTATION, POSTURE, QDD, TAU, TORQUE
+from floatbase.control.tick.problem_arrays import COM, FORCE, FORCES, FRAME, ORIENTATION, POSTURE, QDD, TAU, TORQUE
 from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
+from floatbase.control.tick.workspace import clear, take_matrix, take_vector
 
 
 class TaskTable(NamedTuple):
@@ -21,9 +21,9 @@ class TaskTable(NamedTuple):
     gains: Any  # (N, 3), weight, kp, kd
     frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
     targets: Any  # of all tasks, one after the other: position, rotation row by row or q, then velocity and acceleration
-    first: Any  # where tasks of one's own start among them, one after the other: block, m, weight, A (m, n), b (m,)
-    own: Any  # how many these are
-    rows: Any  # the sum of their m
+    user_start: Any  # where tasks of one's own start among them, one after the other: block, m, weight, A (m, n), b (m,)
+    n_user: Any  # how many these are
+    n_user_rows: Any  # the sum of their m
 
 
 class Cost(NamedTuple):
@@ -94,7 +94,7 @@ def posture_error(tree, q, v, target, base, e, e_dot):
 
 
 @jit
-def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Space, base, workspace, cost: Cost):
+def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, base, workspace, cost: Cost):
     """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns its number of rows, -1 for an angle too large.
 
     q, v: (nq,), (nv,), the state.
@@ -118,7 +118,7 @@ def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Space, base, works
             for r in range(3):
                 for c in range(nv):
                     rows[r, c] *= root
-            add_product(rows, space.V, space.beta_of, R, used)
+            add_product(rows, space.V, space.beta_index, R, used)
             constant = times(root, plus(bias, plus(times(kp, e), times(kd, e_dot))))
             R[used, nb], R[used + 1, nb], R[used + 2, nb] = plus(column_part(R, used, nb), constant)
             used += 3
@@ -133,57 +133,57 @@ def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Space, base, works
                     desired -= kp * e_joint[j] + kd * e_dot_joint[j]
                 weights[first + j] += w
                 weighted[first + j] += w * desired
-    used = own_costs(used, tasks, space, nv, R)
+    used = user_task_costs(used, tasks, space, nv, R)
     used = single_entry_costs(used, weights, weighted, space, cost)
     return 4 * ((used + 3) // 4)
 
 
 @jit
-def own_rows(given, at, own, nv, k, d):
-    """How many rows the `own` tasks of one's own have that start at `at` in `given`, and where they end."""
+def count_user_rows(inputs, at, n_user, nv, k, d):
+    """How many rows the `n_user` tasks of one's own have that start at `at` in `inputs`, and where they end."""
     rows = 0
-    for _ in range(own):
-        block, m = int(given[at]), int(given[at + 1])
+    for _ in range(n_user):
+        block, m = int(inputs[at]), int(inputs[at + 1])
         at, rows = at + 3 + m * (1 + (nv if block == QDD else (k if block == FORCES else d))), rows + m
     return rows, at
 
 
 @jit
-def own_costs(used, tasks: TaskTable, space: Space, nv, R):
+def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
     """Add (weight / 2) ‖A x + b‖² of all tasks of one's own to R. Returns how many rows are in use then."""
-    given, at, V, T = tasks.targets, tasks.first, space.V, space.T
+    inputs, at, V, T = tasks.targets, tasks.user_start, space.V, space.T
     k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
-    for _ in range(tasks.own):
-        block, m, root = int(given[at]), int(given[at + 1]), np.sqrt(given[at + 2])
+    for _ in range(tasks.n_user):
+        block, m, root = int(inputs[at]), int(inputs[at + 1]), np.sqrt(inputs[at + 2])
         size, at = nv if block == QDD else (k if block == FORCES else d), at + 3
         for r in range(m):
             for i in range(size):
-                entry = root * given[at + r * size + i]
+                entry = root * inputs[at + r * size + i]
                 if entry != 0.0 and block != TAU:
-                    add_entry(entry, V, space.beta_of, i if block == QDD else nv + i, R, used)
+                    add_entry(entry, V, space.beta_index, i if block == QDD else nv + i, R, used)
                 elif entry != 0.0:
                     for c in range(nb + 1):
                         R[used, c] += entry * T[i, c]
-            R[used, nb] += root * given[at + m * size + r]
+            R[used, nb] += root * inputs[at + m * size + r]
             used += 1
         at += m * (size + 1)
     return used
 
 
 @jit
-def single_entry_costs(used, weights, weighted, space: Space, cost: Cost):
+def single_entry_costs(used, weights, weighted, space: Parametrisation, cost: Cost):
     """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ) to a cost. Returns how many rows of R are in use then.
 
     weights, weighted: (n + d,), weight and weight × desired of each entry; those that are a β take no row of R.
     """
-    V, beta_of, T = space
+    V, beta_index, T = space
     R, diagonal, linear = cost
     n, nb = V.shape[0], V.shape[1] - 1
     clear(diagonal)
     clear(linear)
     for i in range(n + T.shape[0]):
-        if i < n and beta_of[i] >= 0:
-            diagonal[beta_of[i]], linear[beta_of[i]] = weights[i], weighted[i]
+        if i < n and beta_index[i] >= 0:
+            diagonal[beta_index[i]], linear[beta_index[i]] = weights[i], weighted[i]
         elif weights[i] > 0.0:
             row = V[i] if i < n else T[i - n]
             root = np.sqrt(weights[i])
@@ -195,7 +195,7 @@ def single_entry_costs(used, weights, weighted, space: Space, cost: Cost):
 
 
 @jit
-def hessian(cost: Cost, H, slope):
+def hessian(cost: Cost, H, grad):
     """Lower triangle of the Hessian in the first nb rows of H (nb + 1, nb + 1), and the slope (nb,) at β = 0."""
     R, diagonal, linear = cost
     nb = diagonal.size
@@ -207,19 +207,19 @@ def hessian(cost: Cost, H, slope):
                 H[r, s] += a * R[i, s] + b * R[i + 1, s] + c * R[i + 2, s] + d * R[i + 3, s]
     for r in range(nb):
         H[r, r] += diagonal[r]
-        slope[r] = H[nb, r] - linear[r]
+        grad[r] = H[nb, r] - linear[r]
 
 
 @jit
-def gradient(cost: Cost, beta, slope):
+def gradient(cost: Cost, beta, grad):
     """The slope (nb,) at β, residual by residual, which keeps the digits that the Hessian has lost."""
     R, diagonal, linear = cost
     nb = beta.size
     for c in range(nb):
-        slope[c] = diagonal[c] * beta[c] - linear[c]
+        grad[c] = diagonal[c] * beta[c] - linear[c]
     for i in range(R.shape[0]):
         residual = R[i, nb]
         for c in range(nb):
             residual += R[i, c] * beta[c]
         for c in range(nb):
-            slope[c] += residual * R[i, c]
+            grad[c] += residual * R[i, c]

@@ -11,25 +11,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from floatbase.control.tick.costs import Cost, gradient, hessian
-from floatbase.control.tick.elimination import Space
+from floatbase.control.tick.elimination import Parametrisation
 from floatbase.control.tick.inequalities import Inequalities, row_in_beta, violated_row
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.memory import clear, largest, take_matrix, take_vector
+from floatbase.control.tick.workspace import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
 INACCURATE, INFEASIBLE = -2, -3  # why there is no answer: it lacks digits, or there seems to be none
-FLAT_COST = 1e-13  # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
-PARALLEL = 1e-12  # part of a row, squared, outside the active rows: with less it depends on them
+PIVOT_TOLERANCE = 1e-13  # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
+DEPENDENCE_TOLERANCE = 1e-12  # part of a row, squared, outside the active rows: with less it depends on them
 NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
-SETTLED = 1e-6  # part of β: what a step this small leaves is rounding
-UNSETTLED = 1e-4  # part of β that the last step may still move
-WRONG_SIGN = 1e-9  # part of the largest multiplier by which one may be negative through rounding
+STEP_TOLERANCE = 1e-6  # part of β: what a step this small leaves is rounding
+MAX_FINAL_STEP = 1e-4  # part of β that the last step may still move
+SIGN_TOLERANCE = 1e-9  # part of the largest multiplier by which one may be negative through rounding
 
 
 class ActiveSet(NamedTuple):
     """The active rows, of which q come first in each array, and their factors."""
 
-    numbers: Any  # (nb,), number of each row
+    indices: Any  # (nb,), number of each row
     mu: Any  # (nb,), its multiplier
     bounds: Any  # (nb,), its bound in h
     rows: Any  # (nb, nb), its row of G
@@ -49,7 +49,7 @@ def cholesky(H, L):
                 total -= L[i, c] * L[j, c]
             if i > j:
                 L[i, j] = total / L[j, j]
-            elif total <= FLAT_COST * H[j, j]:
+            elif total <= PIVOT_TOLERANCE * H[j, j]:
                 return False
             else:
                 L[j, j] = np.sqrt(total)
@@ -57,11 +57,11 @@ def cholesky(H, L):
 
 
 @jit
-def minimum(L, slope, x):
-    """x (nb,) = -(L Lᵀ)⁻¹ slope."""
-    n = slope.size
+def solve_cholesky(L, grad, x):
+    """x (nb,) = -(L Lᵀ)⁻¹ grad."""
+    n = grad.size
     for i in range(n):
-        total = -slope[i]
+        total = -grad[i]
         for c in range(i):
             total -= L[i, c] * x[c]
         x[i] = total / L[i, i]
@@ -72,7 +72,7 @@ def minimum(L, slope, x):
 
 
 @jit
-def inverse(L, W):
+def invert_lower(L, W):
     """W (nb, nb) = L⁻¹, lower triangular."""
     n = L.shape[0]
     clear(W)
@@ -87,7 +87,7 @@ def inverse(L, W):
 
 @jit
 def add_row(W, U, d, z, q):
-    """Mirror rows q: of W so that d = W row is zero after q, and make d column q of U; d, z: as from `directions`."""
+    """Mirror rows q: of W so that d = W row is zero after q, and make d column q of U; d, z: as from `step_directions`."""
     n, length = d.size, 0.0
     for j in range(q, n):
         length += d[j] * d[j]
@@ -107,9 +107,9 @@ def add_row(W, U, d, z, q):
 @jit
 def drop_row(active: ActiveSet, at, q):
     """Take row `at` of the q active ones out of an `ActiveSet`, and turn W so that U stays upper triangular."""
-    numbers, mu, bounds, rows, W, U = active
+    indices, mu, bounds, rows, W, U = active
     for j in range(at, q - 1):
-        numbers[j], mu[j], bounds[j] = numbers[j + 1], mu[j + 1], bounds[j + 1]
+        indices[j], mu[j], bounds[j] = indices[j + 1], mu[j + 1], bounds[j + 1]
         for c in range(rows.shape[1]):
             rows[j, c] = rows[j + 1, c]
         for i in range(j + 2):
@@ -128,7 +128,7 @@ def drop_row(active: ActiveSet, at, q):
 
 
 @jit
-def times_row(W, row, d):
+def multiply_by_row(W, row, d):
     """d (nb,) = W row; most rows have three entries or fewer, those of one force whose components are β."""
     n, count, i, j, k = row.size, 0, 0, 0, 0
     for c in range(n):
@@ -147,7 +147,7 @@ def times_row(W, row, d):
 
 
 @jit
-def directions(W, U, d, q, z, r):
+def step_directions(W, U, d, q, z, r):
     """How β and the multipliers move as the multiplier of a new row grows by 1, from d (nb,) = W times that row.
 
     z, r: (nb,) receive the step of β and the decrease of the q multipliers.
@@ -159,9 +159,9 @@ def directions(W, U, d, q, z, r):
         for i in range(n):
             z[i] -= a * W[j, i] + b * W[j + 1, i] + c * W[j + 2, i] + e * W[j + 3, i]
         j += 4
-    for late in range(j, n):
+    for rest in range(j, n):
         for i in range(n):
-            z[i] -= d[late] * W[late, i]
+            z[i] -= d[rest] * W[rest, i]
     for i in range(q - 1, -1, -1):
         total = d[i]
         for j in range(i + 1, q):
@@ -174,69 +174,69 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
     """Bring one violated row to its bound, dropping active rows whose multiplier would turn negative.
 
     number, row, bound: of that row, as in `ActiveSet`.
-    d, z, r: (nb,), memory for `directions`.
+    d, z, r: (nb,), memory for `step_directions`.
 
     Updates `active` and `beta`. Returns the new q, or why there is none.
     """
     n, multiplier, mu, W, U = beta.size, 0.0, active.mu, active.W, active.U
     for _ in range(2 * n + 2):
-        times_row(W, row, d)
-        directions(W, U, d, q, z, r)
+        multiply_by_row(W, row, d)
+        step_directions(W, U, d, q, z, r)
         curvature, size, excess = 0.0, 0.0, -bound
         for j in range(n):
             size += d[j] * d[j]
             if j >= q:
                 curvature += d[j] * d[j]
             excess += row[j] * beta[j]
-        longest, drop = np.inf, -1
+        partial_step, blocking = np.inf, -1
         for j in range(q):
-            if r[j] > 0.0 and mu[j] < longest * r[j]:
-                longest, drop = mu[j] / r[j], j
-        full = excess / curvature if q < n and curvature > PARALLEL * size else np.inf
-        step = min(longest, full)
+            if r[j] > 0.0 and mu[j] < partial_step * r[j]:
+                partial_step, blocking = mu[j] / r[j], j
+        full_step = excess / curvature if q < n and curvature > DEPENDENCE_TOLERANCE * size else np.inf
+        step = min(partial_step, full_step)
         if step == np.inf:
             return INFEASIBLE
         for j in range(q):
             mu[j] -= step * r[j]
         multiplier += step
-        if full < np.inf:
+        if full_step < np.inf:
             for j in range(n):
                 beta[j] += step * z[j]
-        if full <= longest:
+        if full_step <= partial_step:
             add_row(W, U, d, z, q)
-            active.numbers[q], mu[q], active.bounds[q] = number, multiplier, bound
+            active.indices[q], mu[q], active.bounds[q] = number, multiplier, bound
             for j in range(n):
                 active.rows[q, j] = row[j]
             return q + 1
-        drop_row(active, drop, q)
+        drop_row(active, blocking, q)
         q -= 1
     return INACCURATE
 
 
 @jit
-def newton_step(q, slope, L, step, move, y, active: ActiveSet, beta):
+def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
     """One step of Newton's method on the optimality conditions from (β, mu) that are right but for rounding.
 
-    slope: (nb,), the cost's slope at β; overwritten.
+    grad: (nb,), the cost's slope at β; overwritten.
     L: Cholesky factor of the Hessian.
-    step, move, y: (nb,), memory.
+    step, delta_beta, y: (nb,), memory.
 
     Updates β and the multipliers. Returns the largest change of an entry of β.
     """
     nb, mu, rows, W, U = beta.size, active.mu, active.rows, active.W, active.U
     if q == 0:
-        minimum(L, slope, move)
+        solve_cholesky(L, grad, delta_beta)
         for i in range(nb):
-            beta[i] += move[i]
-        return largest(move)
+            beta[i] += delta_beta[i]
+        return largest(delta_beta)
     for a in range(q):
         for c in range(nb):
-            slope[c] += mu[a] * rows[a, c]
+            grad[c] += mu[a] * rows[a, c]
     clear(step)
-    clear(move)
+    clear(delta_beta)
     for j in range(nb):
         for i in range(nb):
-            step[j] -= W[j, i] * slope[i]
+            step[j] -= W[j, i] * grad[i]
     for a in range(q):  # back to the bounds: Uᵀ y = h - G β
         y[a] = active.bounds[a]
         for c in range(nb):
@@ -247,16 +247,16 @@ def newton_step(q, slope, L, step, move, y, active: ActiveSet, beta):
     for j in range(nb):
         along = y[j] if j < q else step[j]
         for i in range(nb):
-            move[i] += along * W[j, i]
+            delta_beta[i] += along * W[j, i]
     for i in range(nb):
-        beta[i] += move[i]
+        beta[i] += delta_beta[i]
     for a in range(q - 1, -1, -1):  # the multipliers balance the slope that is left after the way to the bounds
         step[a] -= y[a]
         for j in range(a + 1, q):
             step[a] -= U[a, j] * step[j]
         step[a] /= U[a, a]
         mu[a] += step[a]
-    return largest(move)
+    return largest(delta_beta)
 
 
 @jit
@@ -267,38 +267,38 @@ def wrong_signed_row(mu, q):
         size = max(size, abs(mu[a]))
         if mu[a] < least:
             least, found = mu[a], a
-    return found if least < -WRONG_SIGN * size - 1e-13 else -1
+    return found if least < -SIGN_TOLERANCE * size - 1e-13 else -1
 
 
 @jit
-def dual_search(cost: Cost, limits: Inequalities, space: Space, nv, workspace, numbers, mu, beta):
+def dual_search(cost: Cost, limits: Inequalities, space: Parametrisation, nv, workspace, indices, mu, beta):
     """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why there is no answer.
 
-    numbers, mu, beta: (nb,) receive the numbers and multipliers of the active rows, and the optimum.
+    indices, mu, beta: (nb,) receive the numbers and multipliers of the active rows, and the optimum.
 
     Newton's method refines the end of the search. Where that shows that it was not the optimum, as a multiplier has the wrong
     sign or a row is violated, the search goes on.
     """
     nb, d, k = beta.size, limits.torque_limits.size, space.V.shape[0] - nv
-    H, slope, L = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb), take_matrix(workspace, nb, nb)
+    H, grad, L = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb), take_matrix(workspace, nb, nb)
     W, U, rows = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
     step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
     forces, tau, qdd = take_vector(workspace, k), take_vector(workspace, d), take_vector(workspace, nv)
-    active = ActiveSet(numbers, mu, bounds, rows, W, U)
-    hessian(cost, H, slope)
+    active = ActiveSet(indices, mu, bounds, rows, W, U)
+    hessian(cost, H, grad)
     if not cholesky(H, L):
         return INACCURATE
-    minimum(L, slope, beta)
+    solve_cholesky(L, grad, beta)
     q, refined, moved, number, has_factors = 0, 0, 0.0, 0, False
     for _ in range(100 + 10 * nb):
         number = violated_row(limits, space, beta, forces, tau, qdd)
         if number < 0:
             if refined == NEWTON_STEPS:
                 break
-            gradient(cost, beta, slope)
-            moved = newton_step(q, slope, L, step, z, r, active, beta)
-            refined = refined + 1 if moved > SETTLED * (1.0 + largest(beta)) else NEWTON_STEPS
+            gradient(cost, beta, grad)
+            moved = newton_step(q, grad, L, step, z, r, active, beta)
+            refined = refined + 1 if moved > STEP_TOLERANCE * (1.0 + largest(beta)) else NEWTON_STEPS
             wrong = wrong_signed_row(mu, q)
             if wrong >= 0:
                 drop_row(active, wrong, q)
@@ -308,13 +308,13 @@ def dual_search(cost: Cost, limits: Inequalities, space: Space, nv, workspace, n
             continue
         refined = 0
         if not has_factors:
-            inverse(L, W)
+            invert_lower(L, W)
             clear(U)
             has_factors = True
         bound = row_in_beta(number, limits, space, nv, row)
         q = enforce(number, row, bound, q, step, z, r, active, beta)
         if q < 0:
             return q
-    if number >= 0 or refined == 0 or not moved <= UNSETTLED * (1.0 + largest(beta)):
+    if number >= 0 or refined == 0 or not moved <= MAX_FINAL_STEP * (1.0 + largest(beta)):
         return INACCURATE
     return q

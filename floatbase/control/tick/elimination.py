@@ -1,6 +1,6 @@
 """The equalities of (27) eliminated: q̈, λ and τ as functions of the free entries β, by Gauss-Jordan elimination (13)(16)(17).
 
-The readable path takes an SVD for the space of motions (13). Here variables are eliminated one by one, and each β is an entry
+The reference backend takes an SVD for the space of motions (13). Here variables are eliminated one by one, and each β is an entry
 of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv, d, k as everywhere, n = nv + k entries of (q̈, λ), nb of
 β.
 """
@@ -11,57 +11,57 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.problem import INCONSISTENT
-from floatbase.control.tick.jit import jit, jit_allocating, jit_forced
-from floatbase.control.tick.memory import clear, take_vector
+from floatbase.control.problem import INCONSISTENCY_TOLERANCE
+from floatbase.control.tick.jit import jit, jit_allocating, jit_forceinline
+from floatbase.control.tick.workspace import clear, take_vector
 from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
 
 DEPENDENT_ROW = 2e-2  # a motion row of which elimination leaves less may nearly depend on the others: an SVD must decide
-LOST_ROW = 1e-11  # less than this part of a row is rounding
+ZERO_ROW = 1e-11  # less than this part of a row is rounding
 ZERO_PIVOT = 1e-14  # relative to the row: no variable is left to solve it for
 
 
-class Space(NamedTuple):
+class Parametrisation(NamedTuple):
     """All (q̈, λ, τ) that satisfy the equalities, as functions of β."""
 
     V: Any  # (n, nb + 1), (q̈, λ) = V (β, 1)
-    beta_of: Any  # (n,), the number of the β that an entry of (q̈, λ) is, -1 where it is none
+    beta_index: Any  # (n,), the number of the β that an entry of (q̈, λ) is, -1 where it is none
     T: Any  # (d, nb + 1), τ = T (β, 1)
 
 
 @jit
-def gauss_jordan(B, first, last, top, columns, weights, lengths, pivots):
+def gauss_jordan(B, first, last, first_cleared, columns, weights, lengths, pivots):
     """Reduce rows first:last of B in place, each to one pivot that is 1. Returns the least part of a row left at its turn.
 
     B: (·, n + 1), the right-hand side in the last column; rows first:last have other entries in the first `columns` only.
-    top: rows from there on are cleared of the pivots.
+    first_cleared: rows from there on are cleared of the pivots.
     weights: (n,), each row takes the pivot of the largest weight × |entry|.
     lengths: of each row of B, before the elimination.
     pivots: receives the column of each row's pivot.
     """
-    right, least = B.shape[1] - 1, 1.0
+    right, smallest_pivot = B.shape[1] - 1, 1.0
     for row in range(first, last):
-        best, pivot = 0.0, -1
+        largest, pivot = 0.0, -1
         for c in range(columns):
             size = weights[c] * abs(B[row, c])
-            if size > best:
-                best, pivot = size, c
+            if size > largest:
+                largest, pivot = size, c
         if pivot < 0 or abs(B[row, pivot]) <= ZERO_PIVOT * lengths[row]:
             return 0.0
-        least = min(least, abs(B[row, pivot]) / lengths[row])
+        smallest_pivot = min(smallest_pivot, abs(B[row, pivot]) / lengths[row])
         pivots[row] = pivot
         scale = 1.0 / B[row, pivot]
         for c in range(columns):
             B[row, c] *= scale
         B[row, right] *= scale
-        for other in range(top, B.shape[0]):
+        for other in range(first_cleared, B.shape[0]):
             factor = B[other, pivot]
             if other != row and factor != 0.0:
                 for c in range(columns):
                     B[other, c] -= factor * B[row, c]
                 B[other, right] -= factor * B[row, right]
                 B[other, pivot] = 0.0
-    return least
+    return smallest_pivot
 
 
 @jit
@@ -101,7 +101,7 @@ def independent_rows(A, b, v, rows, right):
     U = np.ascontiguousarray(U[:, :r])
     rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
-    return -1 if np.max(np.abs(gap)) > INCONSISTENT + CONSTRAINT_NOISE * np.max(np.abs(motion)) else r
+    return -1 if np.max(np.abs(gap)) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * np.max(np.abs(motion)) else r
 
 
 @jit
@@ -118,76 +118,80 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
     and for λ where the contacts already hold it.
     """
     m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
-    lengths, of_motion, of_base = take_vector(workspace, m + base), take_vector(workspace, n), take_vector(workspace, n)
+    lengths, motion_weights, base_weights = (
+        take_vector(workspace, m + base),
+        take_vector(workspace, n),
+        take_vector(workspace, n),
+    )
     for c in range(n):
-        of_motion[c], of_base[c] = (0.05, 1.0) if c < base else (1.0, 0.1 if c < nv else 0.01)
+        motion_weights[c], base_weights[c] = (0.05, 1.0) if c < base else (1.0, 0.1 if c < nv else 0.01)
     equalities(A, b, M, h, J, base, lengths, B)
-    least = gauss_jordan(B, 0, m, 0, nv, of_motion, lengths, pivots)
-    if least <= LOST_ROW:
-        return least, least
-    return least, min(least, gauss_jordan(B, m, m + base, m, n, of_base, lengths, pivots))
+    smallest_pivot = gauss_jordan(B, 0, m, 0, nv, motion_weights, lengths, pivots)
+    if smallest_pivot <= ZERO_ROW:
+        return smallest_pivot, smallest_pivot
+    return smallest_pivot, min(smallest_pivot, gauss_jordan(B, m, m + base, m, n, base_weights, lengths, pivots))
 
 
 @jit
-def parametrise(B, pivots, m, free, V, beta_of):
-    """(13)(17) V and beta_of of `Space` from the reduced rows of `eliminate`, the first m of them for motions.
+def parametrise(B, pivots, m, free_columns, V, beta_index):
+    """(13)(17) V and beta_index of `Parametrisation` from the reduced rows of `eliminate`, the first m of them for motions.
 
-    The pivots of the later rows still stand in those of motions, and are substituted here. free: (nb,), memory.
+    The pivots of the later rows still stand in those of motions, and are substituted here. free_columns: (nb,), memory.
     """
     n, nb = V.shape[0], V.shape[1] - 1
     for c in range(n):
-        beta_of[c] = 0
+        beta_index[c] = 0
     for row in range(pivots.size):
-        beta_of[pivots[row]] = -1
+        beta_index[pivots[row]] = -1
     clear(V)
     j = 0
     for c in range(n):
-        if beta_of[c] == 0:
-            beta_of[c], free[j], V[c, j] = j, c, 1.0
+        if beta_index[c] == 0:
+            beta_index[c], free_columns[j], V[c, j] = j, c, 1.0
             j += 1
     for row in range(pivots.size):
         pivot = pivots[row]
         for j in range(nb):
-            V[pivot, j] = -B[row, free[j]]
+            V[pivot, j] = -B[row, free_columns[j]]
         V[pivot, nb] = B[row, n]
     for row in range(m):
         pivot = pivots[row]
-        for late in range(m, pivots.size):
-            source = pivots[late]
+        for base_row in range(m, pivots.size):
+            source = pivots[base_row]
             factor = B[row, source]
             if factor != 0.0:
                 for j in range(nb + 1):
                     V[pivot, j] -= factor * V[source, j]
 
 
-@jit_forced
-def add_entry(factor, V, beta_of, entry, out, row):
+@jit_forceinline
+def add_entry(factor, V, beta_index, entry, out, row):
     """Add factor × row `entry` of V to a row of out (·, nb + 1); where the entry is a β, that is one number."""
-    if beta_of[entry] >= 0:
-        out[row, beta_of[entry]] += factor
+    if beta_index[entry] >= 0:
+        out[row, beta_index[entry]] += factor
     else:
         for c in range(V.shape[1]):
             out[row, c] += factor * V[entry, c]
 
 
 @jit
-def add_product(rows, V, beta_of, out, first):
+def add_product(rows, V, beta_index, out, first):
     """Add rows (m, nv) times the q̈ of V to rows first:first + m of out (·, nb + 1); most entries of `rows` are zero."""
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             if rows[i, j] != 0.0:
-                add_entry(rows[i, j], V, beta_of, j, out, first + i)
+                add_entry(rows[i, j], V, beta_index, j, out, first + i)
 
 
 @jit
-def torques(V, beta_of, M, h, J, base, T):
-    """(16) T of `Space` from τ = M_j q̈ + h_j - J_jᵀ λ, the rows of (7) after the first `base`; V, beta_of: of `Space`."""
+def torques(V, beta_index, M, h, J, base, T):
+    """(16) T of `Parametrisation` from τ = M_j q̈ + h_j - J_jᵀ λ, the rows of (7) after the first `base`; V, beta_index: of `Parametrisation`."""
     nv, k, nb = M.shape[0], J.shape[0], V.shape[1] - 1
     clear(T)
-    add_product(M[base:], V, beta_of, T, 0)
+    add_product(M[base:], V, beta_index, T, 0)
     for c in range(k):
         for j in range(nv - base):
             if J[c, base + j] != 0.0:
-                add_entry(-J[c, base + j], V, beta_of, nv + c, T, j)
+                add_entry(-J[c, base + j], V, beta_index, nv + c, T, j)
     for j in range(nv - base):
         T[j, nb] += h[base + j]

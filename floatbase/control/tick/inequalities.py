@@ -1,7 +1,7 @@
 """The inequalities of (27)(28), G β ≤ h, which are written out only for the rows that β violates.
 
 Rows are numbered: F facets and the least normal force of each of P points, then their P largest normal forces, d upper torque
-limits, d lower ones, and the rows of one's own. What every problem needs is compiled into the search (`jit_forced`), what few
+limits, d lower ones, and the rows of one's own. What every problem needs is compiled into the search (`jit_forceinline`), what few
 need is not: left to itself, the compiler takes in neither, and a tick with many active rows takes 6 % longer.
 """
 
@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.tick.elimination import Space
-from floatbase.control.tick.jit import jit, jit_forced
-from floatbase.control.tick.memory import clear
-from floatbase.control.tick.tables import FORCES, QDD
+from floatbase.control.tick.elimination import Parametrisation
+from floatbase.control.tick.jit import jit, jit_forceinline
+from floatbase.control.tick.problem_arrays import FORCES, QDD
 from floatbase.control.tick.vectors import dot, minus, row_part, times
+from floatbase.control.tick.workspace import clear
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
 
@@ -28,11 +28,11 @@ class Inequalities(NamedTuple):
     facets: Any  # F
     points: Any  # P
     torque_limits: Any  # (d,), N·m
-    given: Any  # what `own.Own` packed
+    inputs: Any  # what `user_terms.UserTerms` packed
     bounds: Any  # where in it P least and P largest normal forces start, N
-    first: Any  # where rows of one's own start, one group after the other: block, number m of rows, G (m, n), h (m,)
-    groups: Any  # how many groups there are
-    late: Any  # whether there are any of these, or a largest normal force
+    user_start: Any  # where rows of one's own start, one group after the other: block, number m of rows, G (m, n), h (m,)
+    n_user_groups: Any  # how many groups there are
+    has_optional: Any  # whether there are any of these, or a largest normal force
 
 
 @jit
@@ -46,27 +46,27 @@ def affine_value(V, beta, first, last, out):
         out[i - first] = total
 
 
-@jit_forced
-def forces_of(space: Space, beta, forces):
+@jit_forceinline
+def forces_of(space: Parametrisation, beta, forces):
     """forces (k,) at β; most of them are a β themselves."""
     first = space.V.shape[0] - forces.size
     for i in range(forces.size):
-        if space.beta_of[first + i] >= 0:
-            forces[i] = beta[space.beta_of[first + i]]
+        if space.beta_index[first + i] >= 0:
+            forces[i] = beta[space.beta_index[first + i]]
         else:
             affine_value(space.V, beta, first + i, first + i + 1, forces[i:])
 
 
-@jit_forced
+@jit_forceinline
 def worst_facet(limits: Inequalities, first, f):
     """(28) The row of a point's facets, of which `first` is the first, that the force f violates most, and by how much; or -1.
 
     Forces in the circle that the facets touch violate none.
     """
     normal = times(-1.0, row_part(limits.cones, first + limits.facets, 0))
-    mu, along = -dot(row_part(limits.cones, first, 0), normal), dot(normal, f)
-    across = minus(f, times(along, normal))
-    if along >= 0.0 and dot(across, across) <= mu * mu * along * along:
+    mu, normal_force = -dot(row_part(limits.cones, first, 0), normal), dot(normal, f)
+    tangential_force = minus(f, times(normal_force, normal))
+    if normal_force >= 0.0 and dot(tangential_force, tangential_force) <= mu * mu * normal_force * normal_force:
         return -1, 0.0
     worst, found = 0.0, -1
     for row in range(first, first + limits.facets):
@@ -76,7 +76,7 @@ def worst_facet(limits: Inequalities, first, f):
     return found, worst
 
 
-@jit_forced
+@jit_forceinline
 def violated_force_row(limits: Inequalities, forces):
     """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they violate none."""
     cones, worst, found = limits.cones, FEASIBILITY_TOLERANCE, -1
@@ -88,43 +88,43 @@ def violated_force_row(limits: Inequalities, forces):
         if row >= 0 and excess > worst * cones[row, 3]:
             worst, found = excess / cones[row, 3], row
         row = first + limits.facets
-        excess = dot(row_part(cones, row, 0), f) + limits.given[limits.bounds + i]
+        excess = dot(row_part(cones, row, 0), f) + limits.inputs[limits.bounds + i]
         if excess > worst * cones[row, 3]:
             worst, found = excess / cones[row, 3], row
     return found
 
 
-@jit_forced
+@jit_forceinline
 def force_rows_of(limits: Inequalities):
     """How many rows there are on forces."""
     return limits.cones.shape[0] + limits.points
 
 
 @jit
-def violated_late_row(limits: Inequalities, space: Space, beta, forces, tau, qdd):
+def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
     """`violated_row` for largest normal forces and rows of one's own, measured on rows of unit length.
 
     forces, tau: (k,), (d,), those at β. qdd: (nv,), memory.
     """
-    worst, found, known, cones = FEASIBILITY_TOLERANCE, -1, False, limits.cones
+    worst, found, has_qdd, cones = FEASIBILITY_TOLERANCE, -1, False, limits.cones
     for i in range(limits.points):
         row = i * (limits.facets + 1) + limits.facets
         start = int(cones[row, 4])
-        along = -dot(row_part(cones, row, 0), (forces[start], forces[start + 1], forces[start + 2]))
-        excess = along - limits.given[limits.bounds + limits.points + i]
+        normal_force = -dot(row_part(cones, row, 0), (forces[start], forces[start + 1], forces[start + 2]))
+        excess = normal_force - limits.inputs[limits.bounds + limits.points + i]
         if excess > worst * cones[row, 3]:
             worst, found = excess / cones[row, 3], cones.shape[0] + i
-    at, number, given = limits.first, force_rows_of(limits) + 2 * tau.size, limits.given
-    for _ in range(limits.groups):
-        block, m = int(given[at]), int(given[at + 1])
-        if block == QDD and not known:
+    at, number, inputs = limits.user_start, force_rows_of(limits) + 2 * tau.size, limits.inputs
+    for _ in range(limits.n_user_groups):
+        block, m = int(inputs[at]), int(inputs[at + 1])
+        if block == QDD and not has_qdd:
             affine_value(space.V, beta, 0, qdd.size, qdd)
-            known = True
+            has_qdd = True
         x = qdd if block == QDD else (forces if block == FORCES else tau)
         for i in range(m):
-            excess, square = -given[at + 2 + m * x.size + i], 0.0
+            excess, square = -inputs[at + 2 + m * x.size + i], 0.0
             for c in range(x.size):
-                entry = given[at + 2 + i * x.size + c]
+                entry = inputs[at + 2 + i * x.size + c]
                 excess += entry * x[c]
                 square += entry * entry
             length = np.sqrt(square) if square > 0.0 else 1.0
@@ -134,8 +134,8 @@ def violated_late_row(limits: Inequalities, space: Space, beta, forces, tau, qdd
     return found
 
 
-@jit_forced
-def violated_row(limits: Inequalities, space: Space, beta, forces, tau, qdd):
+@jit_forceinline
+def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
     """The number of a row of (27)(28) that β (nb,) violates, -1 for none; forces (k,), tau (d,), qdd (nv,): memory.
 
     Torques are computed only where all forces are feasible, since they cost more; what few problems have comes last.
@@ -150,26 +150,26 @@ def violated_row(limits: Inequalities, space: Space, beta, forces, tau, qdd):
         excess = abs(tau[j]) - limits.torque_limits[j]
         if excess > worst:
             worst, found = excess, n_force_rows + (j if tau[j] > 0.0 else tau.size + j)
-    if found < 0 and limits.late:
-        return violated_late_row(limits, space, beta, forces, tau, qdd)
+    if found < 0 and limits.has_optional:
+        return violated_optional_row(limits, space, beta, forces, tau, qdd)
     return found
 
 
 @jit
-def own_row_in_beta(number, limits: Inequalities, space: Space, nv, out):
+def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
     """`row_in_beta` for the rows of one's own, by their own number."""
-    V, T, given, at = space.V, space.T, limits.given, limits.first
+    V, T, inputs, at = space.V, space.T, limits.inputs, limits.user_start
     k, nb = V.shape[0] - nv, V.shape[1] - 1
     clear(out)
     while True:
-        block, m = int(given[at]), int(given[at + 1])
+        block, m = int(inputs[at]), int(inputs[at + 1])
         size = nv if block == QDD else (k if block == FORCES else T.shape[0])
         if number < m:
             break
         at, number = at + 2 + m * (size + 1), number - m
-    bound = given[at + 2 + m * size + number]
+    bound = inputs[at + 2 + m * size + number]
     for i in range(size):
-        entry = given[at + 2 + number * size + i]
+        entry = inputs[at + 2 + number * size + i]
         if entry != 0.0:
             row = V[i] if block == QDD else (V[nv + i] if block == FORCES else T[i])
             for c in range(nb):
@@ -178,21 +178,21 @@ def own_row_in_beta(number, limits: Inequalities, space: Space, nv, out):
     return bound
 
 
-@jit_forced
-def row_in_beta(number, limits: Inequalities, space: Space, nv, out):
+@jit_forceinline
+def row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
     """A row of (27)(28) by its number: out (nb,) = its row of G. Returns its bound in h."""
     V, T, cones = space.V, space.T, limits.cones
     nb, d, cone_face_matrix, force_rows = V.shape[1] - 1, T.shape[0], cones.shape[0], force_rows_of(limits)
     if number >= force_rows + 2 * d:
-        return own_row_in_beta(number - force_rows - 2 * d, limits, space, nv, out)
+        return user_row_in_beta(number - force_rows - 2 * d, limits, space, nv, out)
     clear(out)
     if number < force_rows:
         n_rows, row, sign, bound = limits.facets + 1, number, 1.0, 0.0
         if number >= cone_face_matrix:  # the largest normal force: the row of the least one, turned round
             row, sign = (number - cone_face_matrix) * n_rows + limits.facets, -1.0
-            bound = limits.given[limits.bounds + limits.points + number - cone_face_matrix]
+            bound = limits.inputs[limits.bounds + limits.points + number - cone_face_matrix]
         elif number % n_rows == limits.facets:
-            bound = -limits.given[limits.bounds + number // n_rows]
+            bound = -limits.inputs[limits.bounds + number // n_rows]
         first = nv + int(cones[row, 4])
         for r in range(3):
             factor = sign * cones[row, r]

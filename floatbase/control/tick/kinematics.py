@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.memory import clear
-from floatbase.control.tick.tables import OWN, POINT
+from floatbase.control.tick.problem_arrays import POINT, USER_DEFINED
 from floatbase.control.tick.vectors import column_part, cross, minus, plus, rotate, rotation_in, row_part, times
+from floatbase.control.tick.workspace import clear
 
 
 class Bodies(NamedTuple):
@@ -31,8 +31,8 @@ class ContactTable(NamedTuple):
     table: Any  # (C, 6), joint, kind, first point, number of points, of motion rows, of entries of λ
     frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
     points: Any  # (P, 3), centre of the ball, or corners, in the frame
-    given: Any  # what `own.Own` packed
-    first: Any  # where the own contacts' A, b and J start in it, one contact after the other
+    inputs: Any  # what `user_terms.UserTerms` packed
+    user_start: Any  # where the user-defined contacts' A, b and J start in it, one contact after the other
     points_only: Any  # whether all are point contacts, whose A and J are the same
 
 
@@ -47,13 +47,13 @@ def forward_velocities(bodies: Bodies, v):
         velocity[0, r], drift[0, r] = 0.0, 0.0
     for i in range(1, tree.shape[0]):
         parent, first, count = tree[i, 0], tree[i, 1], tree[i, 2]
-        own_linear, own_angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        joint_linear, joint_angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for c in range(first, first + count):
-            own_linear = plus(own_linear, times(v[c], column_part(J, 0, c)))
-            own_angular = plus(own_angular, times(v[c], column_part(J, 3, c)))
-        linear, angular = plus(row_part(velocity, parent, 0), own_linear), plus(row_part(velocity, parent, 3), own_angular)
-        a = plus(row_part(drift, parent, 0), plus(cross(angular, own_linear), cross(linear, own_angular)))
-        alpha = plus(row_part(drift, parent, 3), cross(angular, own_angular))
+            joint_linear = plus(joint_linear, times(v[c], column_part(J, 0, c)))
+            joint_angular = plus(joint_angular, times(v[c], column_part(J, 3, c)))
+        linear, angular = plus(row_part(velocity, parent, 0), joint_linear), plus(row_part(velocity, parent, 3), joint_angular)
+        a = plus(row_part(drift, parent, 0), plus(cross(angular, joint_linear), cross(linear, joint_angular)))
+        alpha = plus(row_part(drift, parent, 3), cross(angular, joint_angular))
         for r in range(3):
             velocity[i, r], velocity[i, 3 + r], drift[i, r], drift[i, 3 + r] = linear[r], angular[r], a[r], alpha[r]
 
@@ -96,11 +96,11 @@ def centre_of_mass(bodies: Bodies):
     """Position, velocity and drift of the centre of mass, and the mass."""
     com, com_velocity, com_drift, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
     for i in range(1, bodies.links.shape[0]):
-        link = bodies.links[i, 0]
+        link_mass = bodies.links[i, 0]
         p = plus(row_part(bodies.poses, i, 9), rotate(rotation_in(bodies.poses, i), row_part(bodies.links, i, 1)))
         velocity, drift = point_velocity(bodies, i, p)
-        com, mass = plus(com, times(link, p)), mass + link
-        com_velocity, com_drift = plus(com_velocity, times(link, velocity)), plus(com_drift, times(link, drift))
+        com, mass = plus(com, times(link_mass, p)), mass + link_mass
+        com_velocity, com_drift = plus(com_velocity, times(link_mass, velocity)), plus(com_drift, times(link_mass, drift))
     return times(1.0 / mass, com), times(1.0 / mass, com_velocity), times(1.0 / mass, com_drift), mass
 
 
@@ -116,17 +116,17 @@ def copy_rows(numbers, first, rows, columns, out, row):
 @jit
 def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
     """(4)(5) A (m, nv) and b (m,) of all contacts, and J (k, nv) of (4), the same array where `points_only`."""
-    row, force, nv, given, at = 0, 0, A.shape[1], contacts.given, contacts.first
+    row, force, nv, inputs, start = 0, 0, A.shape[1], contacts.inputs, contacts.user_start
     clear(A)
     clear(J)
     for i in range(contacts.table.shape[0]):
         joint, kind, first, count = contacts.table[i, 0], contacts.table[i, 1], contacts.table[i, 2], contacts.table[i, 3]
         m, k = contacts.table[i, 4], contacts.table[i, 5]
-        if kind == OWN:
-            at = copy_rows(given, at, m, nv, A, row)
+        if kind == USER_DEFINED:
+            start = copy_rows(inputs, start, m, nv, A, row)
             for r in range(m):
-                b[row + r] = given[at + r]
-            at = copy_rows(given, at + m, k, nv, J, force)
+                b[row + r] = inputs[start + r]
+            start = copy_rows(inputs, start + m, k, nv, J, force)
             row, force = row + m, force + k
             continue
         R, p = frame_pose(bodies, joint, contacts.frames, i)

@@ -9,56 +9,70 @@ The same problem as `build_qp` makes, solved in another way that costs a fractio
     dual_search   the optimum without inequalities, then one violated row after the other      App. C
 
 A tick without an answer says why: INVALID (a value is not finite, a quaternion is none, an orientation is too far off),
-INACCURATE (its last digits are lost), INFEASIBLE. Then the readable path decides.
+INACCURATE (its last digits are lost), INFEASIBLE. Then the reference backend decides.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from floatbase.control.tick.costs import Cost, TaskTable, own_rows, task_costs
+from floatbase.control.tick.costs import Cost, TaskTable, count_user_rows, task_costs
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
-from floatbase.control.tick.elimination import DEPENDENT_ROW, LOST_ROW, Space, eliminate, independent_rows, parametrise, torques
+from floatbase.control.tick.elimination import (
+    DEPENDENT_ROW,
+    ZERO_ROW,
+    Parametrisation,
+    eliminate,
+    independent_rows,
+    parametrise,
+    torques,
+)
 from floatbase.control.tick.inequalities import Inequalities, affine_value
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, forward_velocities
-from floatbase.control.tick.memory import all_finite, take_matrix, take_vector
+from floatbase.control.tick.workspace import all_finite, take_matrix, take_vector
 from floatbase.robots import UNIT_NORM_TOLERANCE
 
 INVALID, STOPPED = -1, -4
-PARTS = 4  # of a tick: contact rows, elimination, costs, optimum
-FAR = 1e8  # m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
+N_STAGES = 4  # of a tick: contact rows, elimination, costs, optimum
+MAX_ENTRY = 1e8  # m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
 
 
 @jit_inline
-def unpack(nv, sizes, indices, numbers, given):
-    """Tree, links, contacts, tasks and limits as `tables.tables_of` and `own.Own` laid them out.
+def unpack(nv, sizes, int_tables, float_tables, inputs):
+    """Tree, links, contacts, tasks and limits as `problem_arrays.pack_problem` and `user_terms.UserTerms` laid them out.
 
     sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets, numbers of
         contacts of one's own, tasks of one's own, groups of rows of one's own; 1 or 0: whether all contacts are points, and
-        `Inequalities.late`.
-    indices, numbers: whole and real numbers of all tables, one table after the other, as in a workspace.
-    given: as for `tick`.
+        `Inequalities.has_optional`.
+    int_tables, float_tables: whole and real numbers of all tables, one table after the other, as in a workspace.
+    inputs: as for `tick`.
     """
     n, n_contacts, n_points, n_rows, n_tasks, d, k = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5], sizes[6], sizes[7]
-    indices[0], numbers[0] = 1, 1
-    tree, links, contact_table = take_matrix(indices, n, 5), take_matrix(numbers, n, 4), take_matrix(indices, n_contacts, 6)
-    frames, points = take_matrix(numbers, n_contacts, 16), take_matrix(numbers, n_points, 3)
-    bounds, own = sizes[8], sizes[8] + 2 * n_points
-    contacts = ContactTable(contact_table, frames, points, given, own, sizes[12] == 1)
-    task_table, gains = take_matrix(indices, n_tasks, 3), take_matrix(numbers, n_tasks, 3)
-    first = own + sizes[9]
-    rows, last = own_rows(given, first, sizes[10], nv, k, d)
-    tasks = TaskTable(task_table, gains, take_matrix(numbers, n_tasks, 12), given, first, sizes[10], rows)
-    cones, torque_limits = take_matrix(numbers, n_points * n_rows, 5), take_vector(numbers, d)
-    limits = Inequalities(cones, n_rows - 1, n_points, torque_limits, given, bounds, last, sizes[11], sizes[13] == 1)
+    int_tables[0], float_tables[0] = 1, 1
+    tree, links, contact_table = (
+        take_matrix(int_tables, n, 5),
+        take_matrix(float_tables, n, 4),
+        take_matrix(int_tables, n_contacts, 6),
+    )
+    frames, points = take_matrix(float_tables, n_contacts, 16), take_matrix(float_tables, n_points, 3)
+    bounds, user_start = sizes[8], sizes[8] + 2 * n_points
+    contacts = ContactTable(contact_table, frames, points, inputs, user_start, sizes[12] == 1)
+    task_table, gains = take_matrix(int_tables, n_tasks, 3), take_matrix(float_tables, n_tasks, 3)
+    user_tasks = user_start + sizes[9]
+    n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, sizes[10], nv, k, d)
+    tasks = TaskTable(task_table, gains, take_matrix(float_tables, n_tasks, 12), inputs, user_tasks, sizes[10], n_user_rows)
+    cones, torque_limits = take_matrix(float_tables, n_points * n_rows, 5), take_vector(float_tables, d)
+    limits = Inequalities(
+        cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities, sizes[11], sizes[13] == 1
+    )
     return tree, links, contacts, tasks, limits
 
 
-def workspace_sizes(sizes, own_rows):
+def workspace_sizes(sizes, n_user_rows):
     """How many real and how many whole numbers a tick needs.
 
-    sizes: as for `unpack`. own_rows: number of rows of all tasks of one's own.
+    sizes: as for `unpack`. n_user_rows: number of rows of all tasks of one's own.
     """
     n_joints, _, _, m, _, n_tasks, d, k = (int(size) for size in sizes[:8])
     base = 6
@@ -67,15 +81,15 @@ def workspace_sizes(sizes, own_rows):
     contact = 12 * n_joints + (k + m) * nv + m
     elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
     space = (n + d) * (n + 1)
-    cost = (3 * n_tasks + own_rows + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
+    cost = (3 * n_tasks + n_user_rows + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
     search = (n + 1) ** 2 + 4 * n * n + 7 * n + k + d + nv
     return 1 + contact + elimination + space + cost + search, 1 + (m + base) + 3 * n
 
 
 @jit
-def inputs_valid(q, v, given, tree):
+def inputs_valid(q, v, inputs, tree):
     """Whether all numbers are finite, and quaternions and (cos, sin) in q have length 1; tree: as in `Bodies`."""
-    if not (all_finite(q) and all_finite(v) and all_finite(given)):
+    if not (all_finite(q) and all_finite(v) and all_finite(inputs)):
         return False
     for i in range(1, tree.shape[0]):
         if tree[i, 4] > tree[i, 2]:
@@ -88,16 +102,16 @@ def inputs_valid(q, v, given, tree):
 
 
 @jit
-def write_answer(space: Space, beta, active, n_active, nv, answer):
-    """Write (q̈, τ, λ) at β and the numbers of the active rows into `answer`. Returns False where one has no digits."""
+def write_result(space: Parametrisation, beta, active, n_active, nv, result):
+    """Write (q̈, τ, λ) at β and the numbers of the active rows into `result`. Returns False where one has no digits."""
     n, d = space.V.shape[0], space.T.shape[0]
-    affine_value(space.V, beta, 0, nv, answer[:nv])
-    affine_value(space.T, beta, 0, d, answer[nv : nv + d])
-    affine_value(space.V, beta, nv, n, answer[nv + d : n + d])
+    affine_value(space.V, beta, 0, nv, result[:nv])
+    affine_value(space.T, beta, 0, d, result[nv : nv + d])
+    affine_value(space.V, beta, nv, n, result[nv + d : n + d])
     for i in range(n_active):
-        answer[2 * n + d + i] = active[i]
+        result[2 * n + d + i] = active[i]
     for i in range(n + d):
-        if not abs(answer[i]) <= FAR:  # nor is NaN
+        if not abs(result[i]) <= MAX_ENTRY:  # nor is NaN
             return False
     return True
 
@@ -105,62 +119,72 @@ def write_answer(space: Space, beta, active, n_active, nv, answer):
 def make_tick(digest):
     """The function `tick`, to be compiled; digest: of this folder."""
 
-    def tick(q, v, given, M, h, J, Ag, oMi, sizes, indices, numbers, floats, ints, answer, parts):
+    def tick(q, v, inputs, M, h, J, Ag, oMi, sizes, int_tables, float_tables, float_workspace, int_workspace, result, stages):
         """(26)(27) Torques, accelerations and forces of one state. Returns how many rows are active, or why there is no answer.
 
         q, v: (nq,), (nv,), the state.
-        given: what changes from tick to tick, as `own.Own` packs it: targets, least and largest normal force of each point,
+        inputs: what changes from tick to tick, as `user_terms.UserTerms` packs it: targets, least and largest normal force of each point,
             then contacts, tasks and rows of one's own.
-        sizes, indices, numbers: as for `unpack`; few arrays, since each costs.
-        M, h, J, Ag, oMi: the views of `tables.Dynamics` for q and v.
-        floats, ints: workspaces of `workspace_sizes` numbers.
-        answer: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each.
-        parts: how many of PARTS to run, for benchmarks.
+        sizes, int_tables, float_tables: as for `unpack`; few arrays, since each costs.
+        M, h, J, Ag, oMi: the views of `problem_arrays.Dynamics` for q and v.
+        float_workspace, int_workspace: workspaces of `workspace_sizes` numbers.
+        result: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each.
+        stages: how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
         nv, m, d, k = v.size, sizes[3], sizes[6], sizes[7]
         base, n = nv - d, nv + k
-        tree, links, contacts, tasks, limits = unpack(nv, sizes, indices, numbers, given)
-        if not inputs_valid(q, v, given, tree):
+        tree, links, contacts, tasks, limits = unpack(nv, sizes, int_tables, float_tables, inputs)
+        if not inputs_valid(q, v, inputs, tree):
             return INVALID
-        floats[0], ints[0] = 1, 1
-        bodies = Bodies(tree, links, oMi, J, Ag, take_matrix(floats, tree.shape[0], 6), take_matrix(floats, tree.shape[0], 6))
+        float_workspace[0], int_workspace[0] = 1, 1
+        bodies = Bodies(
+            tree,
+            links,
+            oMi,
+            J,
+            Ag,
+            take_matrix(float_workspace, tree.shape[0], 6),
+            take_matrix(float_workspace, tree.shape[0], 6),
+        )
         forward_velocities(bodies, v)
-        J_points, b = take_matrix(floats, k, nv), take_vector(floats, m)
-        A = J_points if contacts.points_only else take_matrix(floats, m, nv)
+        J_points, b = take_matrix(float_workspace, k, nv), take_vector(float_workspace, m)
+        A = J_points if contacts.points_only else take_matrix(float_workspace, m, nv)
         contact_rows(bodies, contacts, A, b, J_points)
-        if parts == 1:
+        if stages == 1:
             return STOPPED
         M_rows = M.T  # symmetric, and Pinocchio stores it by columns
-        B, pivots = take_matrix(floats, m + base, n + 1), take_vector(ints, m + base)
-        least_motion, least = eliminate(A, b, M_rows, h, J_points, base, floats, B, pivots)
-        if least_motion <= DEPENDENT_ROW:
-            rows, right = take_matrix(floats, m, nv), take_vector(floats, m)
+        B, pivots = take_matrix(float_workspace, m + base, n + 1), take_vector(int_workspace, m + base)
+        motion_pivot, smallest_pivot = eliminate(A, b, M_rows, h, J_points, base, float_workspace, B, pivots)
+        if motion_pivot <= DEPENDENT_ROW:
+            rows, right = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
             m = independent_rows(A, b, v, rows, right)
             if m < 0:
                 return INACCURATE
             B, pivots = B[: m + base], pivots[: m + base]
-            _, least = eliminate(rows[:m], right[:m], M_rows, h, J_points, base, floats, B, pivots)
-        if least <= LOST_ROW:
+            _, smallest_pivot = eliminate(rows[:m], right[:m], M_rows, h, J_points, base, float_workspace, B, pivots)
+        if smallest_pivot <= ZERO_ROW:
             return INACCURATE
         nb = n - m - base
-        space = Space(take_matrix(floats, n, nb + 1), take_vector(ints, n), take_matrix(floats, d, nb + 1))
-        parametrise(B, pivots, m, take_vector(ints, nb), space.V, space.beta_of)
-        torques(space.V, space.beta_of, M_rows, h, J_points, base, space.T)
-        if parts == 2:
+        space = Parametrisation(
+            take_matrix(float_workspace, n, nb + 1), take_vector(int_workspace, n), take_matrix(float_workspace, d, nb + 1)
+        )
+        parametrise(B, pivots, m, take_vector(int_workspace, nb), space.V, space.beta_index)
+        torques(space.V, space.beta_index, M_rows, h, J_points, base, space.T)
+        if stages == 2:
             return STOPPED
-        R = take_matrix(floats, 3 * tasks.table.shape[0] + tasks.rows + 2 * d + k + 3, nb + 1)
-        diagonal, linear = take_vector(floats, nb), take_vector(floats, nb)
-        used = task_costs(q, v, bodies, tasks, space, base, floats, Cost(R, diagonal, linear))
+        R = take_matrix(float_workspace, 3 * tasks.table.shape[0] + tasks.n_user_rows + 2 * d + k + 3, nb + 1)
+        diagonal, linear = take_vector(float_workspace, nb), take_vector(float_workspace, nb)
+        used = task_costs(q, v, bodies, tasks, space, base, float_workspace, Cost(R, diagonal, linear))
         if used < 0:
             return INVALID
-        if parts == 3:
+        if stages == 3:
             return STOPPED
-        beta, active, mu = take_vector(floats, nb), take_vector(ints, nb), answer[n + d : n + d + nb]
-        n_active = dual_search(Cost(R[:used], diagonal, linear), limits, space, nv, floats, active, mu, beta)
+        beta, active, mu = take_vector(float_workspace, nb), take_vector(int_workspace, nb), result[n + d : n + d + nb]
+        n_active = dual_search(Cost(R[:used], diagonal, linear), limits, space, nv, float_workspace, active, mu, beta)
         if n_active < 0:
             return n_active
-        return n_active if write_answer(space, beta, active, n_active, nv, answer) else INACCURATE
+        return n_active if write_result(space, beta, active, n_active, nv, result) else INACCURATE
 
     return tick
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import floatbase as fb
-from floatbase._validation import Array
 from floatbase._assets import assets_root
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, RollingWheel
 from floatbase.lessons.controllers import ConstantTorques
 from floatbase.robots import Robot

@@ -14,7 +14,7 @@ from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verd
 from floatbase.lessons.lesson03 import standing_go2, standing_still
 from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, squeezes, three_feet
 from floatbase.lessons.rounding import about
-from floatbase.objectives import com_wrench_map, force_bias, centroidal_momentum_rate, tangential_bias, wrench_objective
+from floatbase.objectives import centroidal_momentum_rate, com_wrench_map, force_bias, tangential_bias, wrench_objective
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
 FORWARDS = 60.0  # N, of exercise 05.4

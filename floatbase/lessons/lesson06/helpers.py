@@ -15,7 +15,7 @@ from floatbase.dynamics import equations_of_motion
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.lessons.controllers import Torques
-from floatbase.objectives import desired_wrench, force_bias, centroidal_inertia, torques_from_forces, wrench_objective
+from floatbase.objectives import centroidal_inertia, desired_wrench, force_bias, torques_from_forces, wrench_objective
 
 STIFFNESS, DAMPING = 100.0, 20.0  # 1/s² and 1/s of the centre of mass and of the base's rotation, as in lesson 05
 FACETS = 4  # of each foot's polyhedron, inside its cone

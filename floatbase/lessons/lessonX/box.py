@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase._validation import Array, Value, read_only, as_integer
+from floatbase._validation import Array, Value, as_integer, read_only
 from floatbase.robots import Robot
 
 

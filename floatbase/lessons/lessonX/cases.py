@@ -11,7 +11,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array, as_integer
 from floatbase.actuators import FirstOrderLag
-from floatbase.control import Belief, Command
+from floatbase.control import Command, ModelMismatch
 from floatbase.errors import InfeasibleError, unknown_name
 from floatbase.lessons.lesson06 import with_feet
 from floatbase.lessons.lessonA import circling
@@ -70,14 +70,14 @@ def tilted(normal: Array, degrees: float, heading: float) -> Array:
 class Pilot:
     """A controller that remembers the accelerations it planned, and lets feet give way where nothing holds them."""
 
-    def __init__(self, state: fb.State, contacts: fb.Contacts, twist: Twist, belief: Belief):
+    def __init__(self, state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch):
         path = circling(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.way)
         tasks: list[Task] = [
             fb.CoMTask(state.com, kp=KP_COM),
             fb.OrientationTask("base", path, kp=KP_BASE),
             fb.PostureTask(state.q),
         ]
-        options: dict[str, Any] = {"facets": FACETS, "belief": belief}
+        options: dict[str, Any] = {"facets": FACETS, "mismatch": mismatch}
         self.contacts, self.planned = contacts, list[Array]()
         self._firm = fb.WholeBodyController(state.robot, contacts, tasks, **options)
         self._soft = fb.WholeBodyController(state.robot, contacts, tasks, contact_weight=SOFT, **options)
@@ -149,8 +149,8 @@ def recorded(
     told = tilted(twist.normal, mistake.size, mistake.heading) if fault == "normal" else twist.normal
     contacts = fb.Contacts.points(robot, MU, normals=told)
     state = standing_on(robot, twist.normal)
-    belief = Belief(mass=mistake.size if fault == "mass" else 1.0, drift=fault != "drift")
-    pilot = Pilot(state, contacts, twist, belief)
+    mismatch = ModelMismatch(mass=mistake.size if fault == "mass" else 1.0, drift=fault != "drift")
+    pilot = Pilot(state, contacts, twist, mismatch)
     actuators = motors(robot, mistake, pilot(state.q, state.v, 0.0).tau)
     pilot.planned.clear()
     sim = fb.Simulation(robot, fb.Ground(mu, normal=twist.normal))

@@ -8,21 +8,21 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
-from floatbase.actuators.hydraulics import Cylinders, Hydraulics, Pose
+from floatbase.actuators.hydraulics import CylinderGeometry, Cylinders, Hydraulics
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
-_LONGEST_STEP = 2e-4  # s, of the oil's integration: torques come out within 1 % of the limit at 0.2 ms
-_LONGEST_CALL = 10.0  # s in one call: torques and velocities that stay the same for longer are a slip of units
+_MAX_STEP = 2e-4  # s, of the oil's integration: torques come out within 1 % of the limit at 0.2 ms
+_MAX_DURATION = 10.0  # s in one call: torques and velocities that stay the same for longer are a slip of units
 _STEP_ROUNDING = 1e-9  # of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
-_INTEGRAL_PART = 0.05  # of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
-_DEAD_LEVER = 1e-9  # of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
-_Oil = tuple[Array, Array, Array]  # the parts of an `OilState`, between the steps of the integration
+_INTEGRAL_FRACTION = 0.05  # of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
+_MIN_LEVER_FRACTION = 1e-9  # of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
+_StateArrays = tuple[Array, Array, Array]  # the parts of a `HydraulicState`, between the steps of the integration
 VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
 
 
 @dataclass(frozen=True, eq=False)
-class OilState(Value):
+class HydraulicState(Value):
     """What d cylinders and their loops remember.
 
     opening: (d,), of the valves, -1 to 1.
@@ -50,14 +50,14 @@ class HydraulicActuators:
     and in the weaker direction, rod going in. Friction of the pistons is left out. A load that pulls the rod out fast starves
     chamber A: its oil boils, and torque is missing until the chamber is full again.
 
-    robot: as from `fb.load`; hydraulics: the cylinder that is scaled, HyQ's by default; centre: (d,) rad, the angles at which
-    the levers are longest, those of `robot.standing()` by default. `state` is the present `OilState`, `cylinders` the
+    robot: as from `fb.load`; hydraulics: the cylinder that is scaled, HyQ's by default; max_lever_angle: (d,) rad, the angles at which
+    the levers are longest, those of `robot.standing()` by default. `state` is the present `HydraulicState`, `cylinders` the
     equations.
     Source of the loop: Boaventura et al., Model-based hydraulic impedance control for dynamic robots, IEEE T-RO 31, 2015.
     Raises `InputError` for a joint without a torque limit and for joints that slide.
     """
 
-    def __init__(self, robot: Robot, hydraulics: Hydraulics | None = None, centre: npt.ArrayLike | None = None):
+    def __init__(self, robot: Robot, hydraulics: Hydraulics | None = None, max_lever_angle: npt.ArrayLike | None = None):
         self.robot = as_instance("robot", robot, Robot)
         hydraulics = Hydraulics() if hydraulics is None else as_instance("hydraulics", hydraulics, Hydraulics)
         for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
@@ -66,31 +66,33 @@ class HydraulicActuators:
                 raise InputError(f"{joint} of {robot.name} slides ({kind}); hydraulic actuators here turn joints by a crank.")
             if not np.isfinite(limit):
                 raise InputError(
-                    f"{joint} of {robot.name} has no torque limit, so its cylinder has no size: "
+                    f"{joint} of {robot.name} has no torque limit, so its cylinder has no scale: "
                     f'load the robot with one, fb.load("{robot.name}", torque_limits=…).'
                 )
-        if centre is None:  # the difference to the neutral configuration holds the joints' angles, where q has cos and sin
-            centre = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
-        self.cylinders = Cylinders(hydraulics, robot.torque_limits / hydraulics.weakest_torque, centre)
+        if (
+            max_lever_angle is None
+        ):  # the difference to the neutral configuration holds the joints' angles, where q has cos and sin
+            max_lever_angle = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
+        self.cylinders = Cylinders(hydraulics, robot.torque_limits / hydraulics.weakest_torque, max_lever_angle)
         self.reset()
 
     def reset(self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None) -> None:
         """Close the valves, with pressures that give torques tau, (d,) N·m, zero by default, as far as the supply goes.
 
-        q_joints: (d,) rad, the centre by default. A robot that is to stand from the start needs the torques it stands with.
+        q_joints: (d,) rad, `Cylinders.max_lever_angle` by default. A robot that is to stand from the start needs the torques it stands with.
         The integrals begin empty: torques are off, by what leaks, until they have learned how much that is.
         """
         cylinders = self.cylinders
         tau = as_array("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
-        force = self._force_for(tau, cylinders.pose(cylinders.centre if q_joints is None else q_joints))
+        force = self._desired_forces(tau, cylinders.geometry(cylinders.max_lever_angle if q_joints is None else q_joints))
         # a valve with equal edges holds a force with as much pressure missing at A as there is too much at B
         lines = cylinders.hydraulics.supply_pressure + cylinders.hydraulics.tank_pressure
         a = (force + cylinders.areas[1] * lines) / cylinders.areas.sum(axis=0)
-        self.state = OilState(np.zeros(cylinders.d), np.array([a, lines - a]), np.zeros(cylinders.d))
+        self.state = HydraulicState(np.zeros(cylinders.d), np.array([a, lines - a]), np.zeros(cylinders.d))
 
     def torques(self, q_joints: npt.ArrayLike) -> Array:
         """The torques that the oil makes at joint angles, shape (d,) rad: L F, shape (d,), N·m."""
-        return self.cylinders.pose(q_joints).lever * self.cylinders.force(self.state.pressures)
+        return self.cylinders.geometry(q_joints).lever * self.cylinders.force(self.state.pressures)
 
     def step(self, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike, dt: float) -> Array:
         """Let time pass; the joints' torques at its end, shape (d,), N·m.
@@ -101,33 +103,33 @@ class HydraulicActuators:
         dt: s, integrated in equal steps of 0.2 ms at most: the spool exactly, the pressures by linearly implicit Euler.
         """
         cylinders = self.cylinders
-        pose = cylinders.pose(q_joints)
-        force = self._force_for(as_array("tau_desired", tau_desired, (cylinders.d,), "N·m"), pose)
+        geometry = cylinders.geometry(q_joints)
+        force = self._desired_forces(as_array("tau_desired", tau_desired, (cylinders.d,), "N·m"), geometry)
         v = as_array("v_joints", v_joints, (cylinders.d,), "rad/s")
-        steps = max(1, int(np.ceil(as_positive("dt", dt, "s", maximum=_LONGEST_CALL) / _LONGEST_STEP - _STEP_ROUNDING)))
-        oil = (self.state.opening, self.state.pressures, self.state.integral)
+        steps = max(1, int(np.ceil(as_positive("dt", dt, "s", maximum=_MAX_DURATION) / _MAX_STEP - _STEP_ROUNDING)))
+        state = (self.state.opening, self.state.pressures, self.state.integral)
         for _ in range(steps):
-            oil = self._advance(oil, force, pose, v, dt / steps)
-        self.state = OilState(*oil)
-        return pose.lever * cylinders.force(self.state.pressures)
+            state = self._advance(state, force, geometry, v, dt / steps)
+        self.state = HydraulicState(*state)
+        return geometry.lever * cylinders.force(self.state.pressures)
 
-    def _force_for(self, tau: Array, pose: Pose) -> Array:
+    def _desired_forces(self, tau: Array, geometry: CylinderGeometry) -> Array:
         """The piston forces for joint torques, shape (d,), N, within what supply and tank allow."""
-        least_lever = _DEAD_LEVER * self.cylinders.crank
-        lever = np.where(np.abs(pose.lever) < least_lever, least_lever, pose.lever)
+        min_lever = _MIN_LEVER_FRACTION * self.cylinders.crank
+        lever = np.where(np.abs(geometry.lever) < min_lever, min_lever, geometry.lever)
         return np.clip(tau / lever, *self.cylinders.force_limits())
 
-    def _advance(self, oil: _Oil, force: Array, pose: Pose, v: Array, step: float) -> _Oil:
+    def _advance(self, state: _StateArrays, force: Array, geometry: CylinderGeometry, v: Array, step: float) -> _StateArrays:
         """Opening, pressures and integral `step` s later when the loop desires `force`, (d,) N, at joint velocities v."""
-        cylinders, hydraulics, (opening, pressures, integral) = self.cylinders, self.cylinders.hydraulics, oil
+        cylinders, hydraulics, (opening, pressures, integral) = self.cylinders, self.cylinders.hydraulics, state
         rate = 2.0 * np.pi * hydraulics.loop_bandwidth
         error = force - cylinders.force(pressures)
-        force_rate = rate * (error + _INTEGRAL_PART * rate * integral)
-        u = cylinders.opening_for(force_rate, pressures, pose, v)
+        force_rate = rate * (error + _INTEGRAL_FRACTION * rate * integral)
+        u = cylinders.opening_for(force_rate, pressures, geometry, v)
         integral = integral + step * np.where(np.abs(u) < 1.0, error, 0.0)
         u = np.minimum(np.maximum(u, -1.0), 1.0)
-        after = u + (opening - u) * np.exp(-2.0 * np.pi * hydraulics.valve_bandwidth * step)
-        halfway = 0.5 * (opening + after)
-        change = step * cylinders.pressure_rates(halfway, pressures, pose, v)
-        change /= 1.0 + step * cylinders.pressure_decay(halfway, pressures, pose)
-        return after, np.maximum(pressures + change, VACUUM), integral
+        new_opening = u + (opening - u) * np.exp(-2.0 * np.pi * hydraulics.valve_bandwidth * step)
+        mean_opening = 0.5 * (opening + new_opening)
+        pressure_change = step * cylinders.pressure_rates(mean_opening, pressures, geometry, v)
+        pressure_change /= 1.0 + step * cylinders.pressure_decay(mean_opening, pressures, geometry)
+        return new_opening, np.maximum(pressures + pressure_change, VACUUM), integral

@@ -38,13 +38,15 @@ COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
 TASK_KINDS: dict[type, int] = {
     CoMTask: COM, OrientationTask: ORIENTATION, FrameTask: FRAME, PostureTask: POSTURE, ForceTask: FORCE, TorqueTask: TORQUE
 }  # fmt: skip
-POINT, FLAT, OWN = range(3)
+POINT, FLAT, USER_DEFINED = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
 QDD, TAU, FORCES = range(3)
 BLOCKS = {"qdd": QDD, "tau": TAU, "forces": FORCES}
-_POSE = 12  # numbers of a pose: rotation column by column, then position
+_POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
 Indices: TypeAlias = npt.NDArray[np.int64]
-Cut: TypeAlias = tuple[int, bool, float]  # facets, inside and turn of a `FrictionPolyhedron`
+PolyhedronOptions: TypeAlias = tuple[
+    int, bool, float
+]  # facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
 
 
 class Dynamics:
@@ -61,7 +63,7 @@ class Dynamics:
         self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
-        poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE), (8 * _POSE, 8))
+        poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE_SIZE), (8 * _POSE_SIZE, 8))
         self.views: tuple[Array, ...] = (data.M, data.nle, data.J, data.Ag, poses)
         tree = [(model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i]) for i in range(n)]
         self.tree, self.links = np.array(tree, np.int64), np.array([(link.mass, *link.lever) for link in model.inertias])
@@ -72,11 +74,11 @@ class Dynamics:
         pin.crba(self.robot.model, self.data, q, pin.Convention.WORLD)
 
     @property
-    def fits(self) -> bool:
+    def layout_supported(self) -> bool:
         """Whether this version of Pinocchio lays its results out in memory as the views take them."""
         with self.lock:
             self.update(self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv))
-            poses, M = np.array([_numbers(pose) for pose in self.data.oMi]), self.views[0]
+            poses, M = np.array([_flat_pose(pose) for pose in self.data.oMi]), self.views[0]
             return np.array_equal(poses, self.views[-1]) and np.array_equal(M, M.T)
 
     @classmethod
@@ -92,23 +94,23 @@ if hasattr(os, "register_at_fork"):
 dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one for each robot, shared by its controllers
 
 
-class Moving(NamedTuple):
+class TimeVaryingTask(NamedTuple):
     """A task whose targets are a function of time."""
 
-    number: int  # of the task
+    task_index: int  # of the task
     task: Task
     first: int  # where its targets start among all
 
 
-def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Moving]]:
+def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[TimeVaryingTask]]:
     """A problem as what `tick.unpack` takes, with its targets, zeros for those that move, and the moving ones.
 
     Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
     """
-    contacts, frames, points, cones = _contact_tables(problem)
+    contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
-    tasks, gains, poses, targets, moving = _task_tables(problem)
-    dynamics, limits, on = dynamics_of(problem.robot), problem.limits, problem.contacts
+    tasks, gains, poses, targets, time_varying = _pack_tasks(problem)
+    dynamics, limits, problem_contacts = dynamics_of(problem.robot), problem.limits, problem.contacts
     sizes = (
         len(dynamics.tree),
         len(contacts),
@@ -118,90 +120,106 @@ def tables_of(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[Mo
         len(tasks),
         problem.robot.d,
     )
-    own, alike = contacts[contacts[:, 1] == OWN], np.all(contacts[:, 1] == POINT)
-    n_own = sum(m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in own[:, 4:])
-    late = bool(limits.rows) or np.any(limits.bounded_points(on))
-    varying = (on.k, targets.size, n_own, len(problem.tasks) - len(tasks), len(limits.rows), alike, late)
+    user_contacts, points_only = contacts[contacts[:, 1] == USER_DEFINED], np.all(contacts[:, 1] == POINT)
+    n_user_contact_numbers = sum(m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in user_contacts[:, 4:])
+    has_optional = bool(limits.inequalities) or np.any(limits.bounded_points(problem_contacts))
+    counts = (
+        problem_contacts.k,
+        targets.size,
+        n_user_contact_numbers,
+        len(problem.tasks) - len(tasks),
+        len(limits.inequalities),
+        points_only,
+        has_optional,
+    )
     # a workspace counts in its first entry
-    real = (0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits)
-    indices = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
-    return np.array((*sizes, *varying), np.int64), indices, np.concatenate([np.ravel(table) for table in real]), targets, moving
+    float_tables = (0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits)
+    int_tables = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
+    return (
+        np.array((*sizes, *counts), np.int64),
+        int_tables,
+        np.concatenate([np.ravel(table) for table in float_tables]),
+        targets,
+        time_varying,
+    )
 
 
-def _contact_tables(problem: Problem) -> tuple[Any, ...]:
+def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
     """Contacts (C, 6), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P (F + 1), 5)."""
     limits = problem.limits
-    found = [_contact_numbers(problem.robot, contact, limits.cut) for contact in problem.contacts]
+    found = [_pack_contact(problem.robot, contact, limits.polyhedron_options) for contact in problem.contacts]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
     tables = np.array(table, np.int64).reshape(-1, 6)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
     return tables, *(
-        np.concatenate([np.zeros((0, width)), *parts]) for width, parts in ((_POSE + 4, frames), (3, points), (5, cones))
+        np.concatenate([np.zeros((0, width)), *parts]) for width, parts in ((_POSE_SIZE + 4, frames), (3, points), (5, cones))
     )
 
 
-def _contact_numbers(robot: Robot, contact: Contact, cut: Cut) -> tuple[tuple[int, ...], Array, Array, Array]:
+def _pack_contact(robot: Robot, contact: Contact, options: PolyhedronOptions) -> tuple[tuple[int, ...], Array, Array, Array]:
     """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
-        return _known_contact(robot, cast(Any, contact), cut)
+        return _pack_builtin_contact(robot, cast(Any, contact), options)
     n = len(contact.point_names)
-    row = (0, OWN, 0, n, len(contact.row_names), contact.k)
-    return row, np.zeros((1, _POSE + 4)), np.zeros((n, 3)), _cones(contact, cut)
+    row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k)
+    return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), _cones(contact, options)
 
 
 @lru_cache(maxsize=256)
-def _known_contact(
-    robot: Robot, contact: PointContact | FlatFootContact, cut: Cut
+def _pack_builtin_contact(
+    robot: Robot, contact: PointContact | FlatFootContact, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
-    joint, pose = _frame(robot, contact.frame)
+    joint, pose = _frame_placement(robot, contact.frame)
     radius, points = (contact.radius, contact.centre) if isinstance(contact, PointContact) else (0.0, contact.corners)
     points = np.array(points).reshape(-1, 3)
     row = (joint, CONTACT_KINDS[type(contact)], 0, len(points), len(contact.row_names), contact.k)
-    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, _cones(contact, cut)
+    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, _cones(contact, options)
 
 
-def _cones(contact: Contact, cut: Cut) -> Array:
+def _cones(contact: Contact, options: PolyhedronOptions) -> Array:
     """Facets and -normal of each point of a contact with their lengths, and a zero, (p (F + 1), 5)."""
     if not contact.point_names:
         return np.zeros((0, 5))
-    polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *cut)
+    polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *options)
     rows = np.vstack([polyhedron.face_matrix, -polyhedron.normal])
     cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])
     return np.tile(cones, (len(contact.point_names), 1))
 
 
-def _task_tables(problem: Problem) -> tuple[Any, ...]:
+def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
     """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, and those that move.
 
     Those of the package: where one of another kind stands among them does not matter.
     """
     known = [i for i, task in enumerate(problem.tasks) if type(task) in TASK_KINDS]
     n, robot = len(known), problem.robot
-    table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE))
+    table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE_SIZE))
     targets: list[Array] = [np.zeros(0)]
-    first, moving = 0, []
-    for i, which in enumerate(known):
-        task = problem.tasks[which]
-        joint, poses[i] = _frame(robot, task.frame) if isinstance(task, OrientationTask | FrameTask) else (0, np.zeros(_POSE))
+    first, time_varying = 0, []
+    for i, index in enumerate(known):
+        task = problem.tasks[index]
+        joint, poses[i] = (
+            _frame_placement(robot, task.frame) if isinstance(task, OrientationTask | FrameTask) else (0, np.zeros(_POSE_SIZE))
+        )
         table[i] = TASK_KINDS[type(task)], joint, first
         gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)
         shapes = target_shapes(task, robot, problem.contacts.k)
-        still: list[Array] = [np.zeros(shape) for shape in shapes.values()]
+        values: list[Array] = [np.zeros(shape) for shape in shapes.values()]
         if callable(getattr(task, next(iter(shapes)))):
-            moving.append(Moving(which, task, first))
+            time_varying.append(TimeVaryingTask(index, task, first))
         else:
-            still = targets_at(task, robot, problem.contacts.k, 0.0)
-        targets += [target.ravel() for target in still]
-        first += sum(target.size for target in still)
-    return table, gains, poses, np.concatenate(targets), moving
+            values = targets_at(task, robot, problem.contacts.k, 0.0)
+        targets += [target.ravel() for target in values]
+        first += sum(target.size for target in values)
+    return table, gains, poses, np.concatenate(targets), time_varying
 
 
-def _frame(robot: Robot, name: str) -> tuple[int, Array]:
+def _frame_placement(robot: Robot, name: str) -> tuple[int, Array]:
     """The joint that carries a frame, and the frame's pose in it, shape (12,)."""
     frame = robot.model.frames[robot.frame_id(name)]
-    return int(frame.parentJoint), _numbers(frame.placement)
+    return int(frame.parentJoint), _flat_pose(frame.placement)
 
 
-def _numbers(pose: pin.SE3) -> Array:
+def _flat_pose(pose: pin.SE3) -> Array:
     """A pose as 12 numbers."""
     return np.concatenate([pose.rotation.T.ravel(), pose.translation])

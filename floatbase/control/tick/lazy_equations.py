@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from floatbase._validation import Array, frozen
-from floatbase.control.tick.tables import Dynamics
+from floatbase.control.tick.problem_arrays import Dynamics
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.robots import State
 

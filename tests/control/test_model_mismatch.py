@@ -1,4 +1,4 @@
-"""What a controller believes of (7), judged by Pinocchio's own dynamics of another model and by what the plan does."""
+"""What a controller assumes of (7), judged by Pinocchio's own dynamics of another model and by what the plan does."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.control import Belief, build_qp
+from floatbase.control import ModelMismatch, build_qp
 from floatbase.qp import solve
 
 ROUNDING = 1e-9  # relative, of sums of forces of some 100 N
@@ -19,11 +19,11 @@ def moving(seed: int = 3) -> fb.State:
     return state.replace(v=np.random.default_rng(seed).normal(size=state.robot.nv))
 
 
-def solved(belief: Belief, state: fb.State, **options: object) -> tuple[fb.EquationsOfMotion, dict[str, np.ndarray]]:
+def solved(mismatch: ModelMismatch, state: fb.State, **options: object) -> tuple[fb.EquationsOfMotion, dict[str, np.ndarray]]:
     robot, contacts = state.robot, judges.stance(state.robot)
-    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), belief=belief, **options)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), mismatch=mismatch, **options)
     command = controller(state.q, state.v)
-    assert command.path == "readable"
+    assert command.backend == "reference"
     return fb.equations_of_motion(state, contacts), {"qdd": command.qdd, "tau": command.tau, "forces": command.forces.ravel()}
 
 
@@ -34,38 +34,42 @@ def test_mass_and_the_parts_of_h_are_those_of_another_model(seed: int) -> None:
     heavy, data = state.robot.model.copy(), state.robot.model.createData()
     for i, inertia in enumerate(state.robot.model.inertias):
         heavy.inertias[i] = pin.Inertia(1.3 * inertia.mass, inertia.lever, 1.3 * inertia.inertia)
-    believed = Belief(mass=1.3).equations(eom)
+    assumed = ModelMismatch(mass=1.3).assumed_equations(eom)
     M = pin.crba(heavy, data, state.q)
     M = np.triu(M) + np.triu(M, 1).T
     h = pin.nonLinearEffects(heavy, heavy.createData(), state.q, state.v)
-    assert np.allclose(believed.M, M, rtol=0.0, atol=ROUNDING * np.abs(M).max())
-    assert np.allclose(believed.h, h, rtol=0.0, atol=ROUNDING * np.abs(h).max())
+    assert np.allclose(assumed.M, M, rtol=0.0, atol=ROUNDING * np.abs(M).max())
+    assert np.allclose(assumed.h, h, rtol=0.0, atol=ROUNDING * np.abs(h).max())
     weightless = state.robot.model.copy()
     weightless.gravity = pin.Motion.Zero()
     velocity = pin.nonLinearEffects(weightless, weightless.createData(), state.q, state.v)
-    assert np.allclose(Belief(gravity=False).equations(eom).h, velocity, rtol=0.0, atol=ROUNDING * np.abs(h).max())
+    assert np.allclose(
+        ModelMismatch(gravity=False).assumed_equations(eom).h, velocity, rtol=0.0, atol=ROUNDING * np.abs(h).max()
+    )
     still = pin.computeGeneralizedGravity(state.robot.model, state.robot.model.createData(), state.q)
-    assert np.allclose(Belief(velocity_forces=False).equations(eom).h, still, rtol=0.0, atol=ROUNDING * np.abs(h).max())
+    assert np.allclose(
+        ModelMismatch(velocity_forces=False).assumed_equations(eom).h, still, rtol=0.0, atol=ROUNDING * np.abs(h).max()
+    )
 
 
 def test_the_truth_is_the_default_and_changes_nothing() -> None:
     state = moving()
     controller = judges.controller_of("go2")
-    assert controller.problem.belief.is_true
+    assert controller.problem.mismatch.is_exact
     qp = controller.qp(state)
     again = build_qp(fb.equations_of_motion(state, controller.contacts), controller.tasks, controller.limits)
     assert all(np.array_equal(getattr(qp, part), getattr(again, part)) for part in ("H", "g", "A", "b", "G", "h"))
-    assert controller.path == "compiled" and not Belief(drift=False).is_true
+    assert controller.backend == "compiled" and not ModelMismatch(drift=False).is_exact
 
 
 def test_a_forgotten_drift_plans_contacts_that_accelerate_by_it() -> None:
-    eom, x = solved(Belief(drift=False), moving())
+    eom, x = solved(ModelMismatch(drift=False), moving())
     assert np.allclose(eom.A @ x["qdd"], 0.0, atol=1e-8)
     assert np.abs(eom.b).max() > 0.1  # m/s²: there was something to forget
 
 
-def test_an_unfelt_contact_pushes_nobody_in_the_plan() -> None:
-    eom, x = solved(Belief(unfelt=["FR_foot"]), moving())
+def test_an_ignored_contact_pushes_nobody_in_the_plan() -> None:
+    eom, x = solved(ModelMismatch(ignored_contacts=["FR_foot"]), moving())
     part = eom.contacts.force_slice("FR_foot")
     others = np.array(x["forces"])
     others[part] = 0.0
@@ -73,7 +77,7 @@ def test_an_unfelt_contact_pushes_nobody_in_the_plan() -> None:
 
 
 def test_without_the_zeros_of_s_the_joints_obey_and_the_base_need_not() -> None:
-    eom, x = solved(Belief(underactuated=False), moving())
+    eom, x = solved(ModelMismatch(underactuated=False), moving())
     missing, _ = eom.residual(x["qdd"], x["tau"], x["forces"])
     assert np.allclose(missing[6:], 0.0, atol=1e-6)
     assert np.linalg.norm(missing[:3]) > 0.5 * eom.robot.weight, "motors of the base should carry it: torques cost"
@@ -84,20 +88,20 @@ def test_without_cones_feet_pull() -> None:
     state, contacts = robot.standing(), judges.stance(robot)
     tasks = [fb.CoMTask(state.com, acceleration=down), *fb.standing_tasks(state)[1:]]
     normals = {
-        believed: fb.WholeBodyController(robot, contacts, tasks, belief=Belief(cones=believed))(
+        assumed: fb.WholeBodyController(robot, contacts, tasks, mismatch=ModelMismatch(cones=assumed))(
             state.q, state.v
         ).forces.reshape(-1, 3)[:, 2]
-        for believed in (True, False)
+        for assumed in (True, False)
     }
     assert normals[True].min() > -1e-6
     assert normals[False].sum() == pytest.approx(robot.mass * (9.81 - 30.0), rel=0.2)
 
 
-def test_a_belief_survives_a_change_of_stance_and_a_walk() -> None:
-    robot, belief = judges.load("go2"), Belief(mass=1.1)
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), belief=belief)
+def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
+    robot, mismatch = judges.load("go2"), ModelMismatch(mass=1.1)
+    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), mismatch=mismatch)
     lifted = controller.replace(contacts=controller.contacts.without("FL_foot"))
-    assert lifted.problem.belief is belief and lifted.path == "readable" and "belief" in lifted.path_reason
+    assert lifted.problem.mismatch is mismatch and lifted.backend == "reference" and "mismatch" in lifted.backend_reason
     state = robot.standing()
     qp = lifted.qp(state)
     tau, forces = solve(qp)["tau"], solve(qp)["forces"]

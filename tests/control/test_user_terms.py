@@ -1,4 +1,4 @@
-"""Tasks and constraints of one's own: the same answers on both paths, and the words for what is wrong with them."""
+"""Tasks and constraints of one's own: the same answers on both backends, and the words for what is wrong with them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import Rows
+from floatbase.control import LinearInequality
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint, PointContact, RollingWheel
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.robots import Robot, State
@@ -89,11 +89,11 @@ def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: st
     others = [*fb.standing_tasks(at)[1:], fb.ForceTask(weight=1e-4)]
     own = [MyCoM(at.com), others[0], MyHand(frame, hand), *others[1:]]
     moving = fb.FrameTask(frame, lambda t: (hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]), weight=7.0)
-    known = fb.WholeBodyController(robot, contacts, [fb.CoMTask(at.com), moving, *others], path="compiled")
-    compiled, readable = judges.pair(robot, contacts, own)
+    known = fb.WholeBodyController(robot, contacts, [fb.CoMTask(at.com), moving, *others], backend="compiled")
+    compiled, reference = judges.pair(robot, contacts, own)
     active = 0
     for i, state in enumerate(judges.near_and_far(name, 8)):
-        assert judges.difference(compiled, readable, state, 0.1 * i) < judges.agreement(robot)
+        assert judges.difference(compiled, reference, state, 0.1 * i) < judges.agreement(robot)
         assert judges.difference(compiled, known, state, 0.1 * i) < judges.agreement(robot)
         active += len(known(state.q, state.v).active)
     assert active > 8, "nothing was saturated: these states try nothing"
@@ -126,7 +126,9 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
     robot = judges.load(name)
     seen: list[EquationsOfMotion] = []
     contacts, frame = judges.stance(robot), robot.model.frames[robot.model.nframes - 1].name
-    controller = fb.WholeBodyController(robot, contacts, [*fb.standing_tasks(robot.standing()), Looks(seen)], path="compiled")
+    controller = fb.WholeBodyController(
+        robot, contacts, [*fb.standing_tasks(robot.standing()), Looks(seen)], backend="compiled"
+    )
     states = judges.states(name, 5)  # more than the spare memory of a robot
     seen.clear()
     for state in states:
@@ -177,9 +179,9 @@ def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> No
 def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
     robot = judges.load("go2")
     task = Looks([], rows=0)
-    compiled, readable = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task])
+    compiled, reference = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task])
     for task.rows in (0, 3, 1, 400, 2):
-        assert judges.difference(compiled, readable, robot.random_state(task.rows, 0.1)) < judges.agreement(robot)
+        assert judges.difference(compiled, reference, robot.random_state(task.rows, 0.1)) < judges.agreement(robot)
 
 
 def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -> None:
@@ -193,12 +195,12 @@ def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -
             return np.eye(18)[6:7], pull
 
     drive = Drive("drive", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
-    rows = Rows("push", "forces", lambda eom, t: (np.eye(eom.k)[2:3], [slider["bound"]]))
-    options = {"rows": [rows], "max_normal_force": {"FL_foot": lambda t: slider["bound"]}}
+    inequality = LinearInequality("push", "forces", lambda eom, t: (np.eye(eom.k)[2:3], [slider["bound"]]))
+    options = {"inequalities": [inequality], "max_normal_force": {"FL_foot": lambda t: slider["bound"]}}
     contacts = judges.stance(robot).without("FR_foot") + fb.Contacts([drive])
     controller, _ = judges.pair(robot, contacts, [task, *fb.standing_tasks(robot.standing())], **options)
     command = controller(robot.standing().q, np.zeros(18))
-    assert command.path == "compiled"
+    assert command.backend == "compiled"
     slider.update(bound=7.0)
     pull[:] = 50.0
     task.target, task.weight = task.target + 1.0, 3.0
@@ -209,7 +211,7 @@ def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -
 
 def test_threads_may_share_a_controller_with_tasks_of_their_own_and_a_task_may_ask_another_controller() -> None:
     robot, states = judges.load("go2"), judges.states("go2", 40, 0.1)
-    inner = judges.controller_of("go2", path="compiled")
+    inner = judges.controller_of("go2", backend="compiled")
 
     class Nested(MyCoM):
         def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
@@ -254,12 +256,12 @@ def _fail() -> object:
         (_fail, RuntimeError, ("the sensor is gone",)),
     ],
 )
-def test_a_task_that_goes_wrong_is_told_on_both_paths(
+def test_a_task_that_goes_wrong_is_told_on_both_backends(
     later: Callable[[], object], kind: type[Exception], named: tuple[str | float, ...]
 ) -> None:
     robot = judges.load("go2")
     for controller in judges.pair(robot, judges.stance(robot), [_Wrong(later)]):
-        assert controller(robot.standing().q, np.zeros(18)).path == controller.path
+        assert controller(robot.standing().q, np.zeros(18)).backend == controller.backend
         with raises(kind, *named):
             controller(robot.standing().q, np.zeros(18), 1.0)
 
@@ -268,16 +270,16 @@ def test_nothing_is_compiled_when_tasks_contacts_or_rows_change() -> None:
     from numba.core import event
 
     robot = judges.load("go2")
-    controller = judges.controller_of("go2", path="compiled")
+    controller = judges.controller_of("go2", backend="compiled")
     state, at = robot.random_state(1, 0.1), robot.standing()
     feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot", "RR_foot"])
     with event.install_recorder("numba:compile") as recorder:
         for contacts in (feet, feet + fb.Contacts([LinearConstraint("hold", 2, lambda s, t: (np.eye(18)[6:8], np.zeros(2)))])):
             for tasks in (fb.standing_tasks(at), [MyCoM(at.com)], [MyCoM(at.com), MyHand("FL_foot", at.point("FL_foot"))]):
-                for rows in ((), [Rows("push", "tau", (np.eye(12), np.full(12, 20.0)))]):
-                    limits = replace(controller.limits, rows=rows, max_normal_force={"FR_foot": 90.0})
+                for rows in ((), [LinearInequality("push", "tau", (np.eye(12), np.full(12, 20.0)))]):
+                    limits = replace(controller.limits, inequalities=rows, max_normal_force={"FR_foot": 90.0})
                     other = controller.replace(contacts=contacts, tasks=tasks, limits=limits)
-                    assert other(state.q, state.v).path == "compiled"
+                    assert other(state.q, state.v).backend == "compiled"
     assert not recorder.buffer
 
 
@@ -310,9 +312,9 @@ def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> No
     robot = judges.load(name)
     feet = judges.stance(robot)
     for contacts in (feet + hold(robot, [7, 9]), hold(robot, [8]) + feet, hold(robot, [6, 7, 8])):
-        compiled, readable = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())))
+        compiled, reference = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())))
         for i, state in enumerate(judges.near_and_far(name, 3)):
-            assert judges.difference(compiled, readable, state, 0.2 * i) < judges.agreement(robot)
+            assert judges.difference(compiled, reference, state, 0.2 * i) < judges.agreement(robot)
             with np.errstate(all="ignore"):
                 try:
                     command = compiled(state.q, state.v, 0.2 * i)
@@ -322,15 +324,15 @@ def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> No
             assert max(np.max(np.abs(r)) for r in eom.residual(command.qdd, command.tau, command.forces)) < 1e-6
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_a_constraint_of_ones_own_is_asked_once_in_a_tick(path: str) -> None:
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_a_constraint_of_ones_own_is_asked_once_in_a_tick(backend: str) -> None:
     robot = judges.load("go2")
     asked: list[float] = []
     held = LinearConstraint("held", 1, lambda state, t: asked.append(t) or (np.eye(18)[6:7], np.zeros(1)))
     contacts = judges.stance(robot) + fb.Contacts([held])
-    controller = fb.WholeBodyController(robot, contacts, list(fb.standing_tasks(robot.standing())), path=path)
+    controller = fb.WholeBodyController(robot, contacts, list(fb.standing_tasks(robot.standing())), backend=backend)
     asked.clear()
-    assert controller(robot.standing().q, np.zeros(18), 0.3).path == path
+    assert controller(robot.standing().q, np.zeros(18), 0.3).backend == backend
     assert asked == [0.3]
 
 
@@ -377,8 +379,8 @@ def test_contacts_of_ones_own_may_write_into_the_same_arrays_again() -> None:
             assert judges.difference(controller, known, state) < judges.agreement(robot)
 
 
-@pytest.mark.parametrize("path", ["compiled", "readable"])
-def test_a_contact_of_ones_own_whose_shapes_do_not_fit_together_is_told_so(path: str) -> None:
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_a_contact_of_ones_own_whose_shapes_do_not_fit_together_is_told_so(backend: str) -> None:
     class Short(PointContact):
         def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
             A, b = super().constraint(state, t)
@@ -386,7 +388,7 @@ def test_a_contact_of_ones_own_whose_shapes_do_not_fit_together_is_told_so(path:
 
     robot = judges.load("go2")
     with raises(InputError, "A", "b", "J", "FL_foot", 2, 3, 18):
-        fb.WholeBodyController(robot, fb.Contacts([Short("FL_foot")]), [], path=path)
+        fb.WholeBodyController(robot, fb.Contacts([Short("FL_foot")]), [], backend=backend)
 
 
 def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones() -> None:
