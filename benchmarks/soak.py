@@ -35,7 +35,7 @@ import floatbase as fb
 from floatbase.behaviours import Gait, Walk
 from floatbase.control import LinearInequality
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.simulation import Live
+from floatbase.simulation import LiveSimulation
 
 # how much may stay in all: MB, because the allocator keeps freed memory for later; and a connection that is being closed
 LIMITS = {"memory, MB": 8.0, "threads": 1.0, "descriptors": 2.0}
@@ -134,7 +134,7 @@ def walking() -> Soak:
     walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot))
     rng, paces = np.random.default_rng(0), list[float]()
     with closing(fb.Viewer(robot)) as view:
-        run = Live(fb.Simulation(robot), walk, lambda record: view.show(record.final, record.contacts, record.measured[-1]))
+        run = LiveSimulation(fb.Simulation(robot), walk, lambda record: view.show(record.final, record.contacts, record.measured[-1]))
 
         def step() -> None:
             walk.velocity, walk.yaw_rate = rng.uniform([-0.1, -0.1], [0.4, 0.1]), rng.uniform(-0.3, 0.3)

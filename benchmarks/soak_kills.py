@@ -33,7 +33,7 @@ def marked(i):
     time.sleep(0.01)
     return i / 7
 
-fb.sweep(marked, {{"i": list(range({POINTS}))}}, to="rows.jsonl", workers=2, progress=False)
+fb.sweep(marked, {{"i": list(range({POINTS}))}}, file="rows.jsonl", workers=2, progress=False)
 """
 LESSONS = 4
 CELLS = 100  # of a lesson: so many that a kill may fall into the writing of a file

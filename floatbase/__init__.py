@@ -13,7 +13,7 @@ Robots        catalogue, load, load_urdf, Robot, State
 Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accelerations_from_torques (14), feasible_space (13)
 Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask, TorqueTask, standing_tasks
 Control       WholeBodyController (26)(27), QP, solve
-Simulation    Simulation, Ground, Push, rollout, Rollout, sweep, push_rose
+Simulation    Simulation, Ground, Push, rollout, Rollout, sweep, push_recovery
 Walking       from floatbase.behaviours import Gait, Walk, Stand
 Pictures      Viewer
 Errors        FloatbaseError, InfeasibleError
@@ -50,7 +50,7 @@ from floatbase.qp import QP, solve
 from floatbase.robots import Robot, State, catalogue, load, load_urdf
 
 if TYPE_CHECKING:
-    from floatbase.simulation import Ground, Push, Rollout, Simulation, push_rose, rollout, sweep
+    from floatbase.simulation import Ground, Push, Rollout, Simulation, push_recovery, rollout, sweep
     from floatbase.viewer import Viewer
 
 __version__ = "0.2.0"
@@ -62,7 +62,7 @@ _LAZY = {
     "Rollout": "floatbase.simulation",
     "Simulation": "floatbase.simulation",
     "Viewer": "floatbase.viewer",
-    "push_rose": "floatbase.simulation",
+    "push_recovery": "floatbase.simulation",
     "rollout": "floatbase.simulation",
     "sweep": "floatbase.simulation",
 }
@@ -95,7 +95,7 @@ __all__ = [
     "forces_from_torques",
     "load",
     "load_urdf",
-    "push_rose",
+    "push_recovery",
     "rollout",
     "solve",
     "standing_tasks",

@@ -30,7 +30,7 @@ from floatbase.errors import FloatbaseError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.lessons import ConstantTorques
 from floatbase.qp import table_top
-from floatbase.simulation import AlteredSimulation, Live
+from floatbase.simulation import LiveSimulation, PerturbedSimulation
 from floatbase.viewer import plots, programs, recording
 
 ROOMS = (
@@ -66,7 +66,7 @@ CHECKS: dict[str, tuple[Callable[[Any], object], set[str]]] = {
     "matrix": (lambda x: fb.Quadratic(x, UP), set()),
     "direction": (lambda x: FrictionCone(x, 0.7), set()),
     "forces": (lambda x: values()["Contacts"].force_of(x, "FL_foot"), set()),
-    "function": (lambda x: Live(fb.Simulation(judges.load("go2")), controller(), x), set()),
+    "function": (lambda x: LiveSimulation(fb.Simulation(judges.load("go2")), controller(), x), set()),
     "value": (lambda x: fb.State(x, values()["State"].q), set()),
 }
 
@@ -90,12 +90,12 @@ def right() -> dict[str, Any]:
     view, qp = fb.Viewer(robot), values()["QP"]
     forces = 30.0 * np.tile(UP, 4)
     return values() | {
-        "Simulation": sim, "AlteredSimulation": AlteredSimulation(robot), "Viewer": view, "WholeBodyController": controller(),
-        "Live": Live(sim, controller(), lambda record: None), "HydraulicActuators": oil, "Cylinders": oil.cylinders,
+        "Simulation": sim, "PerturbedSimulation": PerturbedSimulation(robot), "Viewer": view, "WholeBodyController": controller(),
+        "LiveSimulation": LiveSimulation(sim, controller(), lambda record: None), "HydraulicActuators": oil, "Cylinders": oil.cylinders,
         "AnalyticController": AnalyticController(robot, contacts, state), "Delay": Delay(robot, 0.01), "Walk": walk,
         "FirstOrderLag": FirstOrderLag(robot, 10.0), "Stand": Stand(robot, fb.Contacts.feet(robot)), "Gait": gait,
         "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
-        "ConstantTorques": ConstantTorques(ZERO), "Controller": controller(), "Step": walk.history[0],
+        "ConstantTorques": ConstantTorques(ZERO), "Controller": controller(), "StepPlan": walk.history[0],
         "bool": True, "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None, "Array": UP,
         "npt.ArrayLike": UP, "Target": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
         "Sequence[Task]": controller().tasks, "Sequence[Contact]": tuple(contacts), "Sequence[str]": ["a", "b"],
@@ -112,7 +112,7 @@ def right() -> dict[str, Any]:
         "f": fb.Affine(np.eye(12), ZERO), "residual": fb.Affine(np.eye(12), ZERO), "parts": fb.Affine(np.eye(12), ZERO),
         "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind, "programs.allowed.qp": table_top(),
         "programs.plot.qp": table_top(), "block": "tau", "pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))],
-        "LIPM.com": np.zeros(2), "place": np.zeros(2), "neutral_point.velocity": np.zeros(2), "dcm_error": np.zeros(2),
+        "LIPM.com": np.zeros(2), "nominal_foothold": np.zeros(2), "neutral_point.velocity": np.zeros(2), "dcm_error": np.zeros(2),
         "point": np.zeros(2), "support_margin.feet": np.eye(2), "places": np.zeros((2, 3)), "time": (0.0, 0.1),
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3, "alpha": 0.1, "rate": 30.0,
@@ -127,7 +127,7 @@ def right() -> dict[str, Any]:
 # what only the package makes
 RESULTS = """
     EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorquesFromForces Pose
-    Power Robot PushRose Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation HydraulicState
+    Power Robot PushRecovery Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live"),
@@ -135,9 +135,9 @@ LEFT_OUT = {
         "reveal", "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
-        "Simulation.advance", "AlteredSimulation.advance",
+        "Simulation.advance", "PerturbedSimulation.advance",
         "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
-        "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian", "below_the_body",
+        "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian", "raibert_foothold",
         "target_shapes", "targets_at",
         "QP.objective", "ModelMismatch.assumed_qp", "ModelMismatch.check_names",
         "LinearInequality.labels", "LinearInequality.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
@@ -153,9 +153,9 @@ LEFT_OUT = {
             for method in ("positions", "jacobian", "constraint", "force_generator_matrix", "slip")),
     ),
     "moves a control that is there, with tests of its own": ("Viewer.move",),
-    "ends what other calls need": ("Viewer.close", "Live.close"),
-    "starts processes, with tests of its own": ("sweep", "push_rose", "Table.read"),
-    "starts a thread": ("Live.push", "Live.soon", "Live.start", "Live.reset"),
+    "ends what other calls need": ("Viewer.close", "LiveSimulation.close"),
+    "starts processes, with tests of its own": ("sweep", "push_recovery", "Table.read"),
+    "starts a thread": ("LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start", "LiveSimulation.reset"),
 }  # fmt: skip
 ALONE = {name for names in LEFT_OUT.values() for name in names}
 

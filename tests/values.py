@@ -16,7 +16,7 @@ from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_f
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torques_from_forces
 from floatbase.qp import active_set, table_top
-from floatbase.simulation import PushRose, Table, World
+from floatbase.simulation import Perturbation, PushRecovery, Table
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -61,8 +61,8 @@ def values() -> dict[str, Any]:
         "PowerBalance": hydraulic.cylinders.power(np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)),
         "bias forces": bias_forces(state), "contact space": contact_space(eom), "drive": moving_frame("base", np.zeros_like),
         "LinearInequality": LinearInequality("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
-        "PushRose": PushRose(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
+        "PushRecovery": PushRecovery(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
         "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan, "Gains": Gains(),
-        "ModelMismatch": ModelMismatch(mass=1.2), "World": World(mass=1.2),
+        "ModelMismatch": ModelMismatch(mass=1.2), "Perturbation": Perturbation(mass=1.2),
         "turning view": view_from_rotating_frame([0.0, 0.1], UP, UP),
     }  # fmt: skip

@@ -4,12 +4,23 @@ from floatbase.behaviours.footholds import capture_point, neutral_point, step_ad
 from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains
+from floatbase.behaviours.orientation import pitch_and_yaw
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing
-from floatbase.behaviours.turning import pitch_and_yaw
-from floatbase.behaviours.walk import Step, Walk, below_the_body
+from floatbase.behaviours.walk import StepPlan, Walk, raibert_foothold
 
 __all__ = [
-    "LIPM", "Gains", "Gait", "Stand", "Step", "Swing", "Walk", "below_the_body", "capture_point", "neutral_point",
-    "pitch_and_yaw", "step_adjustment", "support_margin",
+    "LIPM",
+    "Gains",
+    "Gait",
+    "Stand",
+    "StepPlan",
+    "Swing",
+    "Walk",
+    "capture_point",
+    "neutral_point",
+    "pitch_and_yaw",
+    "raibert_foothold",
+    "step_adjustment",
+    "support_margin",
 ]  # fmt: skip

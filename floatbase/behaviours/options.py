@@ -29,28 +29,28 @@ class Gains(Value):
             object.__setattr__(self, name, gains)
 
     @staticmethod
-    def of(contacts: Contacts) -> Gains:
+    def for_contacts(contacts: Contacts) -> Gains:
         """Gains that go with point feet or with flat feet."""
-        flat = flat_among(as_instance("contacts", contacts, Contacts))
+        flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
         return Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
 
 
-def flat_among(contacts: Contacts) -> set[str]:
+def flat_foot_names(contacts: Contacts) -> set[str]:
     """Names of the flat feet."""
     return {contact.name for contact in contacts if isinstance(contact, FlatFootContact)}
 
 
-def check_options(kind: str, options: Iterable[str]) -> None:
-    """Raise `InputError` for an option that `WholeBodyController` does not have. kind: of behaviour."""
-    has = [name for name in inspect.signature(WholeBodyController).parameters if name not in ("robot", "contacts", "tasks")]
+def check_options(behaviour: str, options: Iterable[str]) -> None:
+    """Raise `InputError` for an option that `WholeBodyController` does not have. behaviour: name of the class."""
+    known = [name for name in inspect.signature(WholeBodyController).parameters if name not in ("robot", "contacts", "tasks")]
     for name in options:
-        if name not in has:
+        if name not in known:
             raise InputError(
-                f"{kind} has no option {name!r}; beside its own, it takes those of the controller: {', '.join(has)}."
+                f"{behaviour} has no option {name!r}; beside its own, it takes those of the controller: {', '.join(known)}."
             )
 
 
-def check_feet(gait: Gait, contacts: Contacts) -> None:
+def check_gait_feet(gait: Gait, contacts: Contacts) -> None:
     """Raise `InputError` for a gait that lifts what is no contact."""
     for foot in gait.feet:
         if foot not in contacts.names:

@@ -16,28 +16,28 @@ class Swing(Value):
     """A foot's path from start to end, at rest at both: minimum jerk, and a bump of `height` upwards.
 
     start, end: (3,), m, world.
-    lift, land: s, when it begins and ends.
+    lift_off, touchdown: s, when it begins and ends.
     height: m, of the bump, half-way.
 
-    It may be aimed elsewhere at every tick, by `towards`. Raises `InputError` for numbers that do not fit.
+    It may be aimed elsewhere at every tick, by `with_end`. Raises `InputError` for numbers that do not fit.
     """
 
     start: Array
     end: Array
-    lift: float
-    land: float
+    lift_off: float
+    touchdown: float
     height: float = 0.05
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", as_array("start", self.start, (3,), "m"))
         object.__setattr__(self, "end", as_array("end", self.end, (3,), "m"))
-        for name in ("lift", "land"):
+        for name in ("lift_off", "touchdown"):
             object.__setattr__(self, name, as_number(name, getattr(self, name), "s"))
         object.__setattr__(self, "height", as_positive("height", self.height, "m", allow_zero=True))
-        if not self.land > self.lift:
-            raise InputError(f"the foot lifts at {self.lift:g} s and lands at {self.land:g} s; it must land later.")
+        if not self.touchdown > self.lift_off:
+            raise InputError(f"the foot lifts at {self.lift_off:g} s and lands at {self.touchdown:g} s; it must land later.")
 
-    def towards(self, end: npt.ArrayLike) -> Swing:
+    def with_end(self, end: npt.ArrayLike) -> Swing:
         """The same path to another end, (3,), m, world; cheap enough for the loop."""
         other = object.__new__(Swing)
         vars(other).update(vars(self), end=as_array("end", end, (3,), "m"))
@@ -48,11 +48,11 @@ class Swing(Value):
 
         With u from 0 to 1: start + (end - start) (10 u³ - 15 u⁴ + 6 u⁵), and 64 u³ (1 - u)³ height upwards.
         """
-        T = self.land - self.lift
-        u = min(max((as_number("t", t, "s") - self.lift) / T, 0.0), 1.0)
+        T = self.touchdown - self.lift_off
+        u = min(max((as_number("t", t, "s") - self.lift_off) / T, 0.0), 1.0)
         w = u * (1.0 - u)
-        along = (u**3 * (10.0 - 15.0 * u + 6.0 * u * u), 30.0 * w * w / T, 60.0 * w * (1.0 - 2.0 * u) / T**2)
-        bump = (64.0 * w**3, 192.0 * w * w * (1.0 - 2.0 * u) / T, 384.0 * w * (1.0 - 5.0 * w) / T**2)
-        way, up = self.end - self.start, np.array([0.0, 0.0, self.height])
-        x, v, a = (s * way + b * up for s, b in zip(along, bump, strict=True))
+        path_derivatives = (u**3 * (10.0 - 15.0 * u + 6.0 * u * u), 30.0 * w * w / T, 60.0 * w * (1.0 - 2.0 * u) / T**2)
+        height_derivatives = (64.0 * w**3, 192.0 * w * w * (1.0 - 2.0 * u) / T, 384.0 * w * (1.0 - 5.0 * w) / T**2)
+        displacement, up = self.end - self.start, np.array([0.0, 0.0, self.height])
+        x, v, a = (s * displacement + b * up for s, b in zip(path_derivatives, height_derivatives, strict=True))
         return read_only(self.start + x), read_only(v), read_only(a)

@@ -15,7 +15,7 @@ import ipywidgets as widgets
 
 from floatbase.errors import FloatbaseError
 from floatbase.lessons.stops import DIRECTIONS, computed, recorded_pushes
-from floatbase.simulation import SEEN, Controller, Live, Rollout, Simulation, advice
+from floatbase.simulation import PUSH_DISPLAY_TIME, Controller, LiveSimulation, Rollout, Simulation, status_message
 from floatbase.viewer import Viewer, hear_at_once, published, push_at, with_image
 
 _NARROW = "min(340px, 100% - 4px)"  # width below which nothing of a slider is left but its name and its number
@@ -151,19 +151,19 @@ def _shown(slider: widgets.FloatSlider) -> float:
 # pushes -----------------------------------------------------------------------------------------------------------------
 
 
-def live(sim: Simulation, controller: Controller, view: Viewer, **options: Any) -> Live:
+def live(sim: Simulation, controller: Controller, view: Viewer, **options: Any) -> LiveSimulation:
     """A run in the background that draws itself into `view`; a push stays as an arrow for half a second.
 
-    options: as for `Live`. Nothing moves before `start`.
+    options: as for `LiveSimulation`. Nothing moves before `start`.
     """
 
     def show(record: Rollout) -> None:
-        view.show(record.final, contacts=record.contacts, forces=record.measured[-1], push=push_at(record, -1, SEEN))
+        view.show(record.final, contacts=record.contacts, forces=record.measured[-1], push=push_at(record, -1, PUSH_DISPLAY_TIME))
 
-    return Live(sim, controller, show, **options)
+    return LiveSimulation(sim, controller, show, **options)
 
 
-def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
+def push_panel(run: LiveSimulation, view: Viewer, most: float = 60.0) -> widgets.VBox:
     """The live picture with a handle to push the robot in any horizontal direction, for 0.1 s at a time.
 
     run: as `live` returns it, paused at first. view: what it draws itself into; give it a `Viewer` of its own, since the
@@ -177,7 +177,7 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
     force = _slider("push [N]", -most, 0.0, most, 5.0, wait=True)
     towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0, wait=True)
     speed = _slider("slow motion [×]", 0.05, 1.0, 1.0, 0.05, wait=False)
-    speed.observe(lambda change: run.slow_motion(change["new"]), names="value")
+    speed.observe(lambda change: run.set_time_scale(change["new"]), names="value")
     line = _Line(run)
 
     def push(_: Any = None) -> None:
@@ -214,7 +214,7 @@ def push_panel(run: Live, view: Viewer, most: float = 60.0) -> widgets.VBox:
 class _PushPanel(widgets.VBox):
     """A live picture with what pushes its robot, as `push_panel` makes it."""
 
-    def __init__(self, run: Live, view: Viewer, most: float, rows: Sequence[widgets.Widget]):
+    def __init__(self, run: LiveSimulation, view: Viewer, most: float, rows: Sequence[widgets.Widget]):
         super().__init__([view.widget(), *rows])
         self._run, self._view, self._most = run, view, most
 
@@ -228,7 +228,7 @@ class _PushPanel(widgets.VBox):
 class _Line(widgets.Label):
     """What a run does: its status, or what was last done to it while it runs. Told from the kernel's thread and the run's."""
 
-    def __init__(self, run: Live):
+    def __init__(self, run: LiveSimulation):
         super().__init__(value=run.status)
         self._run, self._news, self._telling = run, "", threading.Lock()
 
@@ -237,7 +237,7 @@ class _Line(widgets.Label):
         with self._telling:  # the status is read in here, so that the last line is never about an earlier one
             self._news = self._news if news is None else news
             status = self._run.status
-            self.value = self._news if status == "running" and self._news else advice(status)
+            self.value = self._news if status == "running" and self._news else status_message(status)
 
 
 def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:

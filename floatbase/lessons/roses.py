@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 
 from floatbase._validation import as_string
 from floatbase.errors import InputError
-from floatbase.simulation import PushRose, Simulation, push_rose
+from floatbase.simulation import PushRecovery, Simulation, push_recovery
 from floatbase.viewer import Picture, roses
 
 _FILE = Path(__file__).with_name("roses.json")
@@ -29,7 +29,7 @@ _STEP, _DURATION = 5.0, 0.1  # N, s
 _WATCH = 1.5  # s after a push, in which who stands on the spot has fallen; a lesson with steps says `ROSE_WATCH`, more
 
 
-def measured_rose(lesson: str) -> PushRose:
+def measured_rose(lesson: str) -> PushRecovery:
     """The rose of that lesson's controller, such as "05", or of a second one, "09 standing", as it was measured last.
 
     Raises `InputError` for a lesson without one.
@@ -40,7 +40,7 @@ def measured_rose(lesson: str) -> PushRose:
     controller = rose_controller(lesson)()
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     start = Simulation(controller.robot).state
-    return PushRose(angles, np.array(kept[lesson]), _STEP, _DURATION, "base", start, controller.contacts)
+    return PushRecovery(angles, np.array(kept[lesson]), _STEP, _DURATION, "base", start, controller.contacts)
 
 
 def plot_roses(lesson: str, axis: Axes | None = None) -> Axes:
@@ -69,10 +69,10 @@ def rose_controller(lesson: str) -> Callable[[], Any]:
     return make
 
 
-def measure_rose(lesson: str) -> PushRose:
+def measure_rose(lesson: str) -> PushRecovery:
     """Measure the rose of that lesson and keep it."""
     make, watch = rose_controller(lesson), getattr(_package(lesson), "ROSE_WATCH", _WATCH)
-    rose = push_rose(make, directions=_DIRECTIONS, step=_STEP, duration=_DURATION, watch=watch)
+    rose = push_recovery(make, directions=_DIRECTIONS, resolution=_STEP, duration=_DURATION, observation_time=watch)
     kept = {**_kept(), lesson: rose.pushes.tolist()}
     lines = [f"{json.dumps(name)}: {json.dumps(kept[name])}" for name in sorted(kept)]
     _FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
@@ -84,7 +84,7 @@ def _package(lesson: str) -> ModuleType:
     return import_module(f"floatbase.lessons.lesson{lesson.partition(' ')[0]}")
 
 
-def _before(lesson: str) -> PushRose | None:
+def _before(lesson: str) -> PushRecovery | None:
     """The lesson's own second rose, else the rose of the lesson before, if there is one."""
     if " " in lesson:
         return None

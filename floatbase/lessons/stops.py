@@ -133,7 +133,7 @@ def _pushed(sim: Simulation, controller: Controller, force: float, towards: floa
     sim.reset()
     angle = math.radians(towards)
     push = Push(np.array([force * math.cos(angle), force * math.sin(angle), 0.0]), _START, 0.1)
-    record = rollout(sim, controller, _START + _SEEN, [push], settle=0.5)
+    record = rollout(sim, controller, _START + _SEEN, [push], settling_time=0.5)
     sim.reset()
     return record
 

@@ -190,7 +190,7 @@ def _travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
     if len(normals) < len(session.sim.point_names) or min(float(force.min()) for force in normals.values()) < _LOADED:
         judge.memory.clear()
         return "A foot was lifted: it begins anew."
-    places, rolled = record.foot_positions, record.rolled()
+    places, rolled = record.foot_positions, record.rolling_displacement()
     slid = judge.memory.get("slid", np.zeros(places.shape[1:])) + (places - rolled)[-1] - (places - rolled)[0]
     judge.memory["slid"] = slid
     start = judge.memory.setdefault("places", np.array(places[0]))

@@ -10,7 +10,7 @@ class Term(NamedTuple):
 
     name: in `Settings.believed_off` and `Settings.true_off`. symbol: as it is written over the picture.
     believed, true: the names of its switches on the page; "" for none.
-    belief, world: the options of `ModelMismatch` and of `World` that switch it; "" where that takes more than a flag.
+    belief, world: the options of `ModelMismatch` and of `Perturbation` that switch it; "" where that takes more than a flag.
     """
 
     name: str

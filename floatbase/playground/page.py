@@ -20,7 +20,7 @@ from floatbase.playground.session import PERIOD, Session
 from floatbase.playground.settings import Settings
 from floatbase.playground.terms import arrows
 from floatbase.robots import Robot
-from floatbase.simulation import GOES_ON, SEEN, Live, advice
+from floatbase.simulation import ACTIVE_STATUSES, PUSH_DISPLAY_TIME, LiveSimulation, status_message
 from floatbase.viewer import Picture, published, push_at
 
 _STILL = "The playground needs the live lesson: here its robot stands still."
@@ -65,7 +65,7 @@ class Playground:
         self._lock = threading.Lock()  # over what is requested
         self._drawing = threading.Lock()  # the run draws, and so does who pauses it
         session = self.session
-        self.run = Live(
+        self.run = LiveSimulation(
             session.sim, session.controller, self._show, control_period=PERIOD, actuators=session.actuators,
             after_reset=self._restart,
         )  # fmt: skip
@@ -118,11 +118,11 @@ class Playground:
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
-        if not self.run.moves:
+        if not self.run.is_simulating:
             self.run.close()  # its last slice may still go on
             self._take_over()
         elif not waiting:
-            self.run.soon(self._take_over)
+            self.run.call_soon(self._take_over)
 
     def nod(self, size: float) -> None:
         """Let the base describe an ellipse in pitch and yaw; one under way keeps its phase. size: rad, half its width."""
@@ -139,7 +139,7 @@ class Playground:
         """Set everything as it was at first, the push, the speed and what is shown too, and put the robot back on its feet."""
         self.force, self.towards, self._last_push = self._gentle, 0.0, None
         self.shown |= {term: term in _SHOWN for term in SYMBOLS}
-        self.run.slow_motion(1.0)
+        self.run.set_time_scale(1.0)
         self._panel.follow_looks(1.0)
         self._restart_with(self._first if self.card is None else self.card.start)
 
@@ -147,7 +147,7 @@ class Playground:
         """Put the robot back on its feet under these settings."""
         with self._lock:
             self._requested = {}
-        self.run.soon(lambda: self._begin(settings))
+        self.run.call_soon(lambda: self._begin(settings))
         self.run.reset()
 
     def _begin(self, settings: Settings) -> None:
@@ -170,7 +170,7 @@ class Playground:
 
     def _hand_over(self) -> None:
         session = self.session
-        self.run.use(session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD)
+        self.run.set_controller(session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD)
         self.view.stand_on(session.sim.ground)  # the true one, whatever the controller believes
         if self.view.painter.facets not in (None, session.settings.facets):
             self.view.painter = self.view.painter.replace(facets=session.settings.facets)
@@ -208,9 +208,9 @@ class Playground:
 
     def _tell(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
-        self.outcome = "" if status == "running" else advice(status)
+        self.outcome = "" if status == "running" else status_message(status)
         judge = self.judge
-        if judge is not None and status not in GOES_ON:
+        if judge is not None and status not in ACTIVE_STATUSES:
             judge.ended(status, self.session)
             self._write()
         self._draw_again()
@@ -245,7 +245,7 @@ class Playground:
             gait = f", {session.settings.gait}" if session.settings.gait else ""
             headline = f"{self.robot.name}{gait}, {now:.1f} s{pace}, control every {1e3 * PERIOD:g} ms"
             self.view.show(
-                record.final, record.contacts, record.measured[-1], _planned(record), push=push_at(record, -1, SEEN),
+                record.final, record.contacts, record.measured[-1], _planned(record), push=push_at(record, -1, PUSH_DISPLAY_TIME),
                 cones=self.shown["cones"], arrows=self.shown["forces"], support=True, extra=self._extra(record),
                 title="\n".join(filter(None, [headline, self.outcome, session.note])),
             )  # fmt: skip

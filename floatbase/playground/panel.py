@@ -39,7 +39,7 @@ class Panel:
         view.button("reset", self._play.run.reset)
         view.button("push", self._play.push)
         view.button("all as at first", self._play.undo)
-        view.slider("speed", self._play.run.slow_motion, 1.0, 0.05, 1.0, 0.05)
+        view.slider("speed", self._play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
         view.slider("push [N]", partial(setattr, self._play, "force"), self._play.force, 0.0, _HARDEST * weight, 1.0)
         view.slider("towards [°]", partial(setattr, self._play, "towards"), self._play.towards, -180.0, 180.0, 5.0)
         if not self._play.robot.is_floating:

@@ -19,7 +19,7 @@ from floatbase.control import Command, ModelMismatch
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.playground.settings import Settings
 from floatbase.robots import Robot, State
-from floatbase.simulation import Actuators, AlteredSimulation, Controller, World
+from floatbase.simulation import Actuators, Controller, Perturbation, PerturbedSimulation
 
 PERIOD = 4e-3  # s between ticks: go2's reference QP takes 1.5 ms, so that half of the time is left for physics and pictures
 _NOD_RATE = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
@@ -37,7 +37,7 @@ class BaseMotors:
     mismatch: the controller's; the truth by default.
     """
 
-    def __init__(self, controller: Controller, sim: AlteredSimulation, mismatch: ModelMismatch | None = None):
+    def __init__(self, controller: Controller, sim: PerturbedSimulation, mismatch: ModelMismatch | None = None):
         self.controller, self.sim, self.mismatch = controller, sim, ModelMismatch() if mismatch is None else mismatch
 
     @property
@@ -79,7 +79,7 @@ def nodding(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callabl
 
 
 _NAMES: dict[str, Any] = {
-    "fb": fb, "AlteredSimulation": AlteredSimulation, "World": World, "ModelMismatch": ModelMismatch, "FirstOrderLag": FirstOrderLag,
+    "fb": fb, "PerturbedSimulation": PerturbedSimulation, "Perturbation": Perturbation, "ModelMismatch": ModelMismatch, "FirstOrderLag": FirstOrderLag,
     "Gait": Gait, "Stand": Stand, "Walk": Walk, "BaseMotors": BaseMotors, "nodding": nodding,
 }  # fmt: skip
 
@@ -105,7 +105,7 @@ class Session:
         """A world on the true ground, with the robot standing in it."""
         names = _NAMES | {"robot": self.robot}
         world = eval(self.settings.world(self.robot), names)
-        self.sim: AlteredSimulation = AlteredSimulation(self.robot, eval(self.settings.ground(), names), world=world)
+        self.sim: PerturbedSimulation = PerturbedSimulation(self.robot, eval(self.settings.ground(), names), perturbation=world)
         self._ground = self.settings.slope[1]
         self.home = self.sim.state
         self._make_actuators()
@@ -154,8 +154,8 @@ class Session:
             self.last = None
             self._make_world()
             return
-        world: World = eval(now.world(self.robot), _NAMES | {"robot": self.robot})
-        self.sim.world = replace(world, friction=now.friction[1])
+        world: Perturbation = eval(now.world(self.robot), _NAMES | {"robot": self.robot})
+        self.sim.perturbation = replace(world, friction=now.friction[1])
         if now.bandwidth[1] != before.bandwidth[1]:
             self._make_actuators()
 

@@ -75,16 +75,16 @@ class Settings(Value):
         return f"{mu:g}" if slope == 0.0 else f"fb.Ground({mu:g}, normal={_normal(slope)})"
 
     def world(self, robot: Robot) -> str:
-        """An expression for the world of an `AlteredSimulation`."""
+        """An expression for the world of a `PerturbedSimulation`."""
         off, parts = self.true_off, []
         if self.mass[1] != 1.0:
             parts.append(f"mass={self.mass[1]:g}")
         parts += [f"{term.world}=False" for term in EQUATION if term.world and term.name in off]
         if "forces" in off:
-            parts.append(f"untouched={list(Contacts.feet(robot)[self.leg].point_names)}")
+            parts.append(f"disabled_contacts={list(Contacts.feet(robot)[self.leg].point_names)}")
         if "cones" in off:
-            parts.append(f"magnets={robot.weight:.0f}")
-        return f"World({', '.join(parts)})"
+            parts.append(f"adhesion_force={robot.weight:.0f}")
+        return f"Perturbation({', '.join(parts)})"
 
     def belief(self) -> str:
         """An expression for what the controller believes; "" for the truth."""
@@ -101,7 +101,7 @@ class Settings(Value):
         if self.is_plain:
             lines = [f"sim = fb.Simulation(robot, {self.ground()})"]
         else:
-            lines = [f"sim = AlteredSimulation(robot, {self.ground()}, world={self.world(robot)})"]
+            lines = [f"sim = PerturbedSimulation(robot, {self.ground()}, perturbation={self.world(robot)})"]
         return [*lines, "state = sim.state", *self.actuators_lines()]
 
     def actuators_lines(self) -> list[str]:
@@ -187,7 +187,7 @@ _IMPORTS = (
     (("Gait", "Walk", "Stand("), "from floatbase.behaviours import Gait, Stand, Walk"),
     (("ModelMismatch",), "from floatbase.control import ModelMismatch"),
     (("BaseMotors", "nodding"), "from floatbase.playground import BaseMotors, nodding"),
-    (("Altered",), "from floatbase.simulation import AlteredSimulation, World"),
+    (("Perturbed",), "from floatbase.simulation import Perturbation, PerturbedSimulation"),
 )
 
 

@@ -20,19 +20,19 @@ from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
 from floatbase.simulation.conversion import rotation_matrix
-from floatbase.simulation.shapes import link_hulls
+from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
 _IMPEDANCE_RATIO = 100.0  # friction as stiff as the normal force: feet creep less under a steady load
-_CONTACT_TIME = 0.004  # s, time constant of a critically damped contact: four of the default timesteps; two is the least
+_CONTACT_TIME_CONSTANT = 0.004  # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
-_LANDING_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
-_RISING_TIME = 0.2  # s in which a link comes out that was in the ground before it touched
-_CORNER_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
-LINK = "hull of"  # so begin the names of the links' geoms
-_SMALLEST_BALL = 1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
-_SMALLEST_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
-_ROUNDING = 1e-9  # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for rounding
+_IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
+_PENETRATION_RECOVERY_TIME = 0.2  # s in which a link comes out that was in the ground before it touched
+_CORNER_BALL_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
+HULL_PREFIX = "hull of"  # so begin the names of the links' geoms
+_MIN_BALL_RADIUS = 1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+_MIN_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
+_RELATIVE_ROUNDING = 1e-9  # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +52,10 @@ class Ground(Value):
 
     def __post_init__(self) -> None:
         normals, offsets = as_half_spaces("the ground", self.normal, self.offset)
-        one = np.ndim(self.normal) == 1
+        single_plane = np.ndim(self.normal) == 1
         object.__setattr__(self, "mu", as_positive("friction coefficient mu of the ground", self.mu))
-        object.__setattr__(self, "normal", normals[0] if one else normals)
-        object.__setattr__(self, "offset", float(offsets[0]) if one else offsets)
+        object.__setattr__(self, "normal", normals[0] if single_plane else normals)
+        object.__setattr__(self, "offset", float(offsets[0]) if single_plane else offsets)
 
     @property
     def normals(self) -> Array:
@@ -72,19 +72,19 @@ class Ground(Value):
         return np.asarray(points) @ self.normals.T - self.offsets
 
 
-def build_model(robot: Robot, ground: Ground, timestep: float, links: bool = False) -> mujoco.MjModel:
+def build_model(robot: Robot, ground: Ground, timestep: float, link_collisions: bool = False) -> mujoco.MjModel:
     """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact points, motors as joints.
 
-    links: whether the ground touches the links' hulls, too. Raises `SimulationError` when MuJoCo cannot build it.
+    link_collisions: whether the ground touches the links' hulls, too. Raises `SimulationError` when MuJoCo cannot build it.
     """
-    spec = _urdf_without_shapes(robot)
+    spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = _IMPEDANCE_RATIO
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     contact = spec.default.geom
     contact.condim, contact.friction = 3, [ground.mu, 0.0, 0.0]  # no resistance to spinning or rolling
-    contact.solref, contact.solimp = [_CONTACT_TIME, 1.0], _CONTACT_IMPEDANCE
+    contact.solref, contact.solimp = [_CONTACT_TIME_CONSTANT, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
     for name, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
@@ -101,9 +101,9 @@ def build_model(robot: Robot, ground: Ground, timestep: float, links: bool = Fal
         plane.size[2] = 0.05  # MuJoCo wants one, and does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
-        _add_foot(spec, foot, feet.point_names)
-    if links:
-        _add_links(spec, robot)
+        _add_foot_balls(spec, foot, feet.point_names)
+    if link_collisions:
+        _add_link_hulls(spec, robot)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -121,14 +121,14 @@ def body_name(link: str) -> str:
     return "world of the robot" if link == "world" else link
 
 
-def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
+def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
     """The URDF as MuJoCo reads it, welded links fused into one body."""
     root = ElementTree.fromstring(robot.urdf)
     if robot.is_floating:
         for link in root.findall("link"):
             link.set("name", body_name(link.get("name", "")))
-        for end in (*root.findall("joint/parent"), *root.findall("joint/child")):
-            end.set("link", body_name(end.get("link", "")))
+        for joint_end in (*root.findall("joint/parent"), *root.findall("joint/child")):
+            joint_end.set("link", body_name(joint_end.get("link", "")))
     for link in root.findall("link"):
         for shape in link.findall("visual") + link.findall("collision"):
             link.remove(shape)
@@ -138,73 +138,73 @@ def _urdf_without_shapes(robot: Robot) -> mujoco.MjSpec:
         raise SimulationError(f"MuJoCo cannot read {robot.name}: {error}") from None
     spec.compiler.fusestatic, spec.compiler.discardvisual = True, False
     bodies = spec.bodies[1:]  # the first is the world
-    totals = {body.name: _fused(body) for body in bodies if body.joints or (robot.is_floating and body.parent.name == "world")}
-    wrong = [body for body in bodies if body.name in totals and not _can_move(totals[body.name])]
-    if wrong:
-        raise SimulationError(_impossible(robot, wrong, totals[wrong[0].name]))
+    inertias = {body.name: _fused_inertia(body) for body in bodies if body.joints or (robot.is_floating and body.parent.name == "world")}
+    inconsistent = [body for body in bodies if body.name in inertias and not _is_physically_consistent(inertias[body.name])]
+    if inconsistent:
+        raise SimulationError(_inertia_error(robot, inconsistent, inertias[inconsistent[0].name]))
     for body in bodies:
-        total = totals.get(body.name, pin.Inertia.Zero())
-        tensor, body.explicitinertial = total.inertia, body.name in totals
-        body.mass, body.ipos, body.iquat = total.mass, total.lever, [1.0, 0.0, 0.0, 0.0]
+        inertia = inertias.get(body.name, pin.Inertia.Zero())
+        tensor, body.explicitinertial = inertia.inertia, body.name in inertias
+        body.mass, body.ipos, body.iquat = inertia.mass, inertia.lever, [1.0, 0.0, 0.0, 0.0]
         diagonal = tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]  # MuJoCo's word for none
         body.fullinertia = [*diagonal, tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return spec
 
 
-def _fused(body: mujoco.MjsBody) -> pin.Inertia:
+def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
     """The inertia of a body and of all that is welded to it from below, in its own frame, as the URDF gives it."""
-    total = pin.Inertia.Zero()  # the constructor refuses tensors that are not positive definite, and a sum may mend them
+    inertia = pin.Inertia.Zero()  # the constructor refuses tensors that are not positive definite, and a sum may mend them
     if body.explicitinertial:  # else the URDF gives none
         ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(body.fullinertia)  # MuJoCo notes NaN for a tensor of zeros
         R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
         tensor = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
-        total.mass, total.lever, total.inertia = float(body.mass), np.array(body.ipos), tensor
+        inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), tensor
     for child in body.bodies:
         if not child.joints:
-            total = total + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(_fused(child))
-    return total
+            inertia = inertia + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(_fused_inertia(child))
+    return inertia
 
 
-def _can_move(total: pin.Inertia) -> bool:
+def _is_physically_consistent(inertia: pin.Inertia) -> bool:
     """Whether some mass distribution has this inertia; none at all does not count."""
-    smallest, middle, largest = np.linalg.eigvalsh(total.inertia)
-    return bool(total.mass > 0.0 and smallest > _SMALLEST_INERTIA and smallest + middle >= largest * (1.0 - _ROUNDING))
+    smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
+    return bool(inertia.mass > 0.0 and smallest > _MIN_INERTIA and smallest + middle >= largest * (1.0 - _RELATIVE_ROUNDING))
 
 
-def _impossible(robot: Robot, wrong: Sequence[mujoco.MjsBody], total: pin.Inertia) -> str:
-    """What to say of bodies that MuJoCo cannot move; total: the inertia of the first."""
-    smallest, middle, largest = np.linalg.eigvalsh(total.inertia)
-    others = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
-    joints = [joint.name for body in wrong for joint in body.joints]
+def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.Inertia) -> str:
+    """What to say of bodies that MuJoCo cannot move; inertia: that of the first."""
+    smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
+    others = f" (and {len(bodies) - 1} more)" if len(bodies) > 1 else ""
+    joints = [joint.name for body in bodies for joint in body.joints]
     weld = f", or weld such links to the ones they hang from with locked={joints} of fb.load" if joints else ""
     return (
-        f"MuJoCo cannot move link {wrong[0].name!r} of {robot.name}{others}: with all that is welded to it, it has "
-        f"{total.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} kg m². They must be above "
+        f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}: with all that is welded to it, it has "
+        f"{inertia.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} kg m². They must be above "
         f"zero, and none above the sum of the two others. Correct the URDF{weld}."
     )
 
 
-def _add_foot(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
+def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
     """A ball for each of the foot's contact points, so that the ball's lowest point is the contact point."""
     body = spec.body(body_name(foot.frame))
     if body is None:
         raise SimulationError(f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links.")
     if foot.corners is None:
-        centres, radius = foot.centre[None], max(foot.radius, _SMALLEST_BALL)
+        centres, radius = foot.centre[None], max(foot.radius, _MIN_BALL_RADIUS)
     else:
-        centres, radius = foot.corners + [0.0, 0.0, _CORNER_RADIUS], _CORNER_RADIUS
+        centres, radius = foot.corners + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
         body.add_geom(name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1)
 
 
-def _add_links(spec: mujoco.MjSpec, robot: Robot) -> None:
+def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
     """The hulls of links, without mass: they stop at once where they hit the ground, and come out of it slowly."""
-    time = max(_LANDING_TIME, 4.0 * spec.option.timestep)
-    for number, points in link_hulls(robot):
-        joint = spec.joint(robot.model.names[number])  # the free base's has another name
+    impact_time = max(_IMPACT_TIME, 4.0 * spec.option.timestep)
+    for joint_id, points in link_hulls(robot):
+        joint = spec.joint(robot.model.names[joint_id])  # the free base's has another name
         body = spec.body(body_name(robot.base)) if joint is None else joint.parent
-        mesh = spec.add_mesh(name=f"{LINK} {body.name}", uservert=points.ravel())
+        mesh = spec.add_mesh(name=f"{HULL_PREFIX} {body.name}", uservert=points.ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         hull = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, name=mesh.name, mass=0.0)
         hull.contype, hull.conaffinity, hull.priority = 0, 1, 1
-        hull.solref = [-1.0 / (time * _RISING_TIME), -1.0 / time]  # stiffness and damping for 1 kg, overdamped
+        hull.solref = [-1.0 / (impact_time * _PENETRATION_RECOVERY_TIME), -1.0 / impact_time]  # stiffness and damping for 1 kg, overdamped

@@ -19,45 +19,45 @@ class Conversion:
 
     def __init__(self, robot: Robot, model: mujoco.MjModel):
         self._robot = robot
-        self._floating = 6 if robot.is_floating else 0
-        ids = [model.joint(name).id for name in robot.joint_names]
-        self._qpos, self._qvel = model.jnt_qposadr[ids], model.jnt_dofadr[ids]
-        joints = [robot.model.getJointId(name) for name in robot.joint_names]
-        self._q = np.array(robot.model.idx_qs)[joints]
-        self._unlimited = np.array(robot.model.nqs)[joints] == 2  # Pinocchio stores the angle of such a joint as (cos, sin)
-        self._cos = self._q[self._unlimited]
-        base = [0, 1, 2, 4, 5, 6, 3] if self._floating else []
-        self._q_from = np.array(base + [0] * (robot.nq - len(base)), dtype=int)  # index in qpos of each entry of q
-        self._q_from[self._q] = self._qpos
-        self._q_from[self._cos + 1] = self._qpos[self._unlimited]
-        self._v_from = np.concatenate([np.arange(self._floating), self._qvel])
+        self._n_base = 6 if robot.is_floating else 0
+        mujoco_ids = [model.joint(name).id for name in robot.joint_names]
+        self._qpos_indices, self._qvel_indices = model.jnt_qposadr[mujoco_ids], model.jnt_dofadr[mujoco_ids]
+        joint_ids = [robot.model.getJointId(name) for name in robot.joint_names]
+        self._q_indices = np.array(robot.model.idx_qs)[joint_ids]
+        self._is_continuous = np.array(robot.model.nqs)[joint_ids] == 2  # Pinocchio stores the angle of such a joint as (cos, sin)
+        self._cos_indices = self._q_indices[self._is_continuous]
+        base = [0, 1, 2, 4, 5, 6, 3] if self._n_base else []
+        self._qpos_of_q = np.array(base + [0] * (robot.nq - len(base)), dtype=int)  # index in qpos of each entry of q
+        self._qpos_of_q[self._q_indices] = self._qpos_indices
+        self._qpos_of_q[self._cos_indices + 1] = self._qpos_indices[self._is_continuous]
+        self._qvel_of_v = np.concatenate([np.arange(self._n_base), self._qvel_indices])
 
     def q(self, qpos: Array) -> Array:
         """Our q, shape (nq,), for MuJoCo's qpos."""
-        q = qpos[self._q_from]
-        if self._cos.size:
-            q[self._cos], q[self._cos + 1] = np.cos(q[self._cos]), np.sin(q[self._cos + 1])
+        q = qpos[self._qpos_of_q]
+        if self._cos_indices.size:
+            q[self._cos_indices], q[self._cos_indices + 1] = np.cos(q[self._cos_indices]), np.sin(q[self._cos_indices + 1])
         return q
 
     def v(self, qpos: Array, qvel: Array) -> Array:
         """Our v, shape (nv,), for MuJoCo's qpos and qvel."""
-        v = qvel[self._v_from]
-        if self._floating:
+        v = qvel[self._qvel_of_v]
+        if self._n_base:
             v[:3] = rotation_matrix(qpos[3:7]).T.dot(qvel[:3])
         return v
 
-    def joints(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
+    def joint_state(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
         """Angles (of joints without limits beyond π too), rad or m, and velocities, in the order of τ, shape (d,) each."""
-        return qpos[self._qpos], qvel[self._qvel]
+        return qpos[self._qpos_indices], qvel[self._qvel_indices]
 
     def to_mujoco(self, q: Array, v: Array) -> tuple[Array, Array]:
         """MuJoCo's qpos and qvel for our q and v."""
-        qpos, qvel = np.empty(self._robot.d + (7 if self._floating else 0)), np.empty(self._robot.nv)
-        if self._floating:
+        qpos, qvel = np.empty(self._robot.d + (7 if self._n_base else 0)), np.empty(self._robot.nv)
+        if self._n_base:
             qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
             qvel[:3], qvel[3:6] = rotation_matrix(qpos[3:7]) @ v[:3], v[3:6]
-        qpos[self._qpos], qvel[self._qvel] = q[self._q], v[self._floating :]
-        qpos[self._qpos[self._unlimited]] = np.arctan2(q[self._cos + 1], q[self._cos])
+        qpos[self._qpos_indices], qvel[self._qvel_indices] = q[self._q_indices], v[self._n_base :]
+        qpos[self._qpos_indices[self._is_continuous]] = np.arctan2(q[self._cos_indices + 1], q[self._cos_indices])
         return qpos, qvel
 
 

@@ -44,8 +44,8 @@ class Rollout(Value):
     outcome: why the record ends there, or the controller does: "completed", "fell", "diverged" or "controller failed".
     error: of a controller that failed: the exception it raised, or one that names the NaN or infinite torque it gave.
     stances: the controller's contacts at each row; empty where they were `contacts` throughout.
-    off_at: s, from when on the controller is off, since the robot fell or the controller failed; None in other cases. A rollout
-        that settles has rows from then on: τ_desired is the brakes', planned forces are NaN.
+    controller_off_time: s, from when on the controller is off, since the robot fell or the controller failed; None in other cases. A rollout
+        that settles has rows from then on: τ_desired is that of the joint damping, planned forces are NaN.
     """
 
     robot: Robot
@@ -62,7 +62,7 @@ class Rollout(Value):
     outcome: Outcome
     error: FloatbaseError | None = None
     stances: tuple[Contacts, ...] = ()
-    off_at: float | None = None
+    controller_off_time: float | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -102,33 +102,33 @@ class Rollout(Value):
             row[:] = pin.centerOfMass(model, data, q)
         return read_only(com)
 
-    def slip(self, rolling: bool = True) -> Array:
+    def slip(self, include_rolling: bool = True) -> Array:
         """How far each contact point strayed, at most, from where it began to stand, shape (points,), m.
 
         It stands while the controller's stance has it; 0 where it never did.
 
-        rolling: whether the way that a ball rolls counts, too: its lowest point moves with it, and nothing slides.
+        include_rolling: whether the way that a ball rolls counts, too: its lowest point moves with it, and nothing slides.
         """
         self._check_not_empty()
-        places = self.foot_positions if as_bool("rolling", rolling) else self.foot_positions - self.rolled()
-        farthest, first = np.zeros(places.shape[1]), 0
+        positions = self.foot_positions if as_bool("include_rolling", include_rolling) else self.foot_positions - self.rolling_displacement()
+        max_distance, first = np.zeros(positions.shape[1]), 0
         for contact in self.contacts:
             points = slice(first, first := first + len(contact.point_names))
-            for begin, end in self._standing_times(contact.name):
-                strayed = np.linalg.norm(places[begin:end, points] - places[begin, points], axis=2).max(axis=0)
-                farthest[points] = np.maximum(farthest[points], strayed)
-        return read_only(farthest)
+            for begin, end in self._stance_intervals(contact.name):
+                distance = np.linalg.norm(positions[begin:end, points] - positions[begin, points], axis=2).max(axis=0)
+                max_distance[points] = np.maximum(max_distance[points], distance)
+        return read_only(max_distance)
 
-    def _standing_times(self, contact: str) -> list[tuple[int, int]]:
+    def _stance_intervals(self, contact: str) -> list[tuple[int, int]]:
         """First row, and the row after the last, of each time that the controller's stance has a contact."""
         if not self.stances:
             return [(0, len(self))]
-        has = {stance: contact in stance.names for stance in dict.fromkeys(self.stances)}
-        stands = np.array([False, *(has[stance] for stance in self.stances), False])
-        edges = np.flatnonzero(stands[1:] != stands[:-1])
+        in_stance = {stance: contact in stance.names for stance in dict.fromkeys(self.stances)}
+        active = np.array([False, *(in_stance[stance] for stance in self.stances), False])
+        edges = np.flatnonzero(active[1:] != active[:-1])
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
-    def rolled(self) -> Array:
+    def rolling_displacement(self) -> Array:
         """How far each point's ball has rolled, shape (n, points, 3), m, world: the integral of ω × radius · normal."""
         arms = [
             (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
@@ -153,75 +153,75 @@ class Rollout(Value):
 
 
 class Recorder:
-    """Collects the rows of a rollout that begins in a stance: `before`, `after_step` and `complete` in each tick.
+    """Collects the rows of a rollout that begins in a stance: `before_tick`, `after_step` and `complete_tick` in each tick.
 
     ticks: at most so many rows. substeps: timesteps in each.
     """
 
     def __init__(self, sim: Simulation, stance: Contacts, ticks: int, substeps: int):
-        self._sim, self._first, self._substeps, self._n = sim, stance, substeps, 0
+        self._sim, self._initial_stance, self._substeps, self._n = sim, stance, substeps, 0
         d, points = sim.robot.d, len(sim.point_names)
         self._time, self._q, self._v = np.empty(ticks), np.empty((ticks, sim.robot.nq)), np.empty((ticks, sim.robot.nv))
         self._tau_desired = np.empty((ticks, d))
-        # MuJoCo's own numbers, which `finished` turns into ours, all rows at once
-        self._watch()
-        self._centres, self._steps = np.empty((ticks, points, 3)), 0
-        self._actuators = np.empty((ticks * substeps, sim.model.nu))
-        touching = sim._most_contacts
-        self._touching = np.zeros((ticks * substeps, touching, 2), dtype=np.int32)
-        self._forces = np.zeros((ticks * substeps, 3 * touching))
+        # MuJoCo's own numbers, which `to_rollout` turns into ours, all rows at once
+        self._refresh_views()
+        self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
+        self._step_actuator_forces = np.empty((ticks * substeps, sim.model.nu))
+        max_contacts = sim._max_contacts
+        self._step_contact_geoms = np.zeros((ticks * substeps, max_contacts, 2), dtype=np.int32)
+        self._step_contact_forces = np.zeros((ticks * substeps, 3 * max_contacts))
         self._stances: list[Contacts] = []
-        self._plans = np.empty((ticks, stance.k))
-        self._with_plan: list[int] = []  # the rows of those
+        self._planned_forces = np.empty((ticks, stance.k))
+        self._rows_with_plan: list[int] = []  # the rows of those
 
-    def _watch(self) -> None:
+    def _refresh_views(self) -> None:
         """Views into the memory of MuJoCo's data."""
         self._geom_positions, self._actuator_forces = self._sim.data.geom_xpos, self._sim.data.actuator_force
 
-    def fall(self) -> None:
+    def enable_link_collisions(self) -> None:
         """Go on with links that touch. Timesteps of a tick that was begun and is not completed are forgotten."""
-        self._sim.links = True
-        self._watch()
+        self._sim.link_collisions = True
+        self._refresh_views()
         first = self._n * self._substeps
-        self._touching[first : self._steps] = 0
-        self._forces[first : self._steps] = 0.0
-        self._steps = first
+        self._step_contact_geoms[first : self._n_steps] = 0
+        self._step_contact_forces[first : self._n_steps] = 0.0
+        self._n_steps = first
 
-    def before(self, t: float, q: Array, v: Array) -> None:
-        """Keep clock, state and feet before a tick. They count when `complete` does."""
+    def before_tick(self, t: float, q: Array, v: Array) -> None:
+        """Keep clock, state and feet before a tick. They count when `complete_tick` does."""
         n = self._n
         self._time[n], self._q[n], self._v[n] = t, q, v
-        self._geom_positions.take(self._sim._balls, 0, self._centres[n], "clip")  # "clip": it is the fastest
+        self._geom_positions.take(self._sim._foot_geoms, 0, self._foot_centres[n], "clip")  # "clip": it is the fastest
 
     def after_step(self) -> None:
         """Keep what motors and ground did in a timestep of the tick."""
-        i, (geoms, forces) = self._steps, self._sim._raw_contacts()
-        self._actuators[i] = self._actuator_forces
-        self._touching[i, : len(geoms)], self._forces[i, : forces.size] = geoms, forces
-        self._steps += 1
+        i, (geoms, forces) = self._n_steps, self._sim._raw_contacts()
+        self._step_actuator_forces[i] = self._actuator_forces
+        self._step_contact_geoms[i, : len(geoms)], self._step_contact_forces[i, : forces.size] = geoms, forces
+        self._n_steps += 1
 
-    def complete(self, tau_desired: Array, stance: Contacts, planned: Array | None) -> None:
+    def complete_tick(self, tau_desired: Array, stance: Contacts, planned: Array | None) -> None:
         """Complete the row: the controller's torques (d,), N·m, its stance, and the forces (k,), N, it planned there."""
         n = self._n
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
         if planned is not None:
-            more = planned.size - self._plans.shape[1]
+            more = planned.size - self._planned_forces.shape[1]
             if more > 0:  # a larger stance than any before
-                self._plans = np.pad(self._plans, ((0, 0), (0, more)))
-            self._plans[n, : planned.size] = planned
-            self._with_plan.append(n)
+                self._planned_forces = np.pad(self._planned_forces, ((0, 0), (0, more)))
+            self._planned_forces[n, : planned.size] = planned
+            self._rows_with_plan.append(n)
         self._n += 1
 
-    def finished(
+    def to_rollout(
         self,
         pushes: tuple[Push, ...],
         outcome: Outcome,
         error: FloatbaseError | None = None,
-        off_at: float | None = None,
+        controller_off_time: float | None = None,
     ) -> Rollout:
         """The record. Raises `InputError` where a contact was of one kind in one stance and of another in a later one."""
-        contacts = self._first
+        contacts = self._initial_stance
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
             if contact.name not in contacts.names:
                 contacts += Contacts([contact])
@@ -230,56 +230,56 @@ class Recorder:
                     f"contact {contact.name} had {contacts[contact.name].k} force numbers at first and now has {contact.k}; "
                     "in one rollout it must stay a point, or a flat foot."
                 )
-        measured, positions = self._at_contacts(contacts)
+        measured, positions = self._measured_at(contacts)
         return Rollout(
             self._sim.robot,
             contacts,
-            time=self._kept(self._time),
-            q=self._kept(self._q),
-            v=self._kept(self._v),
-            tau=self._mean(self._sim._torques_of(self._actuators[: self._n * self._substeps])),
-            tau_desired=self._kept(self._tau_desired),
-            planned=self._planned(contacts),
+            time=self._complete_rows(self._time),
+            q=self._complete_rows(self._q),
+            v=self._complete_rows(self._v),
+            tau=self._mean_over_substeps(self._sim._torques_from(self._step_actuator_forces[: self._n * self._substeps])),
+            tau_desired=self._complete_rows(self._tau_desired),
+            planned=self._planned_at(contacts),
             measured=measured,
             foot_positions=positions,
             pushes=pushes,
             outcome=outcome,
             error=error,
             stances=() if all(stance is contacts for stance in self._stances) else tuple(self._stances),
-            off_at=off_at,
+            controller_off_time=controller_off_time,
         )
 
-    def _kept(self, rows: Array) -> Array:
+    def _complete_rows(self, rows: Array) -> Array:
         """The rows that are complete, without a copy."""
         return frozen(rows)[: self._n]
 
-    def _mean(self, steps: Array) -> Array:
+    def _mean_over_substeps(self, steps: Array) -> Array:
         """The means over the timesteps of each row, shape (n, …), of numbers at all timesteps."""
         if self._substeps > 1:
             steps = steps.reshape(self._n, self._substeps, *steps.shape[1:]).sum(axis=1) / self._substeps
         return read_only(steps)
 
-    def _planned(self, contacts: Contacts) -> Array:
+    def _planned_at(self, contacts: Contacts) -> Array:
         """Planned forces at the contacts, shape (n, k)."""
-        forces, numbers = np.full((self._n, contacts.k), np.nan), np.arange(contacts.k)
+        forces, entries_of_all = np.full((self._n, contacts.k), np.nan), np.arange(contacts.k)
         rows: dict[Contacts, list[int]] = {stance: [] for stance in self._stances}
-        for i in self._with_plan:
+        for i in self._rows_with_plan:
             rows[self._stances[i]].append(i)
-        for stance, present in rows.items():
-            entries = [i for name in stance.names for i in numbers[contacts.force_slice(name)]]
-            forces[present] = 0.0
-            forces[np.ix_(present, entries)] = self._plans[present, : stance.k]
+        for stance, stance_rows in rows.items():
+            entries = [i for name in stance.names for i in entries_of_all[contacts.force_slice(name)]]
+            forces[stance_rows] = 0.0
+            forces[np.ix_(stance_rows, entries)] = self._planned_forces[stance_rows, : stance.k]
         return read_only(forces)
 
-    def _at_contacts(self, contacts: Contacts) -> tuple[Array, Array]:
+    def _measured_at(self, contacts: Contacts) -> tuple[Array, Array]:
         """Forces (n, k) and positions (n, points, 3) of the contacts from those of the physics' feet; NaN where it has none.
 
         A point contact in the middle of a flat foot takes the sum of its corners' forces and the mean of their positions.
         """
         sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)
-        measured = self._mean(sim._forces_of(self._touching[steps], self._forces[steps]))
-        lowest = sim._lowest_points(self._centres[:n])
+        measured = self._mean_over_substeps(sim._contact_forces_from(self._step_contact_geoms[steps], self._step_contact_forces[steps]))
+        lowest = sim._lowest_points(self._foot_centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             forces, positions = np.full((n, contact.k), np.nan), np.full((n, len(contact.point_names), 3), np.nan)

@@ -23,13 +23,13 @@ from floatbase._validation import (
 )
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
-from floatbase.simulation.physics import Push, Simulation, acting, pushes_of
+from floatbase.simulation.after_fall import record_settling
+from floatbase.simulation.physics import Push, Simulation, active_pushes, as_pushes
 from floatbase.simulation.record import Outcome, Recorder, Rollout
-from floatbase.simulation.settling import settle as lie_down
 
-_MOST_STEPS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
-_PERIOD_ERROR = 1e-6  # part of a period by which a time may miss a whole number of them: how people round
-_TIME_ERROR = 1e-9  # part of the time by which it may: the rounding of many periods
+_MAX_STEPS = 10**7  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
+_PERIOD_TOLERANCE = 1e-6  # part of a period by which a time may miss a whole number of them: how people round
+_TIME_TOLERANCE = 1e-9  # part of the time by which it may: the rounding of many periods
 
 
 class Controller(Protocol):
@@ -62,7 +62,7 @@ def rollout(
     pushes: Sequence[Push] = (),
     control_period: float | None = None,
     actuators: Actuators | None = None,
-    settle: float = 0.0,
+    settling_time: float = 0.0,
     progress: bool = False,
 ) -> Rollout:
     """Run a controller on the physics from its present state.
@@ -75,8 +75,8 @@ def rollout(
     actuators: what the controller's torques pass through in every timestep, such as `HydraulicActuators`; without it the
         joints get the controller's torques, within the motors' limits. Its memory lasts from one rollout to the next: reset
         it with the simulation.
-    settle: s, a whole number of control periods, for which a robot goes on after a fall or a controller's failure, to lie on
-        the ground in the end: controller and actuators are off, the motors brake, `sim.links` is on. See `Rollout.off_at`.
+    settling_time: s, a whole number of control periods, for which a robot goes on after a fall or a controller's failure, to lie on
+        the ground in the end: controller and actuators are off, the motors damp the joints, `sim.link_collisions` is on. See `Rollout.controller_off_time`.
     progress: whether a bar shows how far it is.
 
     A fall, a divergence of the physics, an error of the package that the controller raises, torques that are no finite numbers
@@ -85,60 +85,60 @@ def rollout(
     for a controller that cannot be called as controller(q, v, t), and for an answer without `.tau`.
     Warns (`SimulationWarning`) where pushes are given and none acts in this rollout.
     """
-    pushes = pushes_of(pushes)
-    _check(sim, controller, pushes, actuators)
+    pushes = as_pushes(pushes)
+    _check_arguments(sim, controller, pushes, actuators)
     period = sim.timestep if control_period is None else control_period
-    substeps = _multiple("control_period", period, "the simulation's timestep", sim.timestep)
-    ticks = _multiple("duration", duration, "the control period", substeps * sim.timestep)
-    more = _multiple("settle", settle, "the control period", substeps * sim.timestep, least=0)
-    steps = (ticks + more) * substeps
-    if steps > _MOST_STEPS:
-        raise InputError(f"duration {duration:g} s has {steps} timesteps; at most {_MOST_STEPS} fit in one record.")
-    idle = _idle(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
-    if idle:
-        warnings.warn(idle, SimulationWarning, stacklevel=2)
-    record = Recorder(sim, _stance(sim, controller), ticks + more, substeps)
+    substeps = _period_count("control_period", period, "the simulation's timestep", sim.timestep)
+    ticks = _period_count("duration", duration, "the control period", substeps * sim.timestep)
+    settling_ticks = _period_count("settling_time", settling_time, "the control period", substeps * sim.timestep, minimum=0)
+    steps = (ticks + settling_ticks) * substeps
+    if steps > _MAX_STEPS:
+        raise InputError(f"duration {duration:g} s has {steps} timesteps; at most {_MAX_STEPS} fit in one record.")
+    warning = _inactive_push_warning(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
+    if warning:
+        warnings.warn(warning, SimulationWarning, stacklevel=2)
+    record = Recorder(sim, _current_stance(sim, controller), ticks + settling_ticks, substeps)
 
     def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
-        off_at = sim.time
-        lie_down(sim, record, _stance(sim, controller), more, substeps, pushes)
-        return record.finished(pushes, outcome, error, off_at)
+        controller_off_time = sim.time
+        record_settling(sim, record, _current_stance(sim, controller), settling_ticks, substeps, pushes)
+        return record.to_rollout(pushes, outcome, error, controller_off_time)
 
     for _ in tqdm(range(ticks), "rollout", unit=" ticks") if as_bool("progress", progress) else range(ticks):
         t, q, v = sim.time, sim.q, sim.v
-        record.before(t, q, v)
+        record.before_tick(t, q, v)
         try:
             command = controller(q, v, t)
-        except FloatbaseError as failure:
-            return end("controller failed", failure)
-        stance = _stance(sim, controller)
+        except FloatbaseError as error:
+            return end("controller failed", error)
+        stance = _current_stance(sim, controller)
         try:
-            desired = _desired(sim, command)
-            planned = _planned(command, stance)
-            _act(sim, desired, substeps, pushes, actuators, record)
-        except _NotFinite as failure:
-            return end("controller failed", failure)
-        record.complete(desired, stance, planned)
+            desired = _desired_torques(sim, command)
+            planned = _planned_forces(command, stance)
+            _run_substeps(sim, desired, substeps, pushes, actuators, record)
+        except _NonFiniteTorques as error:
+            return end("controller failed", error)
+        record.complete_tick(desired, stance, planned)
         if sim.diverged:
-            return record.finished(pushes, "diverged")
+            return record.to_rollout(pushes, "diverged")
         if sim.fallen:
             return end("fell")
-    return record.finished(pushes, "completed")
+    return record.to_rollout(pushes, "completed")
 
 
-def _multiple(name: str, time: float, unit: str, period: float, least: int = 1) -> int:
-    """How many periods, s, make up a time, s: `InputError` where that is no whole number, or less than `least`, 0 or 1."""
-    time = as_positive(name, time, "s", allow_zero=least == 0)
+def _period_count(name: str, time: float, unit: str, period: float, minimum: int = 1) -> int:
+    """How many periods, s, make up a time, s: `InputError` where that is no whole number, or less than `minimum`, 0 or 1."""
+    time = as_positive(name, time, "s", allow_zero=minimum == 0)
     count = round(time / period)
-    if count < least or abs(count * period - time) > _PERIOD_ERROR * period + _TIME_ERROR * time:
+    if count < minimum or abs(count * period - time) > _PERIOD_TOLERANCE * period + _TIME_TOLERANCE * time:
         near = max(count, 1) * period
         raise InputError(f"{name} {time:g} s is not a whole multiple of {unit} {period:g} s; {near:g} s would be.")
     return count
 
 
-def _idle(pushes: tuple[Push, ...], begin: float, end: float) -> str:
+def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -> str:
     """What is said where there are pushes and none acts from begin to end, s: "" where one does."""
-    if not pushes or acting(pushes, begin, end):
+    if not pushes or active_pushes(pushes, begin, end):
         return ""
     first = pushes[0]
     several = f"none of the {len(pushes)} pushes acts: the first" if len(pushes) > 1 else "the push does not act: it"
@@ -150,7 +150,7 @@ def _idle(pushes: tuple[Push, ...], begin: float, end: float) -> str:
     return f"{several} {span}; {what}."
 
 
-def _check(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None) -> None:
+def _check_arguments(sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None) -> None:
     """Raise `InputError` for what is of another kind or of another robot."""
     as_instance("sim", sim, Simulation)
     timestep = sim.model.opt.timestep
@@ -177,17 +177,17 @@ def check_actuators(actuators: Actuators | None) -> None:
         raise InputError(f"actuators must have a method step, as HydraulicActuators have; {short_repr(actuators)} has none.")
 
 
-class _NotFinite(InputError):
+class _NonFiniteTorques(InputError):
     """Torques that are NaN, infinite or no numbers: they end the rollout, other mistakes in a controller are raised."""
 
 
-def _stance(sim: Simulation, controller: Controller) -> Contacts:
+def _current_stance(sim: Simulation, controller: Controller) -> Contacts:
     """The controller's contacts now; all feet when it names none."""
     contacts = getattr(controller, "contacts", None)
     return contacts if isinstance(contacts, Contacts) else sim.feet
 
 
-def _act(
+def _run_substeps(
     sim: Simulation,
     desired: Array,
     substeps: int,
@@ -201,23 +201,23 @@ def _act(
     tau = desired
     for _ in range(substeps):
         if actuators is not None:
-            tau = _torques(sim, "the actuators' torques", actuators.step(desired, *sim.joints, sim.timestep))
+            tau = _as_torques(sim, "the actuators' torques", actuators.step(desired, *sim.joint_state, sim.timestep))
         sim.advance(tau, pushes)
         record.after_step()
 
 
-def _desired(sim: Simulation, command: Any) -> Array:
+def _desired_torques(sim: Simulation, command: Any) -> Array:
     """The torques of a command, shape (d,), N·m."""
     if not hasattr(command, "tau"):
         raise InputError(
             f"a controller must answer with .tau, shape ({sim.robot.d},), N·m, as a Command does; got {command!r}. Any "
             f"object with .tau will do: types.SimpleNamespace(tau=…)."
         )
-    return _torques(sim, "the controller's torques", command.tau)
+    return _as_torques(sim, "the controller's torques", command.tau)
 
 
-def _torques(sim: Simulation, name: str, tau: Any) -> Array:
-    """Torques as an array, shape (d,). Raises `_NotFinite`, or `InputError` for another shape."""
+def _as_torques(sim: Simulation, name: str, tau: Any) -> Array:
+    """Torques as an array, shape (d,). Raises `_NonFiniteTorques`, or `InputError` for another shape."""
     if type(tau) is np.ndarray and tau.dtype.char == "d" and tau.shape == (sim.robot.d,) and np.vdot(tau, tau) <= MAX_MAGNITUDE:
         return tau  # as most of them are
     try:
@@ -227,16 +227,16 @@ def _torques(sim: Simulation, name: str, tau: Any) -> Array:
         if entries.shape != (sim.robot.d,):
             raise
         i = [numeric_copy(x) is not None and abs(float(x)) <= MAX_MAGNITUDE for x in entries].index(False)
-        raise _NotFinite(f"{name} hold {entries[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
+        raise _NonFiniteTorques(f"{name} hold {entries[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s.") from None
 
 
-def _planned(command: Any, stance: Contacts) -> Array | None:
+def _planned_forces(command: Any, stance: Contacts) -> Array | None:
     """A command's forces, shape (k,), N, world, or None where it has none."""
     forces = getattr(command, "forces", None)
     if forces is None:
         return None
-    plain = type(forces) is np.ndarray and forces.dtype.char == "d"  # float64, as most of them are
-    planned = forces if plain else numeric_copy(forces)
+    is_float64 = type(forces) is np.ndarray and forces.dtype.char == "d"  # float64, as most of them are
+    planned = forces if is_float64 else numeric_copy(forces)
     if planned is None:
         raise InputError(f"the controller planned forces that are no numbers: {short_repr(forces)}.")
     if planned.shape != (stance.k,):

@@ -22,14 +22,14 @@ from tqdm.auto import tqdm
 
 from floatbase._validation import signature_error
 from floatbase.errors import InputError, SimulationError
-from floatbase.simulation.table import RESERVED, Row, Store, Table, plain
+from floatbase.simulation.table import RESERVED_NAMES, Row, RowStore, Table, as_json_value
 
-_IDLE = 60.0  # s after which a worker without work ends; the next sweep within them saves its start
-_LOOK = 1.0  # s between a worker's looks whether the program that started it is still there
-_AHEAD = 2  # points handed out for each worker: one that it is at, and the next
-_COMING = 32  # threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
-_CONNECTING = 10.0  # s that a Dask scheduler may take to answer
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1")
+_WORKER_IDLE_TIMEOUT = 60.0  # s after which a worker without work ends; the next sweep within them saves its start
+_PARENT_CHECK_PERIOD = 1.0  # s between a worker's looks whether the program that started it is still there
+_POINTS_PER_WORKER = 2  # points handed out for each worker: one that it is at, and the next
+_MIN_CLUSTER_THREADS = 32  # threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
+_CONNECT_TIMEOUT = 10.0  # s that a Dask scheduler may take to answer
+_SINGLE_THREAD_ENV = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1")
 
 
 def sweep(
@@ -37,7 +37,7 @@ def sweep(
     grid: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
     *,
     setup: Callable[[], Any] | None = None,
-    to: str | Path | None = None,
+    file: str | Path | None = None,
     workers: int | None = None,
     cluster: Any = None,
     progress: bool = True,
@@ -56,14 +56,14 @@ def sweep(
             return {"outcome": run.outcome, "moved": run.com[-1] - run.com[0]}
 
         grid = {"force": [50.0, 100.0, 150.0], "angle": np.linspace(0.0, np.pi, 7)}
-        table = fb.sweep(push, grid, setup=setup, to="pushes.jsonl")
+        table = fb.sweep(push, grid, setup=setup, file="pushes.jsonl")
 
     function: takes the parameters by their names, after what `setup` returned where there is one. It returns a dict, a column
         for each name, or one value, the column "result": numbers, texts, booleans, lists and numpy arrays. An exception makes
         the row's "error", and the sweep goes on.
     grid: name -> values, for all combinations, the last name the fastest; or a list of dicts, one for each point.
     setup: called once in each process (on Dask in each thread), for what is heavy or cannot be sent.
-    to: path of a file that keeps each row as it comes. The same sweep into the same file goes on where it was ended, however
+    file: path of a file that keeps each row as it comes. The same sweep into the same file goes on where it was ended, however
         it was; two points for each worker are lost at most. The function is known by its name: after changing what it does,
         give another file. A file of another function or grid is refused. `Table.read` reads a file.
     workers: how many processes, by default as many as the machine has cores for this program. Each uses one thread for
@@ -77,21 +77,21 @@ def sweep(
     something else or that takes no more, as on a full disc; `SimulationError` when a process or the cluster breaks down; and
     what `setup` raises. What is in the file stays there, after an interrupt too.
     """
-    points = _points(grid)
-    plain_points = [{name: plain(f"parameter {name}", value) for name, value in point.items()} for point in points]
-    name = _name(function, to)
-    _check(function, setup, points)
+    points = _grid_points(grid)
+    json_points = [{name: as_json_value(f"parameter {name}", value) for name, value in point.items()} for point in points]
+    name = _function_name(function, file)
+    _check_function(function, setup, points)
     if cluster is not None and workers is not None:
         raise InputError("workers counts processes on this machine; a cluster has its own. Leave one of the two out.")
-    workers = _workers(workers)
-    job = _job(function, setup)
-    with closing(Store(to, name, plain_points)) as store:
-        open_points = [i for i in range(len(points)) if i not in store.rows]
+    workers = _worker_count(workers)
+    job = _make_job(function, setup)
+    with closing(RowStore(file, name, json_points)) as store:
+        pending = [i for i in range(len(points)) if i not in store.rows]
         failed = sum(row["error"] is not None for row in store.rows.values())
         bar = tqdm(total=len(points), initial=len(store.rows), desc=name, unit="point", disable=not progress)
-        with bar, _engine(workers, cluster, bool(open_points)) as engine:
-            for i, answer in _answers(engine, job, points, open_points):
-                store.add(i, plain_points[i] | answer)
+        with bar, _open_pool(workers, cluster, bool(pending)) as pool:
+            for i, answer in _completed_points(pool, job, points, pending):
+                store.add(i, json_points[i] | answer)
                 failed += answer["error"] is not None
                 if failed:
                     bar.set_postfix(failed=failed, refresh=False)
@@ -106,7 +106,7 @@ class _Job(NamedTuple):
     payload: bytes
 
 
-def _points(grid: Any) -> list[Row]:
+def _grid_points(grid: Any) -> list[Row]:
     """The parameters of every point."""
     if isinstance(grid, Mapping):
         axes = {}
@@ -128,17 +128,17 @@ def _points(grid: Any) -> list[Row]:
     if not points:
         raise InputError("the grid has no points.")
     for name in dict.fromkeys(name for point in points for name in point):
-        if not isinstance(name, str) or name in RESERVED:
-            raise InputError(f"a parameter cannot be called {name!r}; {' and '.join(RESERVED)} are the table's own names.")
+        if not isinstance(name, str) or name in RESERVED_NAMES:
+            raise InputError(f"a parameter cannot be called {name!r}; {' and '.join(RESERVED_NAMES)} are the table's own names.")
     return points
 
 
-def _name(function: Any, to: Any) -> str:
+def _function_name(function: Any, file: Any) -> str:
     """What the function is called in the file and beside the bar."""
     if not callable(function):
         raise InputError(f"sweep needs a function first, not {function!r}.")
     name = getattr(function, "__qualname__", None)
-    if to is not None and (name is None or name.endswith("<lambda>")):
+    if file is not None and (name is None or name.endswith("<lambda>")):
         raise InputError(
             f"a file knows its function by its name, and {function!r} has none: write it as a def, and its constants as "
             "parameters of the grid."
@@ -146,7 +146,7 @@ def _name(function: Any, to: Any) -> str:
     return type(function).__name__ if name is None else name.rpartition("<locals>.")[2]
 
 
-def _check(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
+def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
     """Raise `InputError` for parameters that the function does not take, and for a setup that is no function."""
     if setup is not None and not callable(setup):
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
@@ -156,7 +156,7 @@ def _check(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
             raise InputError(f"the grid gives {'what setup returns, then ' if made else ''}{', '.join(names)}; {fault}.")
 
 
-def _workers(workers: Any) -> int:
+def _worker_count(workers: Any) -> int:
     if workers is None:
         return int(loky.cpu_count())
     if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
@@ -164,7 +164,7 @@ def _workers(workers: Any) -> int:
     return int(workers)
 
 
-def _job(function: Any, setup: Any) -> _Job:
+def _make_job(function: Any, setup: Any) -> _Job:
     try:
         return _Job(uuid.uuid4().hex, cloudpickle.dumps((function, setup)))
     except Exception as error:
@@ -174,38 +174,38 @@ def _job(function: Any, setup: Any) -> _Job:
         ) from error
 
 
-class _Engine(NamedTuple):
+class _Pool(NamedTuple):
     """Who computes: an executor, and how many points it is given at a time; no others are lost when the program is killed."""
 
     executor: Executor
-    window: int
+    max_pending: int
 
 
 @contextmanager
-def _engine(workers: int, cluster: Any, needed: bool) -> Iterator[_Engine | None]:
+def _open_pool(workers: int, cluster: Any, needed: bool) -> Iterator[_Pool | None]:
     """Processes on this machine or the cluster's; what is not done when an exception comes is dropped."""
     if not needed:
         yield None
     elif cluster is None:
         executor = loky.get_reusable_executor(
-            workers, timeout=_IDLE, initializer=_end_with, initargs=(os.getpid(),), env=_ONE_THREAD
+            workers, timeout=_WORKER_IDLE_TIMEOUT, initializer=_exit_with_parent, initargs=(os.getpid(),), env=_SINGLE_THREAD_ENV
         )
         try:
-            yield _Engine(executor, _AHEAD * workers)
+            yield _Pool(executor, _POINTS_PER_WORKER * workers)
         except BaseException:
             executor.shutdown(kill_workers=True)
             raise
     else:
-        with _client(cluster) as client:
+        with _dask_client(cluster) as client:
             executor = client.get_executor(pure=False)
             try:
-                yield _Engine(executor, _AHEAD * max(sum(client.nthreads().values()), _COMING))
+                yield _Pool(executor, _POINTS_PER_WORKER * max(sum(client.nthreads().values()), _MIN_CLUSTER_THREADS))
             finally:
                 executor.shutdown(wait=False)
 
 
 @contextmanager
-def _client(cluster: Any) -> Iterator[Any]:
+def _dask_client(cluster: Any) -> Iterator[Any]:
     """The Dask client that was handed in, or one for an address."""
     try:
         from distributed import Client
@@ -221,7 +221,7 @@ def _client(cluster: Any) -> Iterator[Any]:
         raise InputError(f"cluster must be a dask.distributed.Client or a scheduler's address, not {cluster!r}.")
     try:
         parse_host_port(cluster)
-        client = Client(cluster, timeout=_CONNECTING, set_as_default=False)
+        client = Client(cluster, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
             f"no Dask scheduler answers at {cluster} ({error}). An address looks like tcp://127.0.0.1:8786; "
@@ -231,23 +231,23 @@ def _client(cluster: Any) -> Iterator[Any]:
         yield client
 
 
-def _answers(engine: _Engine | None, job: _Job, points: list[Row], open_points: list[int]) -> Iterator[tuple[int, Row]]:
+def _completed_points(pool: _Pool | None, job: _Job, points: list[Row], pending: list[int]) -> Iterator[tuple[int, Row]]:
     """Number and answer of each open point, as they come."""
-    if engine is None:
+    if pool is None:
         return
-    waiting = iter(open_points)
-    numbers: dict[Future[Row | Exception], int] = {}
+    remaining = iter(pending)
+    indices: dict[Future[Row | Exception], int] = {}
     try:
         while True:
-            for i in itertools.islice(waiting, engine.window - len(numbers)):
-                numbers[engine.executor.submit(_answer, job, points[i])] = i
-            if not numbers:
+            for i in itertools.islice(remaining, pool.max_pending - len(indices)):
+                indices[pool.executor.submit(_run_point, job, points[i])] = i
+            if not indices:
                 return
-            for future in wait(numbers, return_when=FIRST_COMPLETED).done:
-                answer = _came(future)
+            for future in wait(indices, return_when=FIRST_COMPLETED).done:
+                answer = _future_result(future)
                 if isinstance(answer, Exception):
                     raise answer
-                yield numbers.pop(future), answer
+                yield indices.pop(future), answer
     except BrokenExecutor as error:
         raise SimulationError(
             "a worker process ended in the middle of a point: it was out of memory, where fewer workers help, or compiled "
@@ -255,8 +255,8 @@ def _answers(engine: _Engine | None, job: _Job, points: list[Row], open_points: 
         ) from error
 
 
-def _came(future: Future[Row | Exception]) -> Row | Exception:
-    """What `_answer` returned. It raises nothing itself: what is raised is the engine's."""
+def _future_result(future: Future[Row | Exception]) -> Row | Exception:
+    """What `_run_point` returned. It raises nothing itself: what is raised is the engine's."""
     try:
         return future.result()
     except BrokenExecutor:
@@ -265,24 +265,24 @@ def _came(future: Future[Row | Exception]) -> Row | Exception:
         raise SimulationError(f"the cluster broke down at a point ({type(error).__name__}: {error}).") from error
 
 
-_parent: int | None = None  # in a process of this machine: the program that started it
-_here = threading.local()  # of a worker's thread: function and token of the sweep that it works for
+_parent_pid: int | None = None  # in a process of this machine: the program that started it
+_this_thread = threading.local()  # of a worker's thread: function and token of the sweep that it works for
 
 
-def _answer(job: _Job, point: Row) -> Row | Exception:
+def _run_point(job: _Job, point: Row) -> Row | Exception:
     """In a worker: the row's results, or the exception that ends the sweep; raised here, Dask would log it for each point."""
-    _end_without_parent()
+    _exit_if_orphaned()
     try:
-        return _results(job, point)
+        return _evaluate(job, point)
     except Exception as error:
         if not isinstance(error, InputError):
             error.add_note(f"in a worker:\n{traceback.format_exc()}")
         return error
 
 
-def _results(job: _Job, point: Row) -> Row:
+def _evaluate(job: _Job, point: Row) -> Row:
     """What the function returned at a point, in plain values, and "error"."""
-    if getattr(_here, "token", None) != job.token:
+    if getattr(_this_thread, "token", None) != job.token:
         try:
             function, setup = pickle.loads(job.payload)
         except (ImportError, AttributeError) as error:
@@ -290,32 +290,32 @@ def _results(job: _Job, point: Row) -> Row:
                 f"a worker cannot load the function: {error}. The workers must be able to import the module that it is "
                 "from. Functions of a notebook or a script are sent whole, but for those that lru_cache wraps: use setup."
             ) from error
-        _here.function = function if setup is None else partial(function, setup())
-        _here.token = job.token
+        _this_thread.function = function if setup is None else partial(function, setup())
+        _this_thread.token = job.token
     try:
-        answer = _here.function(**point)
+        answer = _this_thread.function(**point)
     except (Exception, SystemExit) as error:  # sys.exit would end the program that sweeps, without a word
         return {"error": f"{type(error).__name__}: {error}"}
     results = answer if isinstance(answer, Mapping) else {"result": answer}
     for name in results:
-        if not isinstance(name, str) or name in RESERVED or name in point:
+        if not isinstance(name, str) or name in RESERVED_NAMES or name in point:
             raise InputError(f"the function's result {name!r} must be called otherwise: a text that names no parameter.")
-    return {name: plain(f"the function's result {name!r}", value) for name, value in results.items()} | {"error": None}
+    return {name: as_json_value(f"the function's result {name!r}", value) for name, value in results.items()} | {"error": None}
 
 
-def _end_with(parent: int) -> None:
+def _exit_with_parent(parent: int) -> None:
     """In a worker: end when the program that started it is gone. One that was killed tells nobody."""
-    global _parent
-    _parent = parent
+    global _parent_pid
+    _parent_pid = parent
 
-    def look() -> None:
+    def watch_parent() -> None:
         while True:
-            time.sleep(_LOOK)
-            _end_without_parent()
+            time.sleep(_PARENT_CHECK_PERIOD)
+            _exit_if_orphaned()
 
-    threading.Thread(target=look, daemon=True).start()
+    threading.Thread(target=watch_parent, daemon=True).start()
 
 
-def _end_without_parent() -> None:
-    if _parent is not None and os.getppid() != _parent:
+def _exit_if_orphaned() -> None:
+    if _parent_pid is not None and os.getppid() != _parent_pid:
         os._exit(1)

@@ -1,4 +1,4 @@
-"""`Table`: what a sweep found, row by row; `Store` keeps it in a file that outlives the sweep."""
+"""`Table`: what a sweep found, row by row; `RowStore` keeps it in a file that outlives the sweep."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from floatbase._validation import Value, cached_property, short_repr
 from floatbase.errors import InputError, unknown_name
 
-RESERVED = ("point", "error")  # names of the store's own
+RESERVED_NAMES = ("point", "error")  # names of the store's own
 Row = dict[str, Any]
 
 
@@ -40,7 +40,7 @@ class Table(Value):
             content = Path(path).read_bytes()
         except OSError as error:
             raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-        rows = _rows_of(path, content)
+        rows = _read_rows(path, content)
         return cls(tuple(rows[i] for i in sorted(rows)))
 
     @cached_property
@@ -88,7 +88,7 @@ class Table(Value):
         return f"Table({len(self)} rows: {', '.join(self.columns)}{failed})"
 
 
-class Store:
+class RowStore:
     """The rows of a sweep, number of the point -> row; with a path, also in a file, to which they are added as they come.
 
     The file is JSON Lines: first a line that says what is swept, then a line for each point that is done. It is locked while
@@ -106,11 +106,11 @@ class Store:
         if path is None:
             return
         if not isinstance(path, str | os.PathLike):
-            raise InputError(f'to must be the path of a file, such as "rows.jsonl", not {short_repr(path)}.')
+            raise InputError(f'file must be the path of a file, such as "rows.jsonl", not {short_repr(path)}.')
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._take_up(path, _head(name, points))
+            self._resume(path, _header(name, points))
         except BlockingIOError:
             self.close()
             raise InputError(f"another sweep is writing to {path}; wait for its end, or give another file.") from None
@@ -138,26 +138,26 @@ class Store:
             os.close(self._file)
             self._file = -1
 
-    def _take_up(self, path: str | Path, head: Row) -> None:
+    def _resume(self, path: str | Path, header: Row) -> None:
         """Read what the file holds, after checking that it is of this sweep; begin it where it is empty."""
         content = Path(path).read_bytes()
-        whole = content[: content.rfind(b"\n") + 1]
-        if not whole and json.dumps(head).encode().startswith(content):
+        complete_lines = content[: content.rfind(b"\n") + 1]
+        if not complete_lines and json.dumps(header).encode().startswith(content):
             os.ftruncate(self._file, 0)
-            self._write(json.dumps(head))
+            self._write(json.dumps(header))
             return
-        found = _head_of(path, content)
+        found = _read_header(path, content)
         for key, what in (("sweep", "the function"), ("parameters", "the parameters"), ("points", "the number of points")):
-            if found[key] != head[key]:
-                raise _other(path, f"of {what} {_said(found[key])}, this sweep has {_said(head[key])}")
-        if found["grid"] != head["grid"]:
-            raise _other(path, "of the same parameters at other values")
-        self.rows = _rows_of(path, whole)
+            if found[key] != header[key]:
+                raise _wrong_file_error(path, f"of {what} {_joined(found[key])}, this sweep has {_joined(header[key])}")
+        if found["grid"] != header["grid"]:
+            raise _wrong_file_error(path, "of the same parameters at other values")
+        self.rows = _read_rows(path, complete_lines)
         for i, row in self.rows.items():
             point = self._points[i] if 0 <= i < len(self._points) else {}
-            if not point or _text({name: row.get(name) for name in point}) != _text(point):
-                raise _other(path, f"where point {i} has other parameters: it was changed by hand")
-        os.ftruncate(self._file, len(whole))
+            if not point or _as_json_text({name: row.get(name) for name in point}) != _as_json_text(point):
+                raise _wrong_file_error(path, f"where point {i} has other parameters: it was changed by hand")
+        os.ftruncate(self._file, len(complete_lines))
 
     def _write(self, line: str) -> None:
         data = line.encode() + b"\n"
@@ -169,7 +169,7 @@ class Store:
             raise InputError(f"{self._path} cannot be written to: {error.strerror}. {again}") from None
 
 
-def plain(what: str, value: Any) -> Any:
+def as_json_value(what: str, value: Any) -> Any:
     """A value as JSON gives it back: numbers, texts, booleans, None, lists and dicts of them; numpy's become Python's.
 
     Raises `InputError` with `what`, a name, for anything else.
@@ -193,27 +193,27 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _head(name: str, points: Sequence[Row]) -> Row:
+def _header(name: str, points: Sequence[Row]) -> Row:
     """The first line of a file: what is swept."""
     parameters = list(dict.fromkeys(name for point in points for name in point))
-    digest = hashlib.sha256("\n".join(_text(point) for point in points).encode()).hexdigest()
+    digest = hashlib.sha256("\n".join(_as_json_text(point) for point in points).encode()).hexdigest()
     return {"sweep": name, "parameters": parameters, "points": len(points), "grid": digest[:16]}
 
 
-def _head_of(path: str | Path, content: bytes) -> Row:
+def _read_header(path: str | Path, content: bytes) -> Row:
     """The first line of a file of a sweep."""
     try:
         found = json.loads(content.split(b"\n", 1)[0])
-        if set(found) == set(_head("", [])):
+        if set(found) == set(_header("", [])):
             return dict(found)
     except (ValueError, TypeError):
         pass
-    raise _other(path, "of no sweep")
+    raise _wrong_file_error(path, "of no sweep")
 
 
-def _rows_of(path: str | Path, content: bytes) -> dict[int, Row]:
+def _read_rows(path: str | Path, content: bytes) -> dict[int, Row]:
     """Number of the point -> row, of all whole lines of a file of a sweep."""
-    _head_of(path, content)
+    _read_header(path, content)
     rows: dict[int, Row] = {}
     for number, line in enumerate(content.split(b"\n")[1:-1], start=2):
         try:
@@ -225,13 +225,13 @@ def _rows_of(path: str | Path, content: bytes) -> dict[int, Row]:
     return rows
 
 
-def _text(row: Row) -> str:
+def _as_json_text(row: Row) -> str:
     return json.dumps(row)
 
 
-def _said(value: Any) -> str:
+def _joined(value: Any) -> str:
     return ", ".join(value) if isinstance(value, list) else str(value)
 
 
-def _other(path: str | Path, what: str) -> InputError:
+def _wrong_file_error(path: str | Path, what: str) -> InputError:
     return InputError(f"{path} is a file {what}; it is left as it is. Give another file, or remove this one.")

@@ -18,7 +18,7 @@ from floatbase.viewer.painter import nice
 from floatbase.viewer.shapes import Item, Picture, label, placed
 
 if TYPE_CHECKING:
-    from floatbase.simulation import PushRose
+    from floatbase.simulation import PushRecovery
 
 _FILL = 0.15  # opacity of what lies inside the measured curve
 _LIFT = 0.004  # m above the ground: no flicker with its lines, no gap to be seen
@@ -27,10 +27,10 @@ _SIDES = 72  # of a ring
 _Curve: TypeAlias = tuple[str, Array, RGB, str]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
 
 
-def plot(rose: PushRose, axis: Axes | None = None, theory: bool = True, before: PushRose | None = None) -> Axes:
+def plot(rose: PushRecovery, axis: Axes | None = None, theory: bool = True, before: PushRecovery | None = None) -> Axes:
     """The largest pushes that were survived, N, over their directions, seen from above: x points up, y to the left.
 
-    rose: the record, as from `fb.push_rose`.
+    rose: the record, as from `fb.push_recovery`.
     axis: polar axes to plot on; None for a new figure.
     theory: whether to draw the curves of the capture point and of a steady push too.
     before: another controller's rose in the same directions, to compare with; drawn in grey.
@@ -40,12 +40,12 @@ def plot(rose: PushRose, axis: Axes | None = None, theory: bool = True, before: 
     return _plot(rose.directions, _curves(rose, theory, before), title, axis)
 
 
-def picture(rose: PushRose, scale: float | None = None, theory: bool = True, before: PushRose | None = None) -> Picture:
+def picture(rose: PushRecovery, scale: float | None = None, theory: bool = True, before: PushRecovery | None = None) -> Picture:
     """The rose on level ground around the robot, with rings for its scale: items for `extra` of `Viewer.show`.
 
         view.show(rose.state, rose.contacts, cones=False, extra=roses.picture(rose))
 
-    rose: the record, as from `fb.push_rose`.
+    rose: the record, as from `fb.push_recovery`.
     scale: length of a drawn push, m/N; None makes its widest curve half as wide again as the stance.
     theory, before: as for `plot`.
     """
@@ -117,7 +117,7 @@ def _picture(directions: Array, curves: list[_Curve], middle: Array, feet: Array
     return items
 
 
-def _curves(rose: PushRose, theory: bool, before: PushRose | None) -> list[_Curve]:
+def _curves(rose: PushRecovery, theory: bool, before: PushRecovery | None) -> list[_Curve]:
     """The measured curve first."""
     curves = [("rose", rose.pushes, MEASURED, "o-")]
     if before is not None:
@@ -125,7 +125,7 @@ def _curves(rose: PushRose, theory: bool, before: PushRose | None) -> list[_Curv
             raise InputError(f"roses of {len(rose.directions)} and {len(before.directions)} directions cannot be compared.")
         curves.append(("before", before.pushes, LIMIT, "o-"))
     if theory:
-        curves += [("capture", rose.capture, CALM, "--"), ("steady", rose.steady, WARNING, ":")]
+        curves += [("capture", rose.capture_point_bound, CALM, "--"), ("steady", rose.static_bound, WARNING, ":")]
     return curves
 
 

@@ -21,7 +21,7 @@ from floatbase._validation import (
     short_repr,
     unit_vector,
 )
-from floatbase.behaviours import Step, Walk
+from floatbase.behaviours import StepPlan, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
@@ -211,7 +211,7 @@ class Viewer(Controls):
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return walks.walking(walk, state, self._look)
 
-    def step(self, step: Step, t: float, state: State) -> Picture:
+    def step(self, step: StepPlan, t: float, state: State) -> Picture:
         """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s. state: of the robot, then."""
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return walks.step(step, t, state, self._look)
@@ -239,7 +239,7 @@ class Viewer(Controls):
         cones: bool = True,
         support: bool = False,
         ghost: State | None = None,
-        steps: Iterable[Step] = (),
+        steps: Iterable[StepPlan] = (),
         follow: bool = True,
         paused: bool = False,
         title: str | None = None,

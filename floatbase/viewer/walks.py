@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array, as_instance, as_number, short_repr
-from floatbase.behaviours import LIPM, Step, Swing, Walk, capture_point
+from floatbase.behaviours import LIPM, StepPlan, Swing, Walk, capture_point
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 from floatbase.viewer import geometry, lowering
@@ -45,30 +45,30 @@ def walking(walk: Walk, state: State, look: Look) -> Picture:
     if as_instance("walk", walk, Walk).plan is None:
         return {}
     assert walk.plan is not None and walk.time is not None
-    turns = {foot: walk.yaw_rate * max(path.land - walk.time, 0.0) for foot, path in walk.swings.items()}
+    turns = {foot: walk.yaw_rate * max(path.touchdown - walk.time, 0.0) for foot, path in walk.swings.items()}
     return _on_ground(walk.plan, walk.time, state, look) | _steps(walk.footholds, walk.swings, turns, state, look.size)
 
 
-def step(step: Step, t: float, state: State, look: Look) -> Picture:
+def step(step: StepPlan, t: float, state: State, look: Look) -> Picture:
     """The same of a stored step, as it was planned when its stance began; the capture point is where it is at time t.
 
     step: an entry of `walk.history`. t: s. state: of the robot, then. look: of the marks.
     """
-    marks = _on_ground(as_instance("step", step, Step).plan, as_number("t", t, "s"), state, look)
+    marks = _on_ground(as_instance("step", step, StepPlan).plan, as_number("t", t, "s"), state, look)
     return marks | _steps(step.footholds, step.swings, {}, state, look.size)
 
 
-def step_at(steps: Sequence[Step], t: float) -> Step | None:
+def step_at(steps: Sequence[StepPlan], t: float) -> StepPlan | None:
     """Of the steps of a walk, in the order of time, the one in which time t, s, lies; None before the first."""
     i = bisect_right(steps, as_number("t", t, "s") + 1e-9, key=lambda step: step.time)
     return steps[i - 1] if i else None
 
 
-def checked_steps(steps: Iterable[Step]) -> list[Step]:
+def checked_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
     """The steps as a list, after checking that they are some."""
     if not isinstance(steps, Iterable):
         raise InputError(f"steps must be those of a Walk, as walk.history, not {short_repr(steps)}.")
-    return [as_instance("a step", step, Step, "one of walk.history") for step in steps]
+    return [as_instance("a step", step, StepPlan, "one of walk.history") for step in steps]
 
 
 def _on_ground(plan: LIPM, t: float, state: State, look: Look) -> Picture:

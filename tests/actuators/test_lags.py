@@ -11,7 +11,7 @@ from waiting import until
 import floatbase as fb
 from floatbase.actuators import Delay, FirstOrderLag
 from floatbase.errors import InputError
-from floatbase.simulation import Live
+from floatbase.simulation import LiveSimulation
 
 ROBOT = judges.load("go2")
 STILL = np.zeros(12)
@@ -109,7 +109,7 @@ def test_go2_stands_live_through_a_lag() -> None:
     sim, controller, lag = fb.Simulation(ROBOT), judges.controller_of("go2"), FirstOrderLag(ROBOT, 20.0)
     lag.reset(controller(sim.q, sim.v).tau)
     records: list[fb.Rollout] = []
-    live = Live(sim, controller, records.append, actuators=lag)
+    live = LiveSimulation(sim, controller, records.append, actuators=lag)
     live.start()
     until(lambda: bool(records))
     live.close()

@@ -24,8 +24,8 @@ def test_a_trot_lifts_diagonal_feet_together(name: str) -> None:
     first, with_it, second, with_that = QUADRUPED[name]
     gait = Gait.trot(judges.load(name), swing=0.25, start=1.0)
     in_the_air = (
-        {foot[:2] for foot in gait.feet if gait.swing_of(foot, 1.1)},
-        {foot[:2] for foot in gait.feet if gait.swing_of(foot, 1.3)},
+        {foot[:2] for foot in gait.feet if gait.swing_at(foot, 1.1)},
+        {foot[:2] for foot in gait.feet if gait.swing_at(foot, 1.3)},
     )
     assert in_the_air == ({first, with_it}, {second, with_that})
     assert len(gait.stance(0.99)) == 4 and gait.stance(1.0) == gait.stance(1.2)
@@ -55,10 +55,10 @@ def test_phases_follow_one_another_and_agree_with_the_stance() -> None:
 
 def test_no_foot_lifts_from_the_stop_on_and_endless_standing_is_cut() -> None:
     gait = Gait({"a": 0.0, "b": 0.5}, 1.0, 0.4, stop=1.2)
-    assert gait.swing_of("a", 1.3) == (1.0, 1.4)  # it was in the air and comes down
-    assert gait.swing_of("b", 1.6) is None and gait.next_swing("a", 1.2) is None
+    assert gait.swing_at("a", 1.3) == (1.0, 1.4)  # it was in the air and comes down
+    assert gait.swing_at("b", 1.6) is None and gait.next_swing("a", 1.2) is None
     assert gait.phases(3.0, 4) == [(3.0, 8.0, ("a", "b"))]
-    assert gait.phases(3.0, 4, longest=1.0) == [(3.0, 4.0, ("a", "b"))]
+    assert gait.phases(3.0, 4, max_duration=1.0) == [(3.0, 4.0, ("a", "b"))]
 
 
 def test_stance_times_bear_the_rounding_of_the_clock() -> None:
@@ -78,7 +78,7 @@ def test_gaits_refuse_what_does_not_fit() -> None:
     refused(lambda: Gait({"a": 1.0}, 0.5, 0.2), InputError, "a", 1)
     refused(lambda: Gait.trot(talos), InputError, "talos", 2, "Gait.walk")
     refused(lambda: Gait.walk(go2), InputError, "go2", 4, "Gait.trot", "Gait.crawl")
-    refused(lambda: Gait.trot(go2).swing_of("FL", 0.0), UnknownNameError, "FL", "FL_foot")
+    refused(lambda: Gait.trot(go2).swing_at("FL", 0.0), UnknownNameError, "FL", "FL_foot")
 
 
 def test_a_swing_leads_from_rest_to_rest_over_its_height() -> None:
@@ -92,7 +92,7 @@ def test_a_swing_leads_from_rest_to_rest_over_its_height() -> None:
     for t in np.linspace(0.31, 0.79, 25):
         (x0, v0, _), (x1, v1, _), (_, v, a) = swing(t - STEP), swing(t + STEP), swing(t)
         assert np.allclose((x1 - x0) / (2 * STEP), v, atol=1e-6) and np.allclose((v1 - v0) / (2 * STEP), a, atol=1e-4)
-    refused(lambda: replace(swing, land=0.3), InputError, 0.3)
+    refused(lambda: replace(swing, touchdown=0.3), InputError, 0.3)
 
 
 def test_the_pendulum_keeps_its_equation_and_ends_on_the_last_zmp() -> None:
@@ -169,14 +169,14 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
         period, start = rng.uniform(0.2, 2.0), rng.uniform(-1.0, 1.0)
         gait = Gait({foot: rng.uniform(0.0, 0.99) for foot in "abcd"}, period, rng.uniform(0.05, 0.9) * period, start, stop=9.0)
         late = start + rng.uniform(0.0, 5.0)
-        after = gait.after(late)
-        assert gait.after(start) is gait and not any(after.swing_of(foot, late - 1e-6) for foot in "abcd")
+        after = gait.starting_at(late)
+        assert gait.starting_at(start) is gait and not any(after.swing_at(foot, late - 1e-6) for foot in "abcd")
         for t in rng.uniform(late, 12.0, 20):
             for foot in "abcd":
-                times, found = gait.swing_of(foot, t), after.swing_of(foot, t)
+                times, found = gait.swing_at(foot, t), after.swing_at(foot, t)
                 if times is None or times[0] < late:
                     assert found is None
                 else:
                     assert found is not None and np.allclose(times, found, atol=1e-9)
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
-    assert gait.after(30 * 0.1).swing_of("a", 3.0) == pytest.approx((3.0, 3.25))  # 30 · 0.1 is not 3: the rounding lifts it
+    assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx((3.0, 3.25))  # 30 · 0.1 is not 3: the rounding lifts it

@@ -17,7 +17,7 @@ import pytest
 from messages import refused
 
 import floatbase as fb
-from floatbase.behaviours import Gains, Gait, Stand, Walk, below_the_body
+from floatbase.behaviours import Gains, Gait, Stand, Walk, raibert_foothold
 from floatbase.errors import InputError
 from floatbase.simulation import Rollout
 
@@ -57,7 +57,7 @@ def test_a_trot_goes_at_the_desired_speed_straight_and_upright() -> None:
     assert np.allclose(speed(record, 2.5, 4.5), [0.3, 0.0], atol=0.01)  # two whole periods
     assert abs(record.com[-1, 1]) < 0.03 and tilt(record) < 0.5
     assert record.measured[:, 2::3].max() < 1.2 * judges.load("go2").weight
-    assert record.slip(rolling=False).max() < 3e-3
+    assert record.slip(include_rolling=False).max() < 3e-3
 
 
 def test_the_momentum_of_a_walk_changes_by_what_the_ground_does() -> None:
@@ -291,7 +291,7 @@ def test_endless_standing_has_an_end_to_plan_for() -> None:
     stand = Stand(robot, fb.Contacts.feet(robot))
     state = robot.standing()
     stand(state.q, state.v, 0.0)
-    assert stand.plan is not None and stand.plan.pieces[-1][1] <= 5.0 + 1e-9
+    assert stand.plan is not None and stand.plan.segments[-1][1] <= 5.0 + 1e-9
     assert np.all(np.isfinite(stand(state.q, state.v, 1e4).tau))
 
 
@@ -417,10 +417,10 @@ def test_a_least_normal_force_bounds_the_ramps() -> None:
 def test_a_foothold_of_ones_own_is_taken() -> None:
     asked = []
 
-    def wider(foot: str, land: float, walk: Walk) -> np.ndarray:
+    def wider(foot: str, touchdown: float, walk: Walk) -> np.ndarray:
         asked.append(foot)
         side = np.sign(walk.robot.standing().point(foot)[1])
-        return below_the_body(foot, land, walk) + [0.0, 0.03 * side]
+        return raibert_foothold(foot, touchdown, walk) + [0.0, 0.03 * side]
 
     walk = walk_of("go2", Gait.trot, foothold=wider)
     record = run(walk, 2.5)
@@ -471,7 +471,7 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         (lambda: Walk(robot, contacts, trot, facets=2), "facets", 2),
         (lambda: Walk(robot, contacts, flying), 0),
         (lambda: Stand(robot, contacts, flying), 0),
-        (lambda: walk.below("FL_foot", 1.0), "Walk"),
+        (lambda: walk.nominal_foothold("FL_foot", 1.0), "Walk"),
         (lambda: Walk(robot, contacts, trot, foothold=lambda foot: np.zeros(2)), "foothold", "foot", "land", "walk"),
         (lambda: setattr(walk, "yaw_rate", np.nan), "yaw_rate", np.nan),
         (lambda: setattr(walk, "velocty", 0.2), "velocty"),

@@ -121,7 +121,7 @@ def test_a_lean_goes_where_it_should_at_its_time() -> None:
 
 
 def test_the_roses_are_of_talos_with_and_without_steps() -> None:
-    assert rose_controller().steps is not None and standing_rose_controller().steps is None
+    assert rose_controller().stepping_gait is not None and standing_rose_controller().stepping_gait is None
     assert rose_controller().robot is standing_rose_controller().robot is TALOS
 
 

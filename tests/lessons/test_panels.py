@@ -13,7 +13,7 @@ from waiting import until
 import floatbase as fb
 from floatbase.lessons import SliderPanel, live, push_panel, slider_panel
 from floatbase.lessons.stops import of_panel
-from floatbase.simulation import Live
+from floatbase.simulation import LiveSimulation
 
 RANGES = [
     (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05), (0, 60, 80, 1.0),
@@ -119,7 +119,7 @@ class Pushed:
         controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
         self.view = fb.Viewer(robot)
         self.sim = fb.Simulation(robot)
-        self.run: Live = live(self.sim, controller, self.view)
+        self.run: LiveSimulation = live(self.sim, controller, self.view)
         _, self.force, row, self.speed, buttons = push_panel(self.run, self.view, most=600.0).children
         self.towards, self.push = row.children
         self.line = buttons.children[-1]

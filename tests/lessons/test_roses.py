@@ -44,7 +44,7 @@ def test_the_former_lesson_is_grey_or_a_second_rose_of_the_same_robot(lesson: st
 
 
 def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> None:
-    assert rose_controller(SECOND)().steps is None is not rose_controller(SECOND.split()[0])().steps
+    assert rose_controller(SECOND)().stepping_gait is None is not rose_controller(SECOND.split()[0])().stepping_gait
     assert len(plot_roses(SECOND).get_lines()) == 1
     plt.close("all")
     with pytest.raises(InputError, match="no controller to push"):

@@ -14,21 +14,21 @@ import pytest
 from waiting import until
 
 import floatbase as fb
-from floatbase.simulation import AlteredSimulation, Live, World
+from floatbase.simulation import LiveSimulation, Perturbation, PerturbedSimulation
 
 DEPTH = 5e-3  # m below the ground, at most: a contact that carries a robot gives by less than a millimetre
 PERIOD = 2e-3
-SETTLE = 2.0  # s
+SETTLING_TIME = 2.0  # s
 SLOW = 0.5  # m/s and rad/s: a leg in the air may still sink against its brakes
 ROW_NAMES = ("time", "q", "v", "tau", "tau_desired", "planned", "measured", "foot_positions")
 
 
-def pushed(name: str, force: float, towards: float, settle: float = SETTLE, sim: fb.Simulation | None = None) -> fb.Rollout:
+def pushed(name: str, force: float, towards: float, settling_time: float = SETTLING_TIME, sim: fb.Simulation | None = None) -> fb.Rollout:
     """A standing robot pushed with a force, N, for 0.1 s; towards: degrees, from forwards to the left."""
     robot, angle = judges.load(name), np.deg2rad(towards)
     push = fb.Push([force * np.cos(angle), force * np.sin(angle), 0.0], start=0.05)
     sim = fb.Simulation(robot) if sim is None else sim
-    return fb.rollout(sim, judges.controller_of(name), 2.0, [push], PERIOD, settle=settle)
+    return fb.rollout(sim, judges.controller_of(name), 2.0, [push], PERIOD, settling_time=settling_time)
 
 
 def lowest(state: fb.State) -> dict[str, float]:
@@ -64,7 +64,7 @@ def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards: float) -> 
 @pytest.mark.parametrize("name", ["talos", "anymal_kinova"])
 @pytest.mark.parametrize("towards", [80.0, 190.0])
 def test_other_robots_lie_on_the_ground_too(name: str, towards: float) -> None:
-    record = pushed(name, 4.0 * judges.load(name).weight, towards, settle=2.5)
+    record = pushed(name, 4.0 * judges.load(name).weight, towards, settling_time=2.5)
     assert record.outcome in ("fell", "controller failed")
     low = lowest(record.final)
     assert min(low.values()) > -2.0 * DEPTH, low  # arms may still swing
@@ -73,8 +73,8 @@ def test_other_robots_lie_on_the_ground_too(name: str, towards: float) -> None:
 
 def test_where_links_touch_nothing_the_trunk_goes_into_the_ground() -> None:
     sim = fb.Simulation(judges.load("go2"))
-    pushed("go2", 400.0, 20.0, settle=0.0, sim=sim)
-    assert not sim.links
+    pushed("go2", 400.0, 20.0, settling_time=0.0, sim=sim)
+    assert not sim.link_collisions
     for _ in range(1500):
         sim.step(np.zeros(12))
     assert min(lowest(sim.state).values()) < -10.0 * DEPTH
@@ -82,36 +82,36 @@ def test_where_links_touch_nothing_the_trunk_goes_into_the_ground() -> None:
 
 @pytest.mark.parametrize("towards", [20.0, 110.0])
 def test_a_rollout_that_settles_is_the_same_up_to_the_fall(towards: float) -> None:
-    short, long = (pushed("go2", 400.0, towards, settle) for settle in (0.0, SETTLE))
+    short, long = (pushed("go2", 400.0, towards, settle) for settle in (0.0, SETTLING_TIME))
     n = len(short)
-    assert len(long) == n + round(SETTLE / PERIOD)
-    assert (long.outcome, long.off_at) == (short.outcome, short.off_at)
+    assert len(long) == n + round(SETTLING_TIME / PERIOD)
+    assert (long.outcome, long.controller_off_time) == (short.outcome, short.controller_off_time)
     for name in ROW_NAMES:
         assert np.array_equal(getattr(long, name)[:n], getattr(short, name), equal_nan=True), name
-    assert long.time[n] == pytest.approx(long.off_at)
+    assert long.time[n] == pytest.approx(long.controller_off_time)
     assert np.allclose(np.diff(long.time), PERIOD)
     assert np.isnan(long.planned[n:]).all() and np.isfinite(long.planned[:n]).all()
 
 
 def test_motors_brake_within_their_limits() -> None:
     record = pushed("go2", 400.0, 20.0)
-    n = int(np.searchsorted(record.time, record.off_at or 0.0))
+    n = int(np.searchsorted(record.time, record.controller_off_time or 0.0))
     power = np.einsum("ij,ij->i", record.tau_desired[n:], record.v[n:, 6:])
     assert power.max() <= 0.0 and power.min() < -1.0
     assert np.all(np.abs(record.tau) <= record.robot.torque_limits + 1e-9)
 
 
 def test_a_run_that_ends_well_has_no_fall() -> None:
-    record = fb.rollout(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), 0.02, settle=0.1)
-    assert (record.outcome, record.off_at, len(record)) == ("completed", None, 20)
+    record = fb.rollout(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), 0.02, settling_time=0.1)
+    assert (record.outcome, record.controller_off_time, len(record)) == ("completed", None, 20)
 
 
 def test_a_controller_that_fails_at_once_lets_the_robot_lie_down() -> None:
     def fails(q: np.ndarray, v: np.ndarray, t: float) -> None:
         raise fb.InfeasibleError("no answer")
 
-    record = fb.rollout(fb.Simulation(judges.load("go2")), fails, 0.1, settle=1.5)
-    assert (record.outcome, record.off_at, len(record)) == ("controller failed", 0.0, 1500)
+    record = fb.rollout(fb.Simulation(judges.load("go2")), fails, 0.1, settling_time=1.5)
+    assert (record.outcome, record.controller_off_time, len(record)) == ("controller failed", 0.0, 1500)
     assert record.final.q[2] < 0.5 * record.q[0, 2] and min(lowest(record.final).values()) > -DEPTH
 
 
@@ -127,9 +127,9 @@ def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row() -> None:
             return tau_desired if self.steps < 14 else np.full(12, np.nan)
 
     robot = judges.load("go2")
-    record = fb.rollout(fb.Simulation(robot), judges.controller_of("go2"), 0.1, (), 5e-3, Breaks(), settle=0.1)
+    record = fb.rollout(fb.Simulation(robot), judges.controller_of("go2"), 0.1, (), 5e-3, Breaks(), settling_time=0.1)
     assert record.outcome == "controller failed" and len(record) == 2 + 20
-    assert record.off_at == pytest.approx(0.013)
+    assert record.controller_off_time == pytest.approx(0.013)
     assert np.allclose(np.diff(record.time)[2:], 5e-3)
     assert np.allclose(record.tau[2], np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits), atol=1e-9)
     assert np.abs(record.tau_desired[2]).max() > 1e-3
@@ -140,12 +140,12 @@ def test_links_touch_from_a_fall_to_the_next_reset() -> None:
     sim = fb.Simulation(robot)
     once = pushed("go2", 100.0, 90.0, sim=sim)
     sim.reset()
-    assert not sim.links
+    assert not sim.link_collisions
     pushed("go2", 400.0, 20.0, sim=sim)
-    assert sim.links and copy.deepcopy(sim).links
+    assert sim.link_collisions and copy.deepcopy(sim).link_collisions
     sim.reset()
     again = pushed("go2", 100.0, 90.0, sim=sim)
-    assert not sim.links and once.outcome == again.outcome == "completed"
+    assert not sim.link_collisions and once.outcome == again.outcome == "completed"
     assert np.array_equal(once.q, again.q) and np.array_equal(once.measured, again.measured)
 
 
@@ -156,15 +156,15 @@ def test_forces_are_those_at_the_feet_whatever_else_touches() -> None:
     assert pressing.min() >= 0.0 and pressing.sum() < 0.9 * record.robot.weight
 
 
-def test_an_untouched_foot_stays_untouched_after_a_reset_and_magnets_pull_feet_only() -> None:
-    sim = AlteredSimulation(judges.load("go2"), world=World(untouched=["FL_foot"], magnets=10.0))
-    sim.links = True
+def test_a_disabled_contact_stays_disabled_after_a_reset_and_adhesion_acts_on_feet_only() -> None:
+    sim = PerturbedSimulation(judges.load("go2"), perturbation=Perturbation(disabled_contacts=["FL_foot"], adhesion_force=10.0))
+    sim.link_collisions = True
     sim.step(np.zeros(12))
-    sim.links = False
+    sim.link_collisions = False
     for _ in range(20):
         sim.step(np.zeros(12))
     assert not np.any(sim.contact_forces()[0])
-    sim.world = World()
+    sim.perturbation = Perturbation()
     sim.reset()
     sim.step(np.zeros(12))
     assert sim.contact_forces()[0, 2] > 0.0
@@ -174,7 +174,7 @@ def test_links_are_read_at_the_first_fall() -> None:
     sim = fb.Simulation(judges.load("go2"))
     model, data = sim.model, sim.data
     assert model.nmesh == 0 and model.ngeom == 5
-    sim.links = True
+    sim.link_collisions = True
     assert sim.model.nmesh > 0
     sim.reset()
     assert sim.model is model and sim.data is data
@@ -187,7 +187,7 @@ def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
         sim.step(np.full(12, 0.5))
     state, before = sim.state, (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces())
     for touch in (True, False):
-        sim.links = touch
+        sim.link_collisions = touch
         assert np.array_equal(sim.q, state.q) and np.array_equal(sim.v, state.v)
         after = sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces()
         assert after[0] == before[0] and np.array_equal(after[1], before[1])
@@ -200,7 +200,7 @@ def test_what_is_changed_in_the_model_holds_in_a_fall_and_after_it() -> None:
     sim.model.opt.gravity[2] = -3.0
     sim.model.geom("FL_foot").friction[0] = 0.3
     sim.model.body_mass[1] += 1.0
-    sim.links = True
+    sim.link_collisions = True
     assert sim.model.opt.gravity[2] == -3.0 and sim.model.geom("FL_foot").friction[0] == 0.3
     assert sim.model.geom("FR_foot").friction[0] == 1.0
     assert sim.model.body_mass.sum() == pytest.approx(sim.robot.mass + 1.0)
@@ -212,9 +212,9 @@ def test_what_is_changed_in_the_model_holds_in_a_fall_and_after_it() -> None:
 
 
 def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None:
-    sim = AlteredSimulation(judges.load("go2"))
-    sim.links = True
-    sim.world = World(mass=1.5, untouched=["FL_foot"], velocity_forces=False, magnets=5.0)
+    sim = PerturbedSimulation(judges.load("go2"))
+    sim.link_collisions = True
+    sim.perturbation = Perturbation(mass=1.5, disabled_contacts=["FL_foot"], velocity_forces=False, adhesion_force=5.0)
     sim.step(np.zeros(12))
     assert not np.any(sim.contact_forces()[0]) and np.any(sim.contact_forces()[1])
     sim.reset()
@@ -226,18 +226,18 @@ def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda sim: pickle.loads(pickle.dumps(sim))])
 def test_a_copy_of_a_robot_that_lies_moves_alone(copied: Callable[[fb.Simulation], fb.Simulation]) -> None:
     sim = fb.Simulation(judges.load("go2"))
-    sim.links = True
+    sim.link_collisions = True
     other = copied(sim)
     for _ in range(20):
         other.step(np.zeros(12))
-    assert sim.time == 0.0 and other.links
+    assert sim.time == 0.0 and other.link_collisions
     other.reset()
     other.step(np.zeros(12))
     fresh = fb.Simulation(judges.load("go2"))
     fresh.step(np.zeros(12))
     assert np.array_equal(other.q, fresh.q) and np.array_equal(other.contact_forces(), fresh.contact_forces())
     sim.step(np.zeros(12))
-    assert sim.links and sim.time == pytest.approx(sim.timestep)
+    assert sim.link_collisions and sim.time == pytest.approx(sim.timestep)
 
 
 def test_a_robot_without_its_meshes_keeps_the_primitives() -> None:
@@ -246,13 +246,13 @@ def test_a_robot_without_its_meshes_keeps_the_primitives() -> None:
     bare = fb.load_urdf(robot.urdf, feet=list(robot.feet), posture=robot.posture)
     sims = [fb.Simulation(one) for one in (bare, robot)]
     for sim in sims:
-        sim.links = True
+        sim.link_collisions = True
     assert 0 < sims[0].model.nmesh < sims[1].model.nmesh
 
 
 def test_an_arm_that_is_bolted_to_the_ground_has_no_hulls() -> None:
     sim = fb.Simulation(judges.load("ur5"))
-    sim.links = True
+    sim.link_collisions = True
     assert sim.model.ngeom == 1
 
 
@@ -265,8 +265,8 @@ def slices() -> list[fb.Rollout]:
 
 
 @pytest.fixture
-def run(slices: list[fb.Rollout]) -> Iterator[Live]:
-    live = Live(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), slices.append)
+def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
+    live = LiveSimulation(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), slices.append)
     yield live
     live.close()
 
@@ -274,60 +274,60 @@ def run(slices: list[fb.Rollout]) -> Iterator[Live]:
 FALL = [400.0 * np.cos(0.35), 400.0 * np.sin(0.35), 0.0]
 
 
-def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     told: list[tuple[str, int]] = []
     run.on_status(lambda status: told.append((status, len(slices))))
     run.push(FALL)
-    until(lambda: not run.moves)
+    until(lambda: not run.is_simulating)
     run.close()
     assert [status for status, _ in told] == ["running", "fell"]
     fell = told[1][1]  # slices when it was told
     assert len(slices) > fell + 3
     assert all(record.outcome == "fell" for record in slices[fell - 1 :])
-    assert len({record.off_at for record in slices[fell - 1 :]}) == 1
+    assert len({record.controller_off_time for record in slices[fell - 1 :]}) == 1
     assert np.allclose(np.diff(np.concatenate([record.time for record in slices])), PERIOD)
-    assert slices[-1].time[-1] - (slices[-1].off_at or 0.0) < 1.6
+    assert slices[-1].time[-1] - (slices[-1].controller_off_time or 0.0) < 1.6
     assert min(lowest(slices[-1].final).values()) > -DEPTH
     assert run.status == "fell"
 
 
-def fall_and_wait(run: Live, slices: list[fb.Rollout]) -> int:
+def fall_and_wait(run: LiveSimulation, slices: list[fb.Rollout]) -> int:
     """A push that topples it, and the slices when it draws on after the fall."""
     run.push(FALL)
     until(lambda: run.status == "fell")
     count = len(slices)
     until(lambda: len(slices) > count)
-    assert run.moves
+    assert run.is_simulating
     return len(slices)
 
 
-def test_a_push_or_a_reset_in_mid_fall_begins_anew(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_push_or_a_reset_in_mid_fall_begins_anew(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     for again in (run.reset, lambda: run.push([0.0, 20.0, 0.0])):
         count = fall_and_wait(run, slices)
         again()
         until(lambda count=count: any(record.time[0] == 0.0 for record in slices[count:]))  # type: ignore[misc]
-        assert run.status == "running" and not run.sim.links
+        assert run.status == "running" and not run.sim.link_collisions
         until(lambda: slices[-1].time[-1] > 0.2)
         assert slices[-1].outcome == "completed"
 
 
-def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     fall_and_wait(run, slices)
     run.close()
     count = len(slices)
-    assert (run.status, run.moves) == ("fell", False)
+    assert (run.status, run.is_simulating) == ("fell", False)
     assert not threading.Event().wait(0.1) and len(slices) == count
     run.start()
     until(lambda: len(slices) > count)
     assert slices[count].time[0] == 0.0
 
 
-def test_another_simulation_in_mid_fall_does_not_fall(run: Live, slices: list[fb.Rollout]) -> None:
+def test_another_simulation_in_mid_fall_does_not_fall(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     fall_and_wait(run, slices)
     other = fb.Simulation(judges.load("go2"))
-    run.use(judges.controller_of("go2"), sim=other)
+    run.set_controller(judges.controller_of("go2"), sim=other)
     run.close()
-    assert other.time == 0.0 and not other.links
+    assert other.time == 0.0 and not other.link_collisions
 
 
 def test_an_error_while_a_fall_is_drawn_is_said() -> None:
@@ -338,8 +338,8 @@ def test_an_error_while_a_fall_is_drawn_is_said() -> None:
         if record.outcome == "fell" and len([one for one in seen if one.outcome == "fell"]) == 3:
             raise ValueError("no window")
 
-    run = Live(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), show)
+    run = LiveSimulation(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), show)
     run.push(FALL)
     until(lambda: "no window" in run.status)
-    until(lambda: not run.moves)
+    until(lambda: not run.is_simulating)
     run.close()

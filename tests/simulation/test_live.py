@@ -13,7 +13,7 @@ import pytest
 from waiting import until
 
 import floatbase as fb
-from floatbase.simulation import IDLE, SEEN, Live, advice
+from floatbase.simulation import AUTO_PAUSED, PUSH_DISPLAY_TIME, LiveSimulation, status_message
 from floatbase.viewer import push_at
 
 ROBOT = judges.load("go2")
@@ -30,13 +30,13 @@ def slices() -> list[fb.Rollout]:
 
 
 @pytest.fixture
-def run(slices: list[fb.Rollout]) -> Iterator[Live]:
-    live = Live(fb.Simulation(ROBOT), controller(), slices.append)
+def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
+    live = LiveSimulation(fb.Simulation(ROBOT), controller(), slices.append)
     yield live
     live.close()
 
 
-def test_it_runs_pauses_and_goes_on_where_it_was(run: Live, slices: list[fb.Rollout]) -> None:
+def test_it_runs_pauses_and_goes_on_where_it_was(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     run.start()
     until(lambda: len(slices) > 3)
     run.close()  # pauses, and waits for the last slice
@@ -48,17 +48,17 @@ def test_it_runs_pauses_and_goes_on_where_it_was(run: Live, slices: list[fb.Roll
 
 
 @pytest.mark.parametrize("error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")])
-def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slices: list[fb.Rollout], error: Exception) -> None:
+def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: LiveSimulation, slices: list[fb.Rollout], error: Exception) -> None:
     def broken(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
         raise error
 
-    run.use(broken)
+    run.set_controller(broken)
     assert run.controller is broken
     run.start()
     until(lambda: run.status != "running")
     assert str(error) in run.status
     assert run.error is error
-    run.use(controller())
+    run.set_controller(controller())
     run.start()
     until(lambda: len(slices) > 1)
 
@@ -73,7 +73,7 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: Live, slic
     ],
 )
 def test_what_stopped_a_run_is_told_in_one_sentence(status: str, line: str) -> None:
-    assert line in advice(status) and not {"\n", "Why", "6"} & {*advice(status), *advice(status).split()}
+    assert line in status_message(status) and not {"\n", "Why", "6"} & {*status_message(status), *status_message(status).split()}
 
 
 class Held:
@@ -104,14 +104,14 @@ def held() -> Held:
 
 
 @pytest.fixture
-def held_run(held: Held) -> Iterator[Live]:
-    live = Live(fb.Simulation(ROBOT), controller(), held)
+def held_run(held: Held) -> Iterator[LiveSimulation]:
+    live = LiveSimulation(fb.Simulation(ROBOT), controller(), held)
     yield live
     held.go_on.set()
     live.close()
 
 
-def test_pushes_before_a_reset_are_forgotten(held_run: Live, held: Held) -> None:
+def test_pushes_before_a_reset_are_forgotten(held_run: LiveSimulation, held: Held) -> None:
     held.hold()
     held_run.start()
     assert held.inside.wait(15.0)
@@ -125,7 +125,7 @@ def test_pushes_before_a_reset_are_forgotten(held_run: Live, held: Held) -> None
     assert all(not s.pushes for s in held.slices[count:])
 
 
-def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run: Live, held: Held) -> None:
+def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run: LiveSimulation, held: Held) -> None:
     held.hold()
     held_run.start()
     assert held.inside.wait(15.0)
@@ -140,7 +140,7 @@ def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run: Live, held: H
 HARD = ([0.0, 0.0, -1200.0], 0.3)  # N, s: down, a push that no controller stands
 
 
-def test_the_same_push_after_a_fall_has_the_same_result_every_time(run: Live, slices: list[fb.Rollout]) -> None:
+def test_the_same_push_after_a_fall_has_the_same_result_every_time(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     falls = []
     for _ in range(5):
         count = len(slices)
@@ -157,7 +157,7 @@ def test_the_same_push_after_a_fall_has_the_same_result_every_time(run: Live, sl
         np.testing.assert_allclose(fall[-1].final.q, falls[0][-1].final.q, atol=1e-9)
 
 
-def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     """The next thread waits for the last one, which is kept here while it tells of the fall."""
     go_on = threading.Event()
     run.on_status(lambda status: status == "fell" and go_on.wait(15.0))
@@ -171,7 +171,7 @@ def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(run: Live
     assert [p.force[1] for p in slices[count].pushes] == [30.0]
 
 
-def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(held_run: Live, held: Held) -> None:
+def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(held_run: LiveSimulation, held: Held) -> None:
     def fall() -> None:
         held.hold("fell")
         held_run.push(*HARD)
@@ -203,7 +203,7 @@ def threads() -> list[threading.Thread]:
     return [thread for thread in threading.enumerate() if thread.name == "floatbase-live"]
 
 
-def test_a_pause_ends_the_thread_and_a_close_has_ended_it(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_pause_ends_the_thread_and_a_close_has_ended_it(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     before = len(threads())
     run.start()
     until(lambda: len(slices) > 0)
@@ -214,7 +214,7 @@ def test_a_pause_ends_the_thread_and_a_close_has_ended_it(run: Live, slices: lis
     assert len(threads()) == before
 
 
-def test_it_runs_after_a_start_that_crosses_a_close(run: Live, slices: list[fb.Rollout]) -> None:
+def test_it_runs_after_a_start_that_crosses_a_close(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     for _ in range(10):
         run.start()
         closing = threading.Thread(target=run.close)
@@ -229,7 +229,7 @@ def test_it_runs_after_a_start_that_crosses_a_close(run: Live, slices: list[fb.R
     assert all(late.time[0] > early.time[-1] for early, late in pairwise(slices))  # one thread at a time
 
 
-def test_a_status_is_told_as_it_comes(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_status_is_told_as_it_comes(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     told: list[str] = []
     run.on_status(told.append)
     run.start()
@@ -243,24 +243,24 @@ def test_a_status_is_told_as_it_comes(run: Live, slices: list[fb.Rollout]) -> No
 
 
 def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
-    run = Live(fb.Simulation(ROBOT), controller(), slices.append, idle=0.2)
+    run = LiveSimulation(fb.Simulation(ROBOT), controller(), slices.append, idle_timeout=0.2)
     run.start()
-    until(lambda: run.status == IDLE)
-    assert slices and IDLE in advice(run.status)
+    until(lambda: run.status == AUTO_PAUSED)
+    assert slices and AUTO_PAUSED in status_message(run.status)
     before = slices[-1].time[-1]
     run.start()  # it goes on from there
-    until(lambda: run.status == IDLE and slices[-1].time[-1] > before)
+    until(lambda: run.status == AUTO_PAUSED and slices[-1].time[-1] > before)
     run.close()
 
 
-def test_a_push_is_on_record_until_it_has_been_seen(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_push_is_on_record_until_it_has_been_seen(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     run.push([0.0, 20.0, 0.0], duration=0.1)
     run.start()
     until(lambda: bool(slices) and slices[-1].time[-1] > 1.0)
     run.pause()
-    shown = [(s.time[-1], push_at(s, -1, SEEN)) for s in slices]
-    assert {push is not None for t, push in shown if t < 0.1 + SEEN - 0.01} == {True}
-    assert {push is not None for t, push in shown if t > 0.1 + SEEN + 0.01} == {False}
+    shown = [(s.time[-1], push_at(s, -1, PUSH_DISPLAY_TIME)) for s in slices]
+    assert {push is not None for t, push in shown if t < 0.1 + PUSH_DISPLAY_TIME - 0.01} == {True}
+    assert {push is not None for t, push in shown if t > 0.1 + PUSH_DISPLAY_TIME + 0.01} == {False}
     assert not any(push_at(s, -1) for s in slices if s.time[-1] > 0.1)
 
 
@@ -281,7 +281,7 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
             return now
 
     delay = Delay()
-    run = Live(fb.Simulation(ROBOT), controller(), slices.append, actuators=delay, after_reset=delay.reset)
+    run = LiveSimulation(fb.Simulation(ROBOT), controller(), slices.append, actuators=delay, after_reset=delay.reset)
     run.start()
     until(lambda: len(slices) > 3)
     run.pause()
@@ -294,16 +294,16 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
     run.close()
 
 
-def test_another_world_controller_and_period_are_taken_between_slices(run: Live, slices: list[fb.Rollout]) -> None:
+def test_another_world_controller_and_period_are_taken_between_slices(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     run.start()
     until(lambda: len(slices) > 2)
     ice, seen = fb.Simulation(ROBOT, 0.3), list[threading.Thread]()
 
     def change() -> None:
         seen.append(threading.current_thread())
-        run.use(controller(), sim=ice, control_period=5e-3)
+        run.set_controller(controller(), sim=ice, control_period=5e-3)
 
-    run.soon(change)
+    run.call_soon(change)
     until(lambda: run.sim is ice)
     count = len(slices)  # the slice at that time may be one of before
     until(lambda: len(slices) > count + 1 and slices[-1].time[-1] > 0.1)
@@ -311,12 +311,12 @@ def test_another_world_controller_and_period_are_taken_between_slices(run: Live,
     assert seen[0] is not threading.main_thread()
 
 
-def test_a_change_that_fails_is_said(run: Live, slices: list[fb.Rollout]) -> None:
+def test_a_change_that_fails_is_said(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
     def fail() -> None:
         raise ValueError("no such world")
 
     run.start()
-    run.soon(fail)
+    run.call_soon(fail)
     until(lambda: run.status != "running")
     assert "no such world" in run.status
     run.reset()

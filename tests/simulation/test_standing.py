@@ -36,7 +36,7 @@ def test_it_stands_to_the_end_with_its_centre_of_mass_where_it_was(record: fb.Ro
 
 
 def test_no_foot_slips_more_than_two_millimetres(record: fb.Rollout) -> None:
-    assert record.slip().shape == (record.contacts.n_points,) and record.slip(rolling=False).max() < 2e-3
+    assert record.slip().shape == (record.contacts.n_points,) and record.slip(include_rolling=False).max() < 2e-3
 
 
 def test_planned_and_measured_vertical_forces_agree_at_rest(record: fb.Rollout) -> None:
@@ -57,7 +57,7 @@ def test_after_a_push_of_30_newtons_go2_comes_back() -> None:
     assert record.outcome == "completed"
     assert strayed.max() > 3e-3, "the push moved nothing"
     assert strayed[-1] < 1e-3
-    assert record.slip(rolling=False).max() < 2e-3
+    assert record.slip(include_rolling=False).max() < 2e-3
     assert np.linalg.norm(record.final.v) < 1e-2
 
 
@@ -82,7 +82,7 @@ def test_solo8_pushed_out_of_its_singular_stance_stands_on(backend: str, period:
     assert record.outcome == "completed"
     assert 5e-3 < away.max() < 15e-3
     assert np.linalg.norm(record.final.v) < 1e-2
-    assert record.slip(rolling=False).max() < 2e-3
+    assert record.slip(include_rolling=False).max() < 2e-3
     leaning = fb.equations_of_motion(record.final, judges.stance(robot))
     upright = fb.equations_of_motion(standing, judges.stance(robot))
     assert (contact_space(upright).r, contact_space(leaning).r) == (10, 11)

@@ -31,7 +31,7 @@ def marked(i):
     time.sleep(0.02)
     return i / 7
 
-print(fb.sweep(marked, {"i": list(range(60))}, to="marked.jsonl", workers=2, progress=False))
+print(fb.sweep(marked, {"i": list(range(60))}, file="marked.jsonl", workers=2, progress=False))
 """
 
 
@@ -165,7 +165,7 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
     def cube(x: float) -> float:
         return x**3
 
-    first = fb.sweep(square, {"x": [1, 2.5]}, to=path, workers=1, progress=False)
+    first = fb.sweep(square, {"x": [1, 2.5]}, file=path, workers=1, progress=False)
     kept = path.read_bytes()
     for function, grid, named in (
         (cube, {"x": [1, 2.5]}, ("square", "cube")),
@@ -173,20 +173,20 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
         (square, {"x": [1, 2.6]}, ()),
     ):
         with raises(InputError, "rows.jsonl", *named):
-            fb.sweep(function, grid, to=path, progress=False)
-    assert fb.sweep(square, {"x": [1, 2.5]}, to=path, progress=False).rows == first.rows == Table.read(path).rows
+            fb.sweep(function, grid, file=path, progress=False)
+    assert fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False).rows == first.rows == Table.read(path).rows
     assert path.read_bytes() == kept
     for content in ("a diary", "a diary\nof two lines\n", json.dumps({"point": 0}) + "\n"):
         path.write_text(content)
         with raises(InputError, "rows.jsonl"):
-            fb.sweep(square, {"x": [1, 2.5]}, to=path, progress=False)
+            fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False)
         assert path.read_text() == content
     with raises(InputError, "nowhere/rows.jsonl"):
-        fb.sweep(square, {"x": [1]}, to=tmp_path / "nowhere" / "rows.jsonl", progress=False)
+        fb.sweep(square, {"x": [1]}, file=tmp_path / "nowhere" / "rows.jsonl", progress=False)
     with raises(InputError, "lambda"):
-        fb.sweep(lambda x: x, {"x": [1]}, to=path, progress=False)
+        fb.sweep(lambda x: x, {"x": [1]}, file=path, progress=False)
     with raises(InputError, "to", 3):
-        fb.sweep(square, {"x": [1]}, to=3, progress=False)
+        fb.sweep(square, {"x": [1]}, file=3, progress=False)
     with raises(UnknownNameError, 0, "error", "result", "x", "table.rows"):
         list(first)
 
@@ -206,7 +206,7 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.C
         (square, {"y": [1]}, {}, "grid", "y", "square", "x"),
         (square, [{"x": 1}, {"x": 1, "y": 1}], {}, "grid", "x", "y", "square"),
         (square, {"x": [square]}, {}, "x", "function"),
-        (square, {"x": [1]}, {"to": 3.5}, "to", 3.5),
+        (square, {"x": [1]}, {"file": 3.5}, "to", 3.5),
         (square, {"x": [1]}, {"workers": 0}, "workers", 0),
         (square, {"x": [1]}, {"workers": 1.5}, "workers", 1.5),
         (square, {"x": [1]}, {"workers": 1, "cluster": "tcp://127.0.0.1:1"}, "workers", "cluster"),

@@ -81,7 +81,7 @@ def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, fi
 
     page.evaluate("viewer.gui_controllers['mass [×] true'].setValue(1.5)")
     until(lambda: abs(sunk() - 0.049) < 0.01, work)
-    page.wait_for_function("document.querySelector('#panel pre').textContent.includes('World(mass=1.5)')")
+    page.wait_for_function("document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')")
     page.evaluate("viewer.gui_controllers['mass [×] believed'].setValue(1.5)")
     until(lambda: abs(sunk()) < 0.01, work)
     page.wait_for_function("document.querySelector('#panel p.strip').textContent.includes('differ by')")

@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex
 from messages import refused
 
 import floatbase as fb
-from floatbase.behaviours import Gait, Step, Walk, capture_point
+from floatbase.behaviours import Gait, StepPlan, Walk, capture_point
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, UnknownNameError
 from floatbase.robots import Robot, State
@@ -80,7 +80,7 @@ def test_a_line_follows_the_swing_to_its_foothold(viewer: Viewer, walked: tuple[
         size = np.linalg.norm(path.end - path.start) + path.height
         for point, at in ((line[0], path.start), (line[-1], path.end)):
             np.testing.assert_allclose(point, at + ground, atol=POINTS * size)
-        middle, *_ = path((path.lift + path.land) / 2.0)
+        middle, *_ = path((path.lift_off + path.touchdown) / 2.0)
         # the ground is level but for how feet come down, so the curve leans by what the ends differ in height
         leans = abs(path.end[2] - path.start[2]) + POINTS * size
         np.testing.assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
@@ -127,7 +127,7 @@ def test_soles_are_outlined_where_and_as_they_will_stand(biped: tuple[Rollout, W
         radii = np.linalg.norm(outline[:4, :2] - middle, axis=1)
         np.testing.assert_allclose(radii, np.linalg.norm(corners, axis=1), atol=1e-3)  # vertices are 16-bit numbers
         x, y = look[f"foothold/{foot}"].matrix[:2, 0]
-        left = walk.yaw_rate * (walk.swings[foot].land - walk.time)
+        left = walk.yaw_rate * (walk.swings[foot].touchdown - walk.time)
         base = run.final.frame_pose("base").rotation
         assert np.arctan2(y, x) == pytest.approx(np.arctan2(base[1, 0], base[0, 0]) + left)
     finally:
@@ -163,7 +163,7 @@ def test_what_cannot_be_drawn_is_refused_by_name(viewer: Viewer, walked: tuple[R
     plt.close("all")
 
 
-def renamed(step: Step) -> Step:
+def renamed(step: StepPlan) -> StepPlan:
     return dataclasses.replace(step, footholds={"paw": np.zeros(3)})
 
 

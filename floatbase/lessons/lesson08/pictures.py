@@ -18,7 +18,7 @@ import floatbase as fb
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.panels import live
 from floatbase.lessons.stops import recorded_pushes
-from floatbase.simulation import Live, Rollout, advice
+from floatbase.simulation import LiveSimulation, Rollout, status_message
 from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, published, shapes, with_image
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -100,7 +100,7 @@ class PushTogether(widgets.VBox):
 
     def __init__(self, controllers: Mapping[str, Any]):
         self.views = {title: fb.Viewer(one.robot, height=300, follow=True) for title, one in controllers.items()}
-        self.runs: dict[str, Live] = {}
+        self.runs: dict[str, LiveSimulation] = {}
         self.lines = {title: widgets.Label(value="paused") for title in controllers}
         for title, one in controllers.items():
             sim = fb.Simulation(one.robot)
@@ -133,7 +133,7 @@ class PushTogether(widgets.VBox):
             run.reset()
 
     def _tell(self, title: str, status: str) -> None:
-        self.lines[title].value = advice(status)
+        self.lines[title].value = status_message(status)
 
     def close(self) -> None:
         """Stop the runs and close the pictures."""

@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.behaviours import Step
+from floatbase.behaviours import StepPlan
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.lesson09.helpers import corner_forces, pressure
 from floatbase.simulation import Rollout
@@ -150,7 +150,7 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     return _svg(drawn, *axes, *lines)
 
 
-def plot_walk(record: Rollout, steps: Iterable[Step]) -> Axes:
+def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
     """A walk from above: where x_c was, where the ground pushed, and the soles that stood. steps: `walk.history`."""
     figure, axis = plt.subplots(figsize=(8.5, 3.0), layout="constrained")
     for step in steps:

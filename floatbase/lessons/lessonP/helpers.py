@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 import floatbase as fb
 from floatbase.dynamics import Contacts
-from floatbase.simulation import AlteredSimulation, Rollout, World
+from floatbase.simulation import Perturbation, PerturbedSimulation, Rollout
 
 MU, PERIOD = 0.7, 4e-3  # friction; s between ticks
 BAG = 6.0  # kg, of exercise P.1
@@ -35,7 +35,7 @@ def sinks(kp: float, bag: float = BAG) -> float:
     kp: 1/s², of the task for the centre of mass. It is infinite when the robot does not stand.
     """
     robot = fb.load("go2")
-    sim = AlteredSimulation(robot, MU, world=World(mass=1.0 + bag / robot.mass))
+    sim = PerturbedSimulation(robot, MU, perturbation=Perturbation(mass=1.0 + bag / robot.mass))
     record = _standing(sim, kp)
     below = float(robot.standing().com[2] - record.final.com[2])
     return below if record.outcome == "completed" else float("inf")
@@ -44,7 +44,7 @@ def sinks(kp: float, bag: float = BAG) -> float:
 @cache
 def box_in_the_dark() -> Rollout:
     """Of exercise P.3: go2 in a world whose mass nobody tells."""
-    return _standing(AlteredSimulation(fb.load("go2"), MU, world=World(mass=HIDDEN)), _HIDDEN_GAIN)
+    return _standing(PerturbedSimulation(fb.load("go2"), MU, perturbation=Perturbation(mass=HIDDEN)), _HIDDEN_GAIN)
 
 
 def on_two_feet(shift: npt.ArrayLike) -> float:

@@ -12,19 +12,19 @@ from messages import raises
 import floatbase as fb
 from floatbase.control import ModelMismatch
 from floatbase.errors import InputError, UnknownNameError
-from floatbase.simulation import AlteredSimulation, World
+from floatbase.simulation import Perturbation, PerturbedSimulation
 
 GO2 = judges.load("go2")
 G = 9.81  # m/s²
 
 
-def standing(sim: AlteredSimulation, mismatch: object = None, seconds: float = 0.6) -> fb.Rollout:
+def standing(sim: PerturbedSimulation, mismatch: object = None, seconds: float = 0.6) -> fb.Rollout:
     options = {} if mismatch is None else {"mismatch": mismatch}
     controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), fb.standing_tasks(GO2.standing()), **options)
     return fb.rollout(sim, controller, seconds, control_period=2e-3)
 
 
-def in_the_air(sim: AlteredSimulation, omega: float = 0.0) -> None:
+def in_the_air(sim: PerturbedSimulation, omega: float = 0.0) -> None:
     state = GO2.standing()
     q, v = np.array(state.q), np.zeros(GO2.nv)
     q[2] += 2.0
@@ -33,16 +33,16 @@ def in_the_air(sim: AlteredSimulation, omega: float = 0.0) -> None:
 
 
 def test_as_it_is_made_it_is_the_simulation() -> None:
-    plain, altered = fb.Simulation(GO2, 0.7), AlteredSimulation(GO2, 0.7)
+    plain, perturbed = fb.Simulation(GO2, 0.7), PerturbedSimulation(GO2, 0.7)
     controller = judges.controller_of("go2")
     push = [fb.Push([30.0, 10.0, 0.0])]
-    a, b = (fb.rollout(sim, controller, 0.3, push, control_period=2e-3) for sim in (plain, altered))
+    a, b = (fb.rollout(sim, controller, 0.3, push, control_period=2e-3) for sim in (plain, perturbed))
     assert np.array_equal(a.q, b.q) and np.array_equal(a.measured, b.measured)
 
 
 def test_without_gravity_it_floats_and_with_it_it_falls() -> None:
     for gravity in (True, False):
-        sim = AlteredSimulation(GO2, world=World(gravity=gravity))
+        sim = PerturbedSimulation(GO2, perturbation=Perturbation(gravity=gravity))
         in_the_air(sim)
         for _ in range(200):
             sim.step(np.zeros(12))
@@ -50,16 +50,16 @@ def test_without_gravity_it_floats_and_with_it_it_falls() -> None:
 
 
 def test_the_ground_carries_the_mass_that_the_world_has() -> None:
-    sim = AlteredSimulation(GO2, world=World(mass=1.2))
+    sim = PerturbedSimulation(GO2, perturbation=Perturbation(mass=1.2))
     record = standing(sim)
     assert record.outcome == "completed"
     assert record.measured[-50:].reshape(50, -1, 3)[:, :, 2].sum(axis=1).mean() == pytest.approx(1.2 * GO2.weight, rel=0.02)
-    sim.world = World()
+    sim.perturbation = Perturbation()
     assert np.isclose(sim.model.body_mass.sum(), GO2.mass)
 
 
 def test_a_foot_that_the_ground_does_not_touch_carries_nothing() -> None:
-    sim = AlteredSimulation(GO2, world=World(untouched=["FL_foot"]))
+    sim = PerturbedSimulation(GO2, perturbation=Perturbation(disabled_contacts=["FL_foot"]))
     record = standing(sim, seconds=0.1)
     assert not record.measured.reshape(len(record), -1, 3)[:, 0].any()
     assert record.measured.reshape(len(record), -1, 3)[-1, 1:].any()
@@ -69,7 +69,7 @@ def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
     """M q̈ = 0 with M q̈ + h: without gravity and torques all velocities stay what they are, and else they do not."""
     change = {}
     for kept in (True, False):
-        sim = AlteredSimulation(GO2, timestep=5e-4, world=World(gravity=False, velocity_forces=kept))
+        sim = PerturbedSimulation(GO2, timestep=5e-4, perturbation=Perturbation(gravity=False, velocity_forces=kept))
         in_the_air(sim, omega=5.0)
         before = sim.data.qvel.copy()
         for _ in range(20):
@@ -81,7 +81,7 @@ def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
 
 def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes() -> None:
     """(7) is written in them: with M q̈ = 0 a base that turns flies around a bend, and does not go straight on."""
-    sim = AlteredSimulation(GO2, timestep=1e-4, world=World(gravity=False, velocity_forces=False))
+    sim = PerturbedSimulation(GO2, timestep=1e-4, perturbation=Perturbation(gravity=False, velocity_forces=False))
     in_the_air(sim)
     v = np.random.default_rng(1).normal(size=GO2.nv)
     sim.reset(sim.state.replace(v=v))
@@ -92,25 +92,25 @@ def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes(
     assert np.abs(sim.v - v).max() < 0.02 * turned
 
 
-def test_magnets_let_the_ground_pull() -> None:
-    """Pulled up with 1.5 weights by a controller whose feet may pull, feet on magnets stay; without them they do not."""
+def test_adhesion_lets_the_ground_pull() -> None:
+    """Pulled up with 1.5 weights by a controller whose feet may pull, feet with adhesion stay; without them they do not."""
     up = 1.5 * GO2.weight
     nets = {}
-    for magnets in (0.0, GO2.weight):
-        sim = AlteredSimulation(GO2, world=World(magnets=magnets))
+    for adhesion_force in (0.0, GO2.weight):
+        sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=adhesion_force))
         tasks, mismatch = fb.standing_tasks(GO2.standing()), ModelMismatch(cones=False)
         controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, mismatch=mismatch)
         record = fb.rollout(sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3)
-        nets[magnets] = float(record.measured.reshape(len(record), -1, 3)[-20:, :, 2].sum(axis=1).mean())
+        nets[adhesion_force] = float(record.measured.reshape(len(record), -1, 3)[-20:, :, 2].sum(axis=1).mean())
         stuck = sim.contact_positions()[:, 2].max() < 5e-3
-        assert stuck == bool(magnets)
+        assert stuck == bool(adhesion_force)
     assert nets[0.0] == 0.0
     assert nets[GO2.weight] < -0.2 * GO2.weight
 
 
 def test_magnets_pull_from_the_first_touch_on() -> None:
     """Newton's law of the whole robot at every timestep of a landing: nothing pulls that the measured forces do not have."""
-    sim = AlteredSimulation(GO2, world=World(magnets=GO2.weight))
+    sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=GO2.weight))
     state = GO2.standing()
     q, v = np.array(state.q), np.zeros(GO2.nv)
     q[2], v[2] = q[2] + 5e-3, -0.3
@@ -123,7 +123,7 @@ def test_magnets_pull_from_the_first_touch_on() -> None:
 
 
 def test_motors_of_the_base_carry_it() -> None:
-    sim = AlteredSimulation(GO2)
+    sim = PerturbedSimulation(GO2)
     in_the_air(sim)
     R = sim.state.frame_pose("base").rotation
     sim.base_wrench = np.concatenate([R.T @ [0.0, 0.0, GO2.weight + 2.0 * GO2.mass], np.zeros(3)])
@@ -135,20 +135,20 @@ def test_motors_of_the_base_carry_it() -> None:
 
 
 def test_friction_changes_while_it_runs() -> None:
-    sim = AlteredSimulation(GO2, 0.8)
+    sim = PerturbedSimulation(GO2, 0.8)
     assert standing(sim, seconds=0.2).outcome == "completed"
-    sim.world = World(friction=0.05)
+    sim.perturbation = Perturbation(friction=0.05)
     record = fb.rollout(sim, judges.controller_of("go2"), 0.3, [fb.Push([60.0, 0.0, 0.0], 0.2, 0.1)], control_period=2e-3)
     forces = record.measured.reshape(len(record), -1, 3)
     assert np.all(np.hypot(*forces[:, :, :2].transpose(2, 0, 1)) <= 0.05 * forces[:, :, 2] + 0.1)
 
 
 def test_a_copy_is_on_its_own_and_mistakes_are_told() -> None:
-    sim = AlteredSimulation(GO2, world=World(velocity_forces=False))
+    sim = PerturbedSimulation(GO2, perturbation=Perturbation(velocity_forces=False))
     other = copy.copy(sim)
-    other.world = World(mass=2.0)
-    assert np.isclose(sim.model.body_mass.sum(), GO2.mass) and sim.world.mass == 1.0
+    other.perturbation = Perturbation(mass=2.0)
+    assert np.isclose(sim.model.body_mass.sum(), GO2.mass) and sim.perturbation.mass == 1.0
     with raises(UnknownNameError, "FL_fot", "FL_foot"):
-        sim.world = World(untouched=["FL_fot"])
+        sim.perturbation = Perturbation(disabled_contacts=["FL_fot"])
     with raises(InputError, "base_wrench", 2, 6):
         sim.base_wrench = [1.0, 2.0]

@@ -1,4 +1,4 @@
-"""The push rose: what bisection finds on the physics, its mirror, and theory's curves by other means."""
+"""The push recovery: what bisection finds on the physics, its mirror, and theory's curves by other means."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from scipy.spatial import ConvexHull
 
 import floatbase as fb
 from floatbase.errors import InfeasibleError, InputError, SimulationError, UnknownNameError
-from floatbase.simulation import PushRose
+from floatbase.simulation import PushRecovery
 from floatbase.viewer import roses
 
 STEP, WATCH = 25.0, 1.2
-QUICK = {"step": STEP, "watch": WATCH, "start": 0.1, "progress": False}
+QUICK = {"resolution": STEP, "observation_time": WATCH, "start": 0.1, "progress": False}
 
 
 @pytest.fixture(scope="module")
@@ -29,8 +29,8 @@ def standing() -> fb.WholeBodyController:
 
 
 @pytest.fixture(scope="module")
-def rose(standing: fb.WholeBodyController) -> PushRose:
-    return fb.push_rose(standing, directions=6, workers=2, **QUICK)
+def recovery(standing: fb.WholeBodyController) -> PushRecovery:
+    return fb.push_recovery(standing, directions=6, workers=2, **QUICK)
 
 
 def survives(controller: fb.WholeBodyController, angle: float, force: float) -> bool:
@@ -40,71 +40,71 @@ def survives(controller: fb.WholeBodyController, angle: float, force: float) -> 
 
 
 def test_the_rose_lies_between_survived_and_fatal_and_is_its_own_mirror(
-    rose: PushRose, standing: fb.WholeBodyController
+    recovery: PushRecovery, standing: fb.WholeBodyController
 ) -> None:
-    assert np.allclose(rose.directions, np.deg2rad([0, 60, 120, 180, 240, 300]))
-    left, right = rose.pushes[1:3], rose.pushes[:3:-1]
+    assert np.allclose(recovery.directions, np.deg2rad([0, 60, 120, 180, 240, 300]))
+    left, right = recovery.pushes[1:3], recovery.pushes[:3:-1]
     assert np.all(np.abs(left - right) <= STEP)  # go2 is symmetric
-    assert survives(standing, rose.directions[1], rose.pushes[1])
-    assert not survives(standing, rose.directions[1], rose.pushes[1] + STEP)
+    assert survives(standing, recovery.directions[1], recovery.pushes[1])
+    assert not survives(standing, recovery.directions[1], recovery.pushes[1] + STEP)
     assert survives(standing, np.pi / 2, 170.0)
-    assert "6 directions" in repr(rose)
+    assert "6 directions" in repr(recovery)
 
 
-def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(rose: PushRose) -> None:
-    state, robot = rose.state, rose.state.robot
-    feet, com = rose.contacts.positions(state), state.com
+def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(recovery: PushRecovery) -> None:
+    state, robot = recovery.state, recovery.state.robot
+    feet, com = recovery.contacts.positions(state), state.com
     height, hull = com[2] - feet[:, 2].mean(), ConvexHull(feet[:, :2])
     omega = np.sqrt(robot.gravity / height)
     # an impulse moves the capture point to the border; a push for ever tips the robot over it
     for duration, farther in ((1e-6, 1e-6 / (robot.mass * omega)), (1e2, height / robot.weight)):
-        moved = com[:2] + (replace(rose, duration=duration).capture * farther)[:, None] * rose.unit_vectors[:, :2]
+        moved = com[:2] + (replace(recovery, duration=duration).capture_point_bound * farther)[:, None] * recovery.unit_vectors[:, :2]
         beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
         assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-5)  # m
     # between them: the pendulum on the border, s away, pushed for a while, has its capture point there at the end
-    border = replace(rose, duration=1e2).capture * height / robot.weight
-    transition = expm(rose.duration * np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]]))
-    x = transition[:, 2:] * (rose.capture / robot.mass - omega**2 * border)
+    border = replace(recovery, duration=1e2).capture_point_bound * height / robot.weight
+    transition = expm(recovery.duration * np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]]))
+    x = transition[:, 2:] * (recovery.capture_point_bound / robot.mass - omega**2 * border)
     assert np.allclose(x[0] + x[1] / omega, border, rtol=1e-9)
     # one foot carries nothing, two at the front only while a push of the right size holds the rest up
-    for few in (rose.contacts.only("FL_foot"), rose.contacts.only("FL_foot", "FR_foot")):
-        falling = replace(rose, contacts=few)
-        assert not falling.capture.any() and not falling.steady.any()
+    for few in (recovery.contacts.only("FL_foot"), recovery.contacts.only("FL_foot", "FR_foot")):
+        falling = replace(recovery, contacts=few)
+        assert not falling.capture_point_bound.any() and not falling.static_bound.any()
 
     # (20)(21) a steady push F at height z tips the robot over an edge at a distance l when F z > m g l, if it does not slide
     slack = -(com[:2] @ hull.equations[:, :2].T + hull.equations[:, 2])
     base = state.frame_pose("base").translation
-    lever = (base[2] - feet[:, 2].mean()) * rose.unit_vectors[:, :2] @ hull.equations[:, :2].T
+    lever = (base[2] - feet[:, 2].mean()) * recovery.unit_vectors[:, :2] @ hull.equations[:, :2].T
     tips = np.min(np.where(lever > 0.0, robot.weight * slack / np.where(lever > 0.0, lever, 1.0), np.inf), axis=1)
     assert np.all(tips < 0.7 * np.cos(np.pi / 16) * robot.weight)
-    assert np.allclose(rose.steady, tips, rtol=1e-3)  # the feet are level to a part of a millimetre
-    assert np.all(rose.steady < rose.pushes)  # a push that ends can be larger
+    assert np.allclose(recovery.static_bound, tips, rtol=1e-3)  # the feet are level to a part of a millimetre
+    assert np.all(recovery.static_bound < recovery.pushes)  # a push that ends can be larger
 
 
-def test_the_rose_is_plotted_and_drawn_to_scale(rose: PushRose) -> None:
-    axis = roses.plot(rose)
+def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
+    axis = roses.plot(recovery)
     measured = axis.get_lines()[0]
-    assert np.allclose(measured.get_ydata(), [*rose.pushes, rose.pushes[0]])
+    assert np.allclose(measured.get_ydata(), [*recovery.pushes, recovery.pushes[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
         "largest push survived", "theory: capture point", "theory: steady push",
     ]  # fmt: skip
     plt.close(axis.figure)
-    refused(lambda: roses.plot(rose, plt.figure().add_subplot()), InputError, "polar")
+    refused(lambda: roses.plot(recovery, plt.figure().add_subplot()), InputError, "polar")
     plt.close("all")
-    near, far = (roses.picture(rose, scale) for scale in (0.001, 0.002))
+    near, far = (roses.picture(recovery, scale) for scale in (0.001, 0.002))
     assert {path.split("/")[0] for path in near} == {"rose", "capture", "steady"}
-    assert {path.split("/")[0] for path in roses.picture(rose, theory=False)} == {"rose"}
+    assert {path.split("/")[0] for path in roses.picture(recovery, theory=False)} == {"rose"}
     assert near.keys() == far.keys() and "rose/ring 100 N" in near
-    assert all(np.allclose(near[path].matrix[:2, 3], rose.state.q[:2]) for path in near if "label" not in path)
-    before = replace(rose, pushes=rose.pushes / 2)
-    axis = roses.plot(rose, theory=False, before=before)
+    assert all(np.allclose(near[path].matrix[:2, 3], recovery.state.q[:2]) for path in near if "label" not in path)
+    before = replace(recovery, pushes=recovery.pushes / 2)
+    axis = roses.plot(recovery, theory=False, before=before)
     grey = axis.get_lines()[1]
-    assert np.allclose(grey.get_ydata()[:-1], rose.pushes / 2) and grey.get_label() == "largest push survived before"
+    assert np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2) and grey.get_label() == "largest push survived before"
     plt.close(axis.figure)
-    assert {path.split("/")[0] for path in roses.picture(rose, theory=False, before=before)} == {"rose", "before"}
-    other = replace(rose, directions=rose.directions[:-1], pushes=rose.pushes[:-1])
-    refused(lambda: roses.plot(rose, before=other), InputError, 6, 5)
-    ends = [picture["rose/label 100 N"].matrix[:2, 3] - rose.state.q[:2] for picture in (near, far)]
+    assert {path.split("/")[0] for path in roses.picture(recovery, theory=False, before=before)} == {"rose", "before"}
+    other = replace(recovery, directions=recovery.directions[:-1], pushes=recovery.pushes[:-1])
+    refused(lambda: roses.plot(recovery, before=other), InputError, 6, 5)
+    ends = [picture["rose/label 100 N"].matrix[:2, 3] - recovery.state.q[:2] for picture in (near, far)]
     assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
 
 
@@ -118,14 +118,14 @@ def test_factories_and_what_does_not_fit(standing: fb.WholeBodyController) -> No
     short = {"directions": 3, "workers": 1}
     for make, options, error, *named in (
         (standing, {"directions": 2}, InputError, "directions", 2, 3),
-        (standing, {"step": 0.0}, InputError, "step", 0),
+        (standing, {"resolution": 0.0}, InputError, "resolution", 0),
         (standing, {"frame": "bass"}, UnknownNameError, "bass", "base"),
-        (3, {}, InputError, "push_rose", 3),
+        (3, {}, InputError, "push_recovery", 3),
         (lambda: 3, {}, InputError, 3),
-        (judges.limp, {}, InputError, "push_rose", "limp", "q"),
+        (judges.limp, {}, InputError, "push_recovery", "limp", "q"),
         (lambda: fails, short, SimulationError, "no torque"),
         (lambda: (fb.Simulation(robot), judges.limp), short, SimulationError, 0),
         (lambda: (fb.Simulation(fb.load("ur5")), judges.limp), {}, InputError, "ur5"),
     ):
         with raises(error, *named):
-            fb.push_rose(make, **QUICK | options)
+            fb.push_recovery(make, **QUICK | options)

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from floatbase._validation import Array, as_callable
 
-_STEP = 1e-4  # s, of the differences: their error is below 1e-5 of what a base does in a second
+_DIFFERENCE_STEP = 1e-4  # s, of the differences: their error is below 1e-5 of what a base does in a second
 
 
 def pitch_and_yaw(angles: Callable[[float], Array]) -> Callable[[float], tuple[Array, Array, Array]]:
@@ -21,10 +21,10 @@ def pitch_and_yaw(angles: Callable[[float], Array]) -> Callable[[float], tuple[A
     as_callable("angles", angles, "angles(t)")
 
     def path(t: float) -> tuple[Array, Array, Array]:
-        before, now, after = angles(t - _STEP), angles(t), angles(t + _STEP)
-        (p1, y1), (p2, y2) = (after - before) / (2.0 * _STEP), (after - 2.0 * now + before) / _STEP**2
+        before, now, after = angles(t - _DIFFERENCE_STEP), angles(t), angles(t + _DIFFERENCE_STEP)
+        (p1, y1), (p2, y2) = (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * now + before) / _DIFFERENCE_STEP**2
         R = pin.rpy.rpyToMatrix(0.0, now[0], now[1])
-        up, aside = np.array([0.0, 0.0, 1.0]), R[:, 1]  # the axes of yaw and of pitch
-        return R, y1 * up + p1 * aside, y2 * up + p2 * aside + y1 * p1 * np.cross(up, aside)
+        yaw_axis, pitch_axis = np.array([0.0, 0.0, 1.0]), R[:, 1]  # the axes of yaw and of pitch
+        return R, y1 * yaw_axis + p1 * pitch_axis, y2 * yaw_axis + p2 * pitch_axis + y1 * p1 * np.cross(yaw_axis, pitch_axis)
 
     return path

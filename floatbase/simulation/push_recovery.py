@@ -1,4 +1,4 @@
-"""`push_rose`: the largest push that a controller survives in each direction, and what theory says beside it."""
+"""`push_recovery`: the largest push that a controller survives in each direction, and what theory says beside it."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
 from floatbase.simulation.sweep import sweep
 
-_FEWEST = 3  # directions: fewer are no closed line
+_MIN_DIRECTIONS = 3  # directions: fewer are no closed line
 _FACETS = 16  # of the polyhedra in the friction cones: they leave out 2 % of them
-_MOST = 100.0  # of the robot's weight: a push that is survived beyond it is not carried by the ground
-_LEVEL = 1e-9  # least cosine between direction and an edge's normal: less is an edge along the direction, never met
+_MAX_FORCE_IN_WEIGHTS = 100.0  # of the robot's weight: a push that is survived beyond it is not carried by the ground
+_MIN_COSINE = 1e-9  # least cosine between direction and an edge's normal: less is an edge along the direction, never met
 
 
 @dataclass(frozen=True, eq=False)
-class PushRose(Value):
+class PushRecovery(Value):
     """The largest push that was survived in each of n directions, and theory's curves beside it. All pushes are in N.
 
     directions: (n,) rad, of the pushes, in the world's horizontal plane, from x towards y.
-    pushes: (n,) N, survived; a push that is `step` larger was not.
-    step: N, the resolution.
+    pushes: (n,) N, survived; a push that is `resolution` larger was not.
+    resolution: N, spacing of the pushes that are tried.
     duration: s, of each push.
     frame: the frame that was pushed.
     state, contacts: the robot and its stance, as the simulation began, before anything pushed.
@@ -44,7 +44,7 @@ class PushRose(Value):
 
     directions: Array
     pushes: Array
-    step: float
+    resolution: float
     duration: float
     frame: str
     state: State
@@ -61,7 +61,7 @@ class PushRose(Value):
         return _unit_vectors(self.directions)
 
     @cached_property
-    def steady(self) -> Array:
+    def static_bound(self) -> Array:
         """(20)(21)(28) The largest push that the stance bears for ever without moving, shape (n,), N.
 
         The contact forces must carry the weight and hold against the push, all inside their friction cones:
@@ -69,13 +69,13 @@ class PushRose(Value):
         """
         wrenches = wrench_set(self.state, self.contacts, facets=_FACETS)
         lever = self.state.frame_pose(self.frame).translation - wrenches.reference_point
-        carried = np.array([0.0, 0.0, wrenches.weight, 0.0, 0.0, 0.0])
-        if not wrenches.contains(carried):
+        weight_wrench = np.array([0.0, 0.0, wrenches.weight, 0.0, 0.0, 0.0])
+        if not wrenches.contains(weight_wrench):
             return read_only(np.zeros(len(self.directions)))
-        return read_only([_reach(wrenches, -np.concatenate([d, np.cross(lever, d)]), carried) for d in self.unit_vectors])
+        return read_only([_max_scaling(wrenches, -np.concatenate([d, np.cross(lever, d)]), weight_wrench) for d in self.unit_vectors])
 
     @cached_property
-    def capture(self) -> Array:
+    def capture_point_bound(self) -> Array:
         """The push of `duration` T that ends with the capture point on the border of the support region, shape (n,), N.
 
         The linear inverted pendulum of height h, ω = √(g/h), pushed at the centre of mass, at rest at first. As long as its
@@ -88,28 +88,29 @@ class PushRose(Value):
         height = com[2] - self.contacts.positions(self.state)[:, 2].mean()
         omega = np.sqrt(robot.gravity / height)
         region = wrench_set(self.state, self.contacts).support_region()
-        border = _border(region, com[:2], self.unit_vectors[:, :2])
-        return read_only(border * robot.mass * omega**2 / -np.expm1(-omega * self.duration))
+        distance = _distance_to_border(region, com[:2], self.unit_vectors[:, :2])
+        return read_only(distance * robot.mass * omega**2 / -np.expm1(-omega * self.duration))
 
     def __repr__(self) -> str:
         span = f"{self.pushes.min():g} to {self.pushes.max():g} N for {self.duration:g} s"
-        return f"PushRose({self.state.robot.name}, {len(self.directions)} directions, {span}, in steps of {self.step:g} N)"
+        count = f"{len(self.directions)} directions"
+        return f"PushRecovery({self.state.robot.name}, {count}, {span}, in steps of {self.resolution:g} N)"
 
 
-def push_rose(
+def push_recovery(
     controller: Controller | Callable[[], Any],
     *,
     directions: int = 16,
     duration: float = 0.1,
     frame: str = "base",
     start: float = 0.2,
-    watch: float = 1.5,
-    most: float | None = None,
-    step: float = 5.0,
+    observation_time: float = 1.5,
+    initial_force: float | None = None,
+    resolution: float = 5.0,
     workers: int | None = None,
     cluster: Any = None,
     progress: bool = True,
-) -> PushRose:
+) -> PushRecovery:
     """The largest horizontal push that a controller survives on the physics, in each of several directions, by bisection.
 
     A push is survived when `rollout` comes to its end: the robot has not fallen, nothing diverged, no controller failed.
@@ -122,54 +123,54 @@ def push_rose(
     duration: s, of the push.
     frame: name of the frame at whose origin it acts.
     start: s, before the push: the robot settles.
-    watch: s, after the push: a slow fall must happen within it.
-    most: N, the first push tried, by default the robot's weight; it is doubled while it is survived.
-    step: N, the resolution: pushes are multiples of it.
+    observation_time: s, after the push: a slow fall must happen within it.
+    initial_force: N, the first push tried, by default the robot's weight; it is doubled while it is survived.
+    resolution: N, spacing of the pushes that are tried: pushes are multiples of it.
     workers, cluster, progress: as for `fb.sweep`; a direction is a point.
 
     Raises `InputError` for numbers that do not fit, and for a robot that is bolted to the ground; `SimulationError` where the
     robot falls without a push, and where it survives a hundred times its weight.
     """
-    if isinstance(directions, bool) or not isinstance(directions, int | np.integer) or directions < _FEWEST:
-        raise InputError(f"directions is {directions!r}; it must be a whole number ≥ {_FEWEST}.")
-    make = _maker(controller)
-    sim, one = make()
-    robot, contacts = sim.robot, getattr(one, "contacts", None)
+    if isinstance(directions, bool) or not isinstance(directions, int | np.integer) or directions < _MIN_DIRECTIONS:
+        raise InputError(f"directions is {directions!r}; it must be a whole number ≥ {_MIN_DIRECTIONS}.")
+    make = _factory_for(controller)
+    sim, example = make()
+    robot, contacts = sim.robot, getattr(example, "contacts", None)
     if not robot.is_floating:
-        raise InputError(f"{robot.name} is bolted to the ground and cannot fall: it has no push rose.")
+        raise InputError(f"{robot.name} is bolted to the ground and cannot fall: it has no push recovery.")
     robot.frame_id(frame)
     settings = {
         "start": as_positive("start", start, "s", allow_zero=True),
         "duration": as_positive("duration", duration, "s"),
-        "watch": as_positive("watch", watch, "s"),
-        "step": as_positive("step", step, "N"),
+        "observation_time": as_positive("observation_time", observation_time, "s"),
+        "resolution": as_positive("resolution", resolution, "N"),
     }
-    first = ceil(as_positive("most", robot.weight if most is None else most, "N") / step)
+    first = ceil(as_positive("initial_force", robot.weight if initial_force is None else initial_force, "N") / resolution)
 
     def largest_push(direction: float) -> float:  # the bar shows this name
-        return _largest(direction, make, frame, first, **settings)
+        return _largest_survived(direction, make, frame, first, **settings)
 
     angles = 2.0 * np.pi * np.arange(directions) / directions
     table = sweep(largest_push, {"direction": angles}, workers=workers, cluster=cluster, progress=progress)
     for row in table.errors:
         raise SimulationError(f"the push towards {np.rad2deg(row['direction']):.0f}° ended with {row['error']}")
-    return PushRose(
-        read_only(angles), read_only(table["result"]), settings["step"], settings["duration"], frame, sim.state,
+    return PushRecovery(
+        read_only(angles), read_only(table["result"]), settings["resolution"], settings["duration"], frame, sim.state,
         contacts if isinstance(contacts, Contacts) else sim.feet,
     )  # fmt: skip
 
 
-def _maker(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
-    """A function that makes a simulation and a controller, from what `push_rose` was given; it can be sent to a worker."""
+def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
+    """A function that makes a simulation and a controller, from what `push_recovery` was given; it can be sent to a worker."""
     needs = "a controller that has a robot, or a function without parameters that makes one"
     if not callable(controller):
-        raise InputError(f"push_rose needs {needs} or makes a pair (simulation, controller), not {controller!r}.")
+        raise InputError(f"push_recovery needs {needs} or makes a pair (simulation, controller), not {controller!r}.")
     if not hasattr(controller, "robot"):
         if fault := signature_error(controller):
-            raise InputError(f"push_rose needs {needs}; {fault}.")
-        return partial(_pair, controller)
+            raise InputError(f"push_recovery needs {needs}; {fault}.")
+        return partial(_simulation_and_controller, controller)
     try:
-        return partial(_pair, partial(pickle.loads, cloudpickle.dumps(controller)))
+        return partial(_simulation_and_controller, partial(pickle.loads, cloudpickle.dumps(controller)))
     except Exception as error:
         raise InputError(
             f"this controller cannot be copied for each push ({type(error).__name__}: {error}): give a function without "
@@ -177,7 +178,7 @@ def _maker(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
         ) from error
 
 
-def _pair(make: Callable[[], Any]) -> tuple[Simulation, Any]:
+def _simulation_and_controller(make: Callable[[], Any]) -> tuple[Simulation, Any]:
     """What a function makes, a controller or (simulation, controller), as a pair."""
     made = make()
     if isinstance(made, tuple) and len(made) == 2 and isinstance(made[0], Simulation):
@@ -189,41 +190,41 @@ def _pair(make: Callable[[], Any]) -> tuple[Simulation, Any]:
     return Simulation(made.robot), made
 
 
-def _largest(
+def _largest_survived(
     direction: float,
     make: Callable[[], tuple[Simulation, Any]],
     frame: str,
-    first: int,
+    initial_steps: int,
     start: float,
     duration: float,
-    watch: float,
-    step: float,
+    observation_time: float,
+    resolution: float,
 ) -> float:
-    """The largest multiple of `step`, N, that is survived as a push in a direction, rad; `first` is the first one tried."""
+    """The largest multiple of `resolution`, N, that is survived as a push in a direction, rad; `initial_steps` of them are tried first."""
 
     def pushed(steps: int) -> Rollout:
         sim, controller = make()
-        push = Push(steps * step * _unit_vectors(direction), sim.time + start, duration, frame)
-        ticks = ceil((start + duration + watch) / sim.timestep)
+        push = Push(steps * resolution * _unit_vectors(direction), sim.time + start, duration, frame)
+        ticks = ceil((start + duration + observation_time) / sim.timestep)
         return rollout(sim, controller, ticks * sim.timestep, [push])
 
     def survives(steps: int) -> bool:
         return pushed(steps).outcome == "completed"
 
-    survived, fatal = 0, first
+    survived, fatal = 0, initial_steps
     while survives(fatal):
         survived, fatal = fatal, 2 * fatal
-        if fatal * step > _MOST * make()[0].robot.weight:
+        if fatal * resolution > _MAX_FORCE_IN_WEIGHTS * make()[0].robot.weight:
             raise SimulationError(
-                f"a push of {survived * step:g} N is survived, and the doubled one is too large to be sensible."
+                f"a push of {survived * resolution:g} N is survived, and the doubled one is too large to be sensible."
             )
     while fatal - survived > 1:
         middle = (survived + fatal) // 2
         survived, fatal = (middle, fatal) if survives(middle) else (survived, middle)
-    if survived == 0 and (still := pushed(0)).outcome != "completed":
-        how = f"the controller fails without a push: {still.error}"
-        raise SimulationError("the robot falls without a push." if still.error is None else how)
-    return survived * step
+    if survived == 0 and (unpushed := pushed(0)).outcome != "completed":
+        how = f"the controller fails without a push: {unpushed.error}"
+        raise SimulationError("the robot falls without a push." if unpushed.error is None else how)
+    return survived * resolution
 
 
 def _unit_vectors(directions: Any) -> Array:
@@ -231,26 +232,26 @@ def _unit_vectors(directions: Any) -> Array:
     return read_only(np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1))
 
 
-def _reach(wrenches: WrenchSet, push: Array, carried: Array) -> float:
+def _max_scaling(wrenches: WrenchSet, push: Array, weight_wrench: Array) -> float:
     """The largest multiple of a push that can go with what is carried; 0 where rounding puts that beyond the set's border."""
     try:
-        return max(0.0, wrenches.max_scaling(push, carried))
+        return max(0.0, wrenches.max_scaling(push, weight_wrench))
     except InfeasibleError:
         return 0.0
 
 
-def _border(polygon: Array, inside: Array, directions: Array) -> Array:
+def _distance_to_border(polygon: Array, point: Array, directions: Array) -> Array:
     """How far it is from a point to the border of a convex polygon, shape (n,), m; 0 for a point that is not inside.
 
-    polygon: (k, 2), m, counter-clockwise. inside: (2,), m, the point. directions: (n, 2), unit.
+    polygon: (k, 2), m, counter-clockwise. point: (2,), m. directions: (n, 2), unit.
     """
     if len(polygon) < 3:
         return np.zeros(len(directions))
     edges = np.roll(polygon, -1, axis=0) - polygon
     normals = np.column_stack([edges[:, 1], -edges[:, 0]])
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    slack = np.sum(normals * (polygon - inside), axis=1)
+    slack = np.sum(normals * (polygon - point), axis=1)
     if np.any(slack < 0.0):
         return np.zeros(len(directions))
-    towards = directions @ normals.T
-    return np.asarray(np.min(np.where(towards > _LEVEL, slack / np.maximum(towards, _LEVEL), np.inf), axis=1))
+    cosines = directions @ normals.T
+    return np.asarray(np.min(np.where(cosines > _MIN_COSINE, slack / np.maximum(cosines, _MIN_COSINE), np.inf), axis=1))

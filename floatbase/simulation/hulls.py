@@ -13,10 +13,10 @@ import pinocchio as pin
 from floatbase._validation import Array, read_only
 from floatbase.robots import Robot
 
-_THINNEST = 1e-3  # m: flatter points have no hull for MuJoCo
-_SIDES = 24  # of the prism that stands for a cylinder: it is within 1 % of the radius
-_BLOCK = 1024  # points at a time: what one core's cache holds
-_DIRECTIONS = 1000  # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 0.2 mm
+_MIN_THICKNESS = 1e-3  # m: flatter points have no hull for MuJoCo
+_PRISM_SIDES = 24  # of the prism that stands for a cylinder: it is within 1 % of the radius
+_BLOCK_SIZE = 1024  # points at a time: what one core's cache holds
+_N_DIRECTIONS = 1000  # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 0.2 mm
 
 
 @lru_cache(maxsize=16)
@@ -29,31 +29,31 @@ def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
     if not robot.is_floating:
         return ()
     clouds = dict[int, list[Array]]()
-    for item in _collisions(robot):
-        points = _points(item.geometry) @ item.placement.rotation.T + item.placement.translation
+    for item in _collision_objects(robot):
+        points = _shape_points(item.geometry) @ item.placement.rotation.T + item.placement.translation
         clouds.setdefault(int(item.parentJoint), []).append(points)
     hulls = {joint: np.vstack(cloud) for joint, cloud in clouds.items()}
-    return tuple((joint, read_only(_farthest(points))) for joint, points in hulls.items() if _thickness(points) > _THINNEST)
+    return tuple((joint, read_only(_extreme_points(points))) for joint, points in hulls.items() if _thickness(points) > _MIN_THICKNESS)
 
 
-def _collisions(robot: Robot) -> list[Any]:
+def _collision_objects(robot: Robot) -> list[Any]:
     """The links' collision shapes, or what is seen of links without; no meshes where one of their files is missing."""
     root = ElementTree.fromstring(robot.urdf)
     for link in root.findall("link"):
         if link.find("collision") is None:
-            for seen in link.findall("visual"):
-                seen.tag = "collision"
+            for visual in link.findall("visual"):
+                visual.tag = "collision"
     try:
-        return _read(robot, root)
+        return _read_geometry(robot, root)
     except ValueError:
         for link in root.findall("link"):
             for shape in link.findall("collision"):
                 if shape.find("geometry/mesh") is not None:
                     link.remove(shape)
-        return _read(robot, root)
+        return _read_geometry(robot, root)
 
 
-def _read(robot: Robot, root: ElementTree.Element) -> list[Any]:
+def _read_geometry(robot: Robot, root: ElementTree.Element) -> list[Any]:
     """The collision shapes of a URDF. Raises `ValueError` where a file of a mesh is missing."""
     urdf = ElementTree.tostring(root, encoding="unicode")
     loader = coal.CachedMeshLoader(coal.BV_OBB)  # legs share files; of other kinds of trees Python cannot see the vertices
@@ -63,19 +63,19 @@ def _read(robot: Robot, root: ElementTree.Element) -> list[Any]:
     )
 
 
-def _points(shape: Any) -> Array:
+def _shape_points(shape: Any) -> Array:
     """Points whose hull is a shape, in its own frame, shape (n, 3), m; none for a kind that is not known."""
     match shape:
         case coal.Box():
             return np.array(shape.halfSide).ravel() * (2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0)
         case coal.Sphere():
-            return shape.radius * _directions()
+            return shape.radius * _sphere_directions()
         case coal.Cylinder() | coal.Capsule():
             ends = np.array([[0.0, 0.0, -shape.halfLength], [0.0, 0.0, shape.halfLength]])
-            angles = np.arange(_SIDES) * 2.0 * np.pi / _SIDES
-            circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_SIDES)])
-            around = circle if isinstance(shape, coal.Cylinder) else _directions()
-            return np.vstack([end + shape.radius * around for end in ends])
+            angles = np.arange(_PRISM_SIDES) * 2.0 * np.pi / _PRISM_SIDES
+            circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_PRISM_SIDES)])
+            profile = circle if isinstance(shape, coal.Cylinder) else _sphere_directions()
+            return np.vstack([end + shape.radius * profile for end in ends])
         case coal.BVHModelBase():
             return np.array(shape.vertices())
     return np.zeros((0, 3))
@@ -90,21 +90,21 @@ def _thickness(points: Array) -> float:
     return float(np.ptp(centred @ axes, axis=0).min())
 
 
-def _farthest(points: Array) -> Array:
+def _extreme_points(points: Array) -> Array:
     """Those points, shape (m, 3), that are the farthest in some direction: enough for a hull."""
-    directions = _directions()
-    best, reach = np.zeros(len(directions), dtype=int), np.full(len(directions), -np.inf)
-    for first in range(0, len(points), _BLOCK):
-        reaches = directions @ points[first : first + _BLOCK].T
-        ahead = reaches.argmax(axis=1)
-        farther = (found := reaches[np.arange(len(directions)), ahead]) > reach
-        best[farther], reach[farther] = first + ahead[farther], found[farther]
+    directions = _sphere_directions()
+    best, support = np.zeros(len(directions), dtype=int), np.full(len(directions), -np.inf)
+    for first in range(0, len(points), _BLOCK_SIZE):
+        supports = directions @ points[first : first + _BLOCK_SIZE].T
+        indices = supports.argmax(axis=1)
+        farther = (candidate := supports[np.arange(len(directions)), indices]) > support
+        best[farther], support[farther] = first + indices[farther], candidate[farther]
     return points[np.unique(best)]
 
 
-def _directions() -> Array:
+def _sphere_directions() -> Array:
     """Unit vectors that cover a sphere evenly along a golden spiral, shape (n, 3), the six axes among them."""
-    i = np.arange(_DIRECTIONS)
-    z, turn = 1.0 - (2.0 * i + 1.0) / _DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
-    flat = np.sqrt(1.0 - z**2)
-    return np.vstack([np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z]), np.eye(3), -np.eye(3)])
+    i = np.arange(_N_DIRECTIONS)
+    z, angle = 1.0 - (2.0 * i + 1.0) / _N_DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
+    radius = np.sqrt(1.0 - z**2)
+    return np.vstack([np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z]), np.eye(3), -np.eye(3)])
