@@ -7,7 +7,7 @@ robot, splits them at creases so that edges look sharp, and merges them into one
 The file `assets/meshes/<robot>.npz` contains, for part i: `joints[i]`, its joint's name; rows
 `vertex_start[i]:vertex_start[i + 1]` of `vertices` (int16, times `steps[i]` metres, in the joint's frame) and of `colours`
 (index of `palette`, 0-255); rows `face_start[i]:face_start[i + 1]` of `faces` (indices of the part's own vertices).
-`appearance` and `moving` say which robots look like that: those for whose URDF `appearance(urdf, moving)` is the same.
+`appearance` and `moving` say which robots look like that: those for whose URDF `appearance_digest(urdf, moving)` is the same.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ import numpy as np
 import trimesh
 
 from floatbase.robots import Robot, catalogue, load
-from floatbase.viewer import Piece, appearance, urdf_visuals
+from floatbase.viewer.scene.meshes import appearance_digest
+from floatbase.viewer.scene.visuals import VisualMesh, urdf_visuals
 
 OUT = Path(__file__).parent / "meshes"
 FACES = 36_000  # of a robot; fewer if the file would be larger than SIZE
@@ -33,13 +34,13 @@ PAINT = {"solo12": SOLO, "solo8": SOLO}
 Light = tuple[np.ndarray, trimesh.Trimesh]  # colour and mesh
 
 
-def paint(robot: str, piece: Piece) -> np.ndarray:
+def paint(robot: str, piece: VisualMesh) -> np.ndarray:
     """The piece's colour: of PAINT if the robot is there, else its own."""
     words = [word for word in PAINT.get(robot, {}) if word in piece.source]
     return np.array(PAINT[robot][max(words, key=len)]) if words else piece.colour
 
 
-def budget(pieces: list[Piece], total: float) -> list[int]:
+def budget(pieces: list[VisualMesh], total: float) -> list[int]:
     """How many faces each piece may have: in proportion to its size, `total` together."""
     have = np.array([len(piece.mesh.faces) for piece in pieces])
     size = np.array([np.sqrt(piece.mesh.area) for piece in pieces])
@@ -86,7 +87,7 @@ def build(name: str) -> None:
         path = write(robot, pieces, total)
 
 
-def write(robot: Robot, pieces: list[Piece], total: float) -> Path:
+def write(robot: Robot, pieces: list[VisualMesh], total: float) -> Path:
     """Write the light meshes with `total` faces, print their numbers, and return the file."""
     light: dict[int, list[Light]] = {}
     for piece, faces in zip(pieces, budget(pieces, total), strict=True):
@@ -98,7 +99,7 @@ def write(robot: Robot, pieces: list[Piece], total: float) -> Path:
     path = OUT / f"{robot.name}.npz"
     np.savez_compressed(
         path,
-        appearance=np.array(appearance(robot.urdf, robot.joint_names)),
+        appearance=np.array(appearance_digest(robot.urdf, robot.joint_names)),
         moving=np.array(robot.joint_names),
         joints=np.array([robot.model.names[joint] for joint in sorted(light)]),
         steps=np.array(steps),

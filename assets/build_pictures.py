@@ -17,7 +17,8 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import floatbase as fb
-from floatbase.viewer import FIGURES, Viewer
+from floatbase.lessons import FIGURES
+from floatbase.viewer import Viewer
 
 OUT = Path(__file__).parent / "pictures"
 FLAGS = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

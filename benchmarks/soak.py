@@ -134,7 +134,9 @@ def walking() -> Soak:
     walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot))
     rng, paces = np.random.default_rng(0), list[float]()
     with closing(fb.Viewer(robot)) as view:
-        run = LiveSimulation(fb.Simulation(robot), walk, lambda record: view.show(record.final, record.contacts, record.measured[-1]))
+        run = LiveSimulation(
+            fb.Simulation(robot), walk, lambda record: view.show(record.final, record.contacts, record.measured[-1])
+        )
 
         def step() -> None:
             walk.velocity, walk.yaw_rate = rng.uniform([-0.1, -0.1], [0.4, 0.1]), rng.uniform(-0.3, 0.3)
@@ -171,11 +173,11 @@ def viewer() -> Soak:
         spent.append(time.perf_counter() - start)
 
     def step() -> None:
-        if view.window.browsers < 2:
+        if view.window.n_pages < 2:
             close(pages)
-            wait_for(lambda: view.window.browsers == 0, "a page that was closed stays connected")
+            wait_for(lambda: view.window.n_pages == 0, "a page that was closed stays connected")
             pages.extend(sleeper(view.window.port) for _ in range(2))
-            wait_for(lambda: view.window.browsers == 2, "a page cannot connect")
+            wait_for(lambda: view.window.n_pages == 2, "a page cannot connect")
         draw()
 
     with closing(fb.Viewer(robot)) as view:
@@ -199,7 +201,7 @@ def viewers() -> Soak:
         with closing(fb.Viewer(robot)) as view:
             page = sleeper(view.window.port)
             view.show(home)
-            wait_for(lambda: view.window.browsers == 1, "a page cannot connect")
+            wait_for(lambda: view.window.n_pages == 1, "a page cannot connect")
         page.close()
         with suppress(OSError):
             socket.create_connection(("127.0.0.1", view.window.port), timeout=2).close()

@@ -24,7 +24,8 @@ import meshcat
 import numpy as np
 
 import floatbase as fb
-from floatbase.viewer import Window, wire
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.transport.window import Window
 
 TARGETS = {"set_transform": 25.0, "show": 1500.0}  # µs, median
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
@@ -56,7 +57,7 @@ def transforms(window: Window, calls: int) -> Iterator[Row]:
     yield "set_transform", "meshcat's Visualizer", timed(lambda i: box.set_transform(matrices[i % 100]), calls)
 
     def put(i: int) -> None:
-        window.put([wire.set_transform("/meshcat/box", matrices[i % 100])])
+        window.put([protocol.set_transform("/meshcat/box", matrices[i % 100])])
 
     yield "set_transform", "Window.put", timed(put, calls)
 

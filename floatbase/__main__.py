@@ -65,7 +65,7 @@ def _again(given: Sequence[str], asked: int, port: int) -> str:
 
 def start_when_seen(page: Playground, ended: threading.Event) -> None:
     """Let the robot run once a page is connected, so that nobody finds it fallen, or paused for want of a reader."""
-    while not (page.view.window.browsers or ended.wait(_LOOK)):
+    while not (page.view.window.n_pages or ended.wait(_LOOK)):
         pass
     if not ended.is_set():
         page.start()
@@ -83,7 +83,7 @@ def _view(options: argparse.Namespace, given: Sequence[str]) -> int:
         page = Playground(robot, settings, background=options.background, port=options.port)
         with closing(page):
             page.view.show(page.session.sim.state)
-            page.view.ending(_again(given, options.port, page.view.window.port))
+            page.view.set_disconnect_message(_again(given, options.port, page.view.window.port))
             print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
                 page.view.window.open()

@@ -53,5 +53,5 @@ def judge_all(count: int) -> None:
 
 
 def _drawn(panel: SliderPanel) -> Any:
-    picture = panel.view.canvas.picture if panel.view else {}
+    picture = panel.view.renderer.picture if panel.view else {}
     return {path: (item.matrix.tolist(), item.colour) for path, item in picture.items()}

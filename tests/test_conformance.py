@@ -28,16 +28,17 @@ from floatbase.behaviours import Gait, Stand, Walk
 from floatbase.control import AnalyticController
 from floatbase.errors import FloatbaseError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
-from floatbase.lessons import ConstantTorques
+from floatbase.lessons import ConstantTorques, qp_plots
 from floatbase.qp import table_top
 from floatbase.simulation import LiveSimulation, PerturbedSimulation
-from floatbase.viewer import plots, programs, recording
+from floatbase.viewer.export import recording
+from floatbase.viewer.plots import run_plots
 
 ROOMS = (
     "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp", "robots", "simulation",
     "viewer",
 )  # fmt: skip
-MODULES = (plots, programs, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
+MODULES = (run_plots, qp_plots, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
 ZERO = np.zeros(12)
 # for every parameter; a robot's state, say, becomes that of another robot instead of ragged numbers
 FEW = {"NaN": np.nan, "instance": SimpleNamespace(), "ragged": [[1.0], [1.0, 2.0]]}
@@ -90,8 +91,10 @@ def right() -> dict[str, Any]:
     view, qp = fb.Viewer(robot), values()["QP"]
     forces = 30.0 * np.tile(UP, 4)
     return values() | {
-        "Simulation": sim, "PerturbedSimulation": PerturbedSimulation(robot), "Viewer": view, "WholeBodyController": controller(),
-        "LiveSimulation": LiveSimulation(sim, controller(), lambda record: None), "HydraulicActuators": oil, "Cylinders": oil.cylinders,
+        "Simulation": sim, "PerturbedSimulation": PerturbedSimulation(robot), "Viewer": view, "WholeBodyController":
+        controller(),
+        "LiveSimulation": LiveSimulation(sim, controller(), lambda record: None), "HydraulicActuators": oil,
+        "Cylinders": oil.cylinders,
         "AnalyticController": AnalyticController(robot, contacts, state), "Delay": Delay(robot, 0.01), "Walk": walk,
         "FirstOrderLag": FirstOrderLag(robot, 10.0), "Stand": Stand(robot, fb.Contacts.feet(robot)), "Gait": gait,
         "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
@@ -102,22 +105,25 @@ def right() -> dict[str, Any]:
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2, "Mapping": {"a": 0.0},
         "A": np.eye(12), "H": np.eye(12), "G": np.eye(12), "b": ZERO, "g": ZERO, "h": ZERO, "x": ZERO, "r": ZERO,
         "N": np.eye(12)[:, :3], "tau": ZERO, "tau_desired": ZERO, "q_joints": state.q[7:], "v_joints": ZERO,
-        "size": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q, "v": state.v, "dv": np.zeros(18),
-        "qdd": np.zeros(18), "forces": forces, "plots.friction_used.forces": record().measured,
+        "size": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q, "v": state.v, "dv":
+        np.zeros(18),
+        "qdd": np.zeros(18), "forces": forces, "run_plots.friction_used.forces": record().measured,
         "beta": np.zeros(space.dimension), "wrench": np.ones(6), "direction": np.ones(6),
         "points": contacts.positions(state), "max_normal_force": np.full(4, 200.0), "a": 10.0,
         "torque_limits": np.full(12, 20.0), "corners": talos.feet[0].corners, "flat_feet.robot": talos,
         "Gait.walk.robot": talos, "with_floating_base.robot": judges.load("ur5"), "force": np.array([0.1, 0.0, 1.0]),
         "cost": fb.Quadratic.zero(space.dimension), "cost_on_qdd": fb.Quadratic.zero(18),
         "f": fb.Affine(np.eye(12), ZERO), "residual": fb.Affine(np.eye(12), ZERO), "parts": fb.Affine(np.eye(12), ZERO),
-        "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind, "programs.allowed.qp": table_top(),
-        "programs.plot.qp": table_top(), "block": "tau", "pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))],
-        "LIPM.com": np.zeros(2), "nominal_foothold": np.zeros(2), "neutral_point.velocity": np.zeros(2), "dcm_error": np.zeros(2),
+        "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind, "qp_plots.feasible_polygon.qp": table_top(),
+        "qp_plots.plot.qp": table_top(), "block": "tau", "pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))],
+        "LIPM.com": np.zeros(2), "nominal_foothold": np.zeros(2), "neutral_point.velocity": np.zeros(2), "dcm_error":
+        np.zeros(2),
         "point": np.zeros(2), "support_margin.feet": np.eye(2), "places": np.zeros((2, 3)), "time": (0.0, 0.1),
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3, "alpha": 0.1, "rate": 30.0,
         "high": 1.0, "low": 0.0, "lift": 0.0, "omega": 5.0, "centripetal_acceleration.omega": UP,
-        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP, "LinearInequality.coefficients": (np.eye(18), np.ones(18)),
+        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP, "LinearInequality.coefficients":
+        (np.eye(18), np.ones(18)),
         "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2", "solver": "daqp",
         "column": "force", "status": "inside", "root": "/robot", "lesson": "07", "path": "floatbase-view.html",
         "load_urdf.path": str(judges.load("ur5").urdf),
@@ -140,19 +146,23 @@ LEFT_OUT = {
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian", "raibert_foothold",
         "target_shapes", "targets_at",
         "QP.objective", "ModelMismatch.assumed_qp", "ModelMismatch.check_names",
-        "LinearInequality.labels", "LinearInequality.at", "Limits.check_names", "Limits.normal_forces", "Limits.bounded_points", "Problem.check",
-        "recording.lifted_at", "Cylinders.force", "Cylinders.line_pressures", "Cylinders.orifice_flow", "Cylinders.valve_flows",
-        "Cylinders.leakage_flow", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay", "Cylinders.opening_for",
-        "recording.checked_rollout", "Ground.clearances", "with_image", "hear_at_once",
+        "LinearInequality.labels", "LinearInequality.at", "Limits.check_names", "Limits.normal_forces",
+        "Limits.bounded_points", "Problem.check",
+        "recording.swing_feet_at", "Cylinders.force", "Cylinders.line_pressures", "Cylinders.orifice_flow",
+        "Cylinders.valve_flows",
+        "Cylinders.leakage_flow", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay",
+        "Cylinders.opening_for",
+        "recording.as_rollout", "Ground.clearances", "with_thumbnail", "receive_during_cells",
     ),
     "needs trimesh": ("urdf_visuals",),
-    "draws what it is given": ("Viewer.draw", "Viewer.play_pictures", "below", "hexadecimal", "robot_meshes", "appearance"),
+    "draws what it is given": ("Viewer.draw", "Viewer.play_pictures", "prefixed", "hex_code", "robot_meshes",
+    "appearance_digest"),
     "Contacts and rollout call them, and have checked": (
         "ConstantTorques.__call__", "Torques", *(f"{kind}.{method}"
             for kind in ("PointContact", "FlatFootContact", "RollingWheel", "LinearConstraint")
             for method in ("positions", "jacobian", "constraint", "force_generator_matrix", "slip")),
     ),
-    "moves a control that is there, with tests of its own": ("Viewer.move",),
+    "moves a control that is there, with tests of its own": ("Viewer.set_control_value",),
     "ends what other calls need": ("Viewer.close", "LiveSimulation.close"),
     "starts processes, with tests of its own": ("sweep", "push_recovery", "Table.read"),
     "starts a thread": ("LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start", "LiveSimulation.reset"),

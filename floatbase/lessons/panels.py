@@ -16,7 +16,11 @@ import ipywidgets as widgets
 from floatbase.errors import FloatbaseError
 from floatbase.lessons.stops import DIRECTIONS, computed, recorded_pushes
 from floatbase.simulation import PUSH_DISPLAY_TIME, Controller, LiveSimulation, Rollout, Simulation, status_message
-from floatbase.viewer import Viewer, hear_at_once, published, push_at, with_image
+from floatbase.viewer import Viewer
+from floatbase.viewer.export.display_mode import display_mode
+from floatbase.viewer.export.recording import push_at
+from floatbase.viewer.export.thumbnail import with_thumbnail
+from floatbase.viewer.transport.notebook_events import receive_during_cells
 
 _NARROW = "min(340px, 100% - 4px)"  # width below which nothing of a slider is left but its name and its number
 _LETTER, _NAME = 0.55, 10.4  # em: of a letter of a slider's name, at most on average; of a name where the page is narrow
@@ -67,10 +71,10 @@ class SliderPanel(widgets.VBox):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The picture is put in only here: by now the camera has been placed, and a still picture keeps that view."""
-        if published.display() == "site":
+        if display_mode() == "site":
             return computed(self)
         self._picture.children = [self.view.widget()] if self.view else []
-        return with_image(super()._repr_mimebundle_(**kwargs), *self._picture.children)
+        return with_thumbnail(super()._repr_mimebundle_(**kwargs), *self._picture.children)
 
 
 def _wide(share: int, least: int) -> widgets.Layout:
@@ -158,7 +162,9 @@ def live(sim: Simulation, controller: Controller, view: Viewer, **options: Any) 
     """
 
     def show(record: Rollout) -> None:
-        view.show(record.final, contacts=record.contacts, forces=record.measured[-1], push=push_at(record, -1, PUSH_DISPLAY_TIME))
+        view.show(
+            record.final, contacts=record.contacts, forces=record.measured[-1], push=push_at(record, -1, PUSH_DISPLAY_TIME)
+        )
 
     return LiveSimulation(sim, controller, show, **options)
 
@@ -219,10 +225,10 @@ class _PushPanel(widgets.VBox):
         self._run, self._view, self._most = run, view, most
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        if published.display() == "site":
+        if display_mode() == "site":
             forces = [self._most * part / 4 for part in (1, 2, 3, 4)]
             return recorded_pushes({"": (self._view, self._run.sim, self._run.controller)}, forces, list(DIRECTIONS))
-        return with_image(super()._repr_mimebundle_(**kwargs), self.children[0])
+        return with_thumbnail(super()._repr_mimebundle_(**kwargs), self.children[0])
 
 
 class _Line(widgets.Label):
@@ -243,7 +249,7 @@ class _Line(widgets.Label):
 def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:
     made = widgets.Button(description=text, layout=widgets.Layout(width="6em", flex="0 0 auto"))
     made.on_click(pressed)
-    hear_at_once(made)
+    receive_during_cells(made)
     return made
 
 

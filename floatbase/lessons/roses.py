@@ -21,7 +21,8 @@ from matplotlib.axes import Axes
 from floatbase._validation import as_string
 from floatbase.errors import InputError
 from floatbase.simulation import PushRecovery, Simulation, push_recovery
-from floatbase.viewer import Picture, roses
+from floatbase.viewer import Picture
+from floatbase.viewer.plots import push_recovery_plots
 
 _FILE = Path(__file__).with_name("roses.json")
 _DIRECTIONS = 8
@@ -45,7 +46,7 @@ def measured_rose(lesson: str) -> PushRecovery:
 
 def plot_roses(lesson: str, axis: Axes | None = None) -> Axes:
     """The rose of that lesson, over the former lesson's in grey. axis: polar axes to plot on; None for a new figure."""
-    return roses.plot(measured_rose(lesson), axis, theory=False, before=_before(lesson))
+    return push_recovery_plots.plot(measured_rose(lesson), axis, theory=False, previous=_before(lesson))
 
 
 def draw_roses(lesson: str, scale: float | None = None) -> Picture:
@@ -53,7 +54,7 @@ def draw_roses(lesson: str, scale: float | None = None) -> Picture:
 
     scale: length of a drawn push, m/N; None makes the widest rose half as wide again as the stance.
     """
-    return roses.picture(measured_rose(lesson), scale, theory=False, before=_before(lesson))
+    return push_recovery_plots.picture(measured_rose(lesson), scale, theory=False, previous=_before(lesson))
 
 
 def rose_controller(lesson: str) -> Callable[[], Any]:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from floatbase.lessons.static_export import Control, StaticExport
 from floatbase.simulation import Controller, Push, Rollout, Simulation, rollout
-from floatbase.viewer.published import Control, Pack
 
 if TYPE_CHECKING:
     from floatbase.lessons.panels import SliderPanel
@@ -87,10 +87,10 @@ def computed(panel: SliderPanel) -> dict[str, Any]:
     at, together = places([len(stops) for stops in values.values()], first)
     words = _ONLY + ("" if together else _ONE)
     panel.draw_at(panel.shown())
-    pack = Pack([panel.view] if panel.view else [], beside=panel.beside, words=words)
+    pack = StaticExport([panel.view] if panel.view else [], beside=panel.beside, words=words)
     for place in at:
         note = panel.draw_at({name: values[name][i] for name, i in zip(values, place, strict=True)})
-        pack.stop(place, note)
+        pack.add_sample(place, note)
     panel.draw_at(panel.shown())
     controls = [_control(panel.sliders[name], values[name], i) for name, i in zip(values, first, strict=True)]
     return pack.bundle(controls, together)
@@ -113,14 +113,14 @@ def recorded_pushes(
     for view, sim, controller in titles.values():
         standing = _pushed(sim, controller, 0.0, 0.0)
         view.show(standing.final, standing.contacts, standing.measured[-1])
-    pack = Pack(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
+    pack = StaticExport(views, words=RECORDED, titles=list(titles) if len(titles) > 1 else ())
     for k in range(len(directions)):
-        pack.stop((0, k))
+        pack.add_sample((0, k))
     for (i, force), (k, direction) in product(enumerate(sizes), enumerate(directions)):
         records = [_pushed(sim, controller, force, DIRECTIONS[direction]) for _, sim, controller in titles.values()]
         for view, record in zip(views, records, strict=True):
             view.play(record, rate=_RATE)
-        pack.stop((i + 1, k), ", ".join(_fates(titles, records)))
+        pack.add_sample((i + 1, k), ", ".join(_fates(titles, records)))
     return pack.bundle(
         [
             Control("push", ("0", *(f"{force:.0f}" for force in sizes)), 0, unit="N"),

@@ -12,6 +12,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.errors import ViewerError
+from floatbase.lessons import static_export
 from floatbase.playground.cards import Card, Judge
 from floatbase.playground.equation import SYMBOLS
 from floatbase.playground.pace import Pace
@@ -21,7 +22,9 @@ from floatbase.playground.settings import Settings
 from floatbase.playground.terms import arrows
 from floatbase.robots import Robot
 from floatbase.simulation import ACTIVE_STATUSES, PUSH_DISPLAY_TIME, LiveSimulation, status_message
-from floatbase.viewer import Picture, published, push_at
+from floatbase.viewer import Picture
+from floatbase.viewer.export.display_mode import display_mode
+from floatbase.viewer.export.recording import push_at
 
 _STILL = "The playground needs the live lesson: here its robot stands still."
 _SHOWN = ("forces", "cones")  # terms that are drawn at first
@@ -71,7 +74,7 @@ class Playground:
         )  # fmt: skip
         self.run.on_status(self._tell)
         self.pace = Pace()
-        self.view.stand_on(session.sim.ground)
+        self.view.set_ground(session.sim.ground)
         self._panel = Panel(self)
         self._write()
 
@@ -171,7 +174,7 @@ class Playground:
     def _hand_over(self) -> None:
         session = self.session
         self.run.set_controller(session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD)
-        self.view.stand_on(session.sim.ground)  # the true one, whatever the controller believes
+        self.view.set_ground(session.sim.ground)  # the true one, whatever the controller believes
         if self.view.painter.facets not in (None, session.settings.facets):
             self.view.painter = self.view.painter.replace(facets=session.settings.facets)
 
@@ -200,11 +203,11 @@ class Playground:
         judge = self.judge  # a challenge may be chosen meanwhile
         with suppress(ViewerError):
             if judge is not None:
-                self.view.note("card", f"{judge.card.text}\n{judge.says}")
+                self.view.add_text("card", f"{judge.card.text}\n{judge.says}")
             elif self.robot.is_floating:
-                self.view.note("card", "")
+                self.view.add_text("card", "")
             code = self.session.settings.code(self.robot, PERIOD, self._last_push)
-            self.view.note("code", code, "as Python", code=True)
+            self.view.add_text("code", code, "as Python", code=True)
 
     def _tell(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
@@ -234,7 +237,7 @@ class Playground:
             self._waits = False
             self.run.pause()
         if self.robot.is_floating:
-            self.view.strip("planned and measured forces differ by", float(record.time[-1]), gap(record), "N")
+            self.view.add_plot_point("planned and measured forces differ by", float(record.time[-1]), gap(record), "N")
 
     def _draw(self, record: fb.Rollout) -> None:
         """The last row of a slice, under the time, the part of real time that this machine reaches, and messages."""
@@ -258,16 +261,16 @@ class Playground:
             if shown:
                 picture |= arrows(term, record, self.view.scale, self.view.painter.size, settings.true_off, settings.mass[1])
         walk = self.session.walk
-        return picture if walk is None else picture | dict(self.view.walking(walk, record.final))
+        return picture if walk is None else picture | dict(self.view.walk_overlay(walk, record.final))
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        if published.display() == "site":
+        if display_mode() == "site":
             self.view.show(self.session.sim.state, self.session.sim.feet)
-            return published.Pack([self.view], words=_STILL).bundle()
+            return static_export.StaticExport([self.view], words=_STILL).bundle()
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
-        address = f", {self.url}" if self.view.window.listens else ""
+        address = f", {self.url}" if self.view.window.is_listening else ""
         return f"Playground({self.robot.name}{address})"
 
 

@@ -34,14 +34,14 @@ class Panel:
 
     def _add(self) -> None:
         view, weight, s = self._play.view, self._play.robot.weight, self._play.session.settings
-        view.button("run", self._play.run.start)
-        view.button("pause", self._play.run.pause)
-        view.button("reset", self._play.run.reset)
-        view.button("push", self._play.push)
-        view.button("all as at first", self._play.undo)
-        view.slider("speed", self._play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
-        view.slider("push [N]", partial(setattr, self._play, "force"), self._play.force, 0.0, _HARDEST * weight, 1.0)
-        view.slider("towards [°]", partial(setattr, self._play, "towards"), self._play.towards, -180.0, 180.0, 5.0)
+        view.add_button("run", self._play.run.start)
+        view.add_button("pause", self._play.run.pause)
+        view.add_button("reset", self._play.run.reset)
+        view.add_button("push", self._play.push)
+        view.add_button("all as at first", self._play.undo)
+        view.add_slider("speed", self._play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
+        view.add_slider("push [N]", partial(setattr, self._play, "force"), self._play.force, 0.0, _HARDEST * weight, 1.0)
+        view.add_slider("towards [°]", partial(setattr, self._play, "towards"), self._play.towards, -180.0, 180.0, 5.0)
         if not self._play.robot.is_floating:
             return
         self._add_cards()
@@ -49,51 +49,51 @@ class Panel:
             for i, column in enumerate(("believed", "true")):
                 value, changed = getattr(s, attribute)[i], partial(self._set_part, attribute, i)
                 word = "perfect" if high == IDEAL else ""
-                view.slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column, word)
+                view.add_slider(f"{name} {column}", changed, value, low, high, step, "believed and true", column, word)
         self._add_stance()
         self._add_walk()
         where = "its quadratic program"
-        view.slider("facets", lambda n: self._play.set(facets=round(n)), s.facets, 3, 16, 1, where)
-        view.slider("torque limits [×]", lambda x: self._play.set(torque=x), s.torque, 0.05, 1.0, 0.05, where)
-        view.slider("least force [N]", lambda x: self._play.set(least_force=x), s.least_force, 0.0, 100.0, 5.0, where)
+        view.add_slider("facets", lambda n: self._play.set(facets=round(n)), s.facets, 3, 16, 1, where)
+        view.add_slider("torque limits [×]", lambda x: self._play.set(torque=x), s.torque, 0.05, 1.0, 0.05, where)
+        view.add_slider("least force [N]", lambda x: self._play.set(least_force=x), s.least_force, 0.0, 100.0, 5.0, where)
         for i, name in enumerate(_WEIGHTS):
             changed = partial(self._set_weight, i)
-            view.slider(f"{name} ×10^", changed, 0.0, -3.0, 3.0, 0.5, where)
+            view.add_slider(f"{name} ×10^", changed, 0.0, -3.0, 3.0, 0.5, where)
         self._add_terms()
 
     def _add_cards(self) -> None:
         if self._play.robot.name in {card.robot for card in CARDS}:
             titles = [_FREE, *(f"{i + 1}. {card.title}" for i, card in enumerate(CARDS))]
-            self._play.view.choice("challenge", lambda i: self._play.choose(CARDS[i - 1] if i else None), titles)
+            self._play.view.add_dropdown("challenge", lambda i: self._play.choose(CARDS[i - 1] if i else None), titles)
 
     def _add_stance(self) -> None:
         view = self._play.view
         for foot in self._play.robot.feet:
-            view.checkbox(f"on {foot.frame}", partial(self._stand_on, foot.frame), True, "its stance")
+            view.add_checkbox(f"on {foot.frame}", partial(self._stand_on, foot.frame), True, "its stance")
         for i, axis in enumerate("xyz"):
-            view.slider(f"CoM {axis} [m]", partial(self._set_part, "shift", i), 0.0, -0.08, 0.08, 0.005, "its stance")
-        view.slider("nod and turn", self._play.nod, 0.0, 0.0, 0.35, 0.01, "its stance")
+            view.add_slider(f"CoM {axis} [m]", partial(self._set_part, "shift", i), 0.0, -0.08, 0.08, 0.005, "its stance")
+        view.add_slider("nod and turn", self._play.nod, 0.0, 0.0, 0.35, 0.01, "its stance")
 
     def _add_walk(self) -> None:
         view, gaits = self._play.view, self._gaits
         if not gaits:
             return
-        view.choice("gait", self._walk, ["stand", "step when pushed", *gaits], 0, "its steps")
-        view.slider("forwards [m/s]", partial(self._set_part, "velocity", 0), 0.0, -0.3, 0.5, 0.05, "its steps")
-        view.slider("to the left [m/s]", partial(self._set_part, "velocity", 1), 0.0, -0.2, 0.2, 0.05, "its steps")
-        view.slider("turn [rad/s]", partial(self._set_part, "velocity", 2), 0.0, -0.5, 0.5, 0.05, "its steps")
+        view.add_dropdown("gait", self._walk, ["stand", "step when pushed", *gaits], 0, "its steps")
+        view.add_slider("forwards [m/s]", partial(self._set_part, "velocity", 0), 0.0, -0.3, 0.5, 0.05, "its steps")
+        view.add_slider("to the left [m/s]", partial(self._set_part, "velocity", 1), 0.0, -0.2, 0.2, 0.05, "its steps")
+        view.add_slider("turn [rad/s]", partial(self._set_part, "velocity", 2), 0.0, -0.5, 0.5, 0.05, "its steps")
 
     def _add_terms(self) -> None:
         view = self._play.view
         for name, (colour, meaning) in MEANINGS.items():
-            view.explain(f"term {name}", colour, meaning)
+            view.add_legend_entry(f"term {name}", colour, meaning)
         for term in EQUATION:
             show = partial(self._play.show_term, term.name)
-            view.term(f"show {term.name}", show, self._play.shown[term.name], term.symbol, "shown")
+            view.add_toggle(f"show {term.name}", show, self._play.shown[term.name], term.symbol, "shown")
             if term.believed:
-                view.term(term.believed, partial(self._switch, "believed_off", term.name), True, term.symbol, "believed")
+                view.add_toggle(term.believed, partial(self._switch, "believed_off", term.name), True, term.symbol, "believed")
             if term.true:
-                view.term(term.true, partial(self._switch, "true_off", term.name), True, term.symbol, "world")
+                view.add_toggle(term.true, partial(self._switch, "true_off", term.name), True, term.symbol, "world")
 
     @property
     def _gaits(self) -> list[str]:
@@ -126,7 +126,7 @@ class Panel:
         if play.robot.is_floating:
             values |= {f"show {term.name}": play.shown[term.name] for term in EQUATION}
         for name, value in values.items():
-            play.view.move(name, value)
+            play.view.set_control_value(name, value)
 
     def follow(self, s: Settings) -> None:
         """Show settings at the controls, which only a floating robot has."""
@@ -148,4 +148,4 @@ class Panel:
             values |= {term.believed: term.name not in s.believed_off} if term.believed else {}
             values |= {term.true: term.name not in s.true_off} if term.true else {}
         for name, value in values.items():
-            view.move(name, value)
+            view.set_control_value(name, value)

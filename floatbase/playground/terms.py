@@ -7,7 +7,8 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import Contacts, equations_of_motion
-from floatbase.viewer import COM, MEASURED, Picture, below, marks, shapes
+from floatbase.viewer import Picture, markers, prefixed, shapes
+from floatbase.viewer.scene.colours import COM, MEASURED
 
 _PER_ACCELERATION = 0.03  # m of arrow per m/s², of the feet's drift
 _TEXT = 0.06  # height of letters, over the size of the robot
@@ -48,7 +49,7 @@ def arrows(
     lacking = term in off and term in ("gravity", "velocity")
     drawn = {} if lacking else made[term](record, scale * (mass if term in _OF_MASS else 1.0), size)
     if drawn:
-        return below(f"term {term}", drawn)
+        return prefixed(f"term {term}", drawn)
     words = MEANINGS[term][1].split(",")[0] + (": switched off" if lacking else " ≈ 0")
     at = np.array(record.final.com) + [-_BEHIND * size, 0.0, _ROWS[term] * size]
     return {f"word {term}": shapes.label(at, words, _TEXT * size)}
@@ -95,7 +96,7 @@ def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
         moment = scale / _LEVER * tau * axis
         if np.linalg.norm(moment) > _SHORTEST:
             at = state.joint_transforms[record.robot.model.getJointId(joint)][:3, 3]
-            picture[f"/{joint}"] = marks.curled_arrow(at, moment, MEASURED, on_top=True)
+            picture[f"/{joint}"] = markers.curled_arrow(at, moment, MEASURED, on_top=True)
     return picture
 
 

@@ -39,7 +39,7 @@ class PushRecovery(Value):
     frame: the frame that was pushed.
     state, contacts: the robot and its stance, as the simulation began, before anything pushed.
 
-    `floatbase.viewer.roses` plots it, and draws it on the ground below the robot.
+    `floatbase.viewer.plots.push_recovery_plots` plots it, and draws it on the ground below the robot.
     """
 
     directions: Array
@@ -72,7 +72,9 @@ class PushRecovery(Value):
         weight_wrench = np.array([0.0, 0.0, wrenches.weight, 0.0, 0.0, 0.0])
         if not wrenches.contains(weight_wrench):
             return read_only(np.zeros(len(self.directions)))
-        return read_only([_max_scaling(wrenches, -np.concatenate([d, np.cross(lever, d)]), weight_wrench) for d in self.unit_vectors])
+        return read_only(
+            [_max_scaling(wrenches, -np.concatenate([d, np.cross(lever, d)]), weight_wrench) for d in self.unit_vectors]
+        )
 
     @cached_property
     def capture_point_bound(self) -> Array:

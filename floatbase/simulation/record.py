@@ -91,7 +91,7 @@ class Rollout(Value):
 
     def plot(self) -> Figure:
         """A figure of the record: centre of mass, normal forces, friction used, torques. More: `floatbase.viewer.plots`."""
-        figure: Figure = import_module("floatbase.viewer").plots.plot(self)  # a floor above, which loads when first used
+        figure: Figure = import_module("floatbase.viewer").plots.plot_run(self)  # a floor above, which loads when first used
         return figure
 
     @cached_property
@@ -110,7 +110,11 @@ class Rollout(Value):
         include_rolling: whether the way that a ball rolls counts, too: its lowest point moves with it, and nothing slides.
         """
         self._check_not_empty()
-        positions = self.foot_positions if as_bool("include_rolling", include_rolling) else self.foot_positions - self.rolling_displacement()
+        positions = (
+            self.foot_positions
+            if as_bool("include_rolling", include_rolling)
+            else self.foot_positions - self.rolling_displacement()
+        )
         max_distance, first = np.zeros(positions.shape[1]), 0
         for contact in self.contacts:
             points = slice(first, first := first + len(contact.point_names))
@@ -278,7 +282,9 @@ class Recorder:
         """
         sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)
-        measured = self._mean_over_substeps(sim._contact_forces_from(self._step_contact_geoms[steps], self._step_contact_forces[steps]))
+        measured = self._mean_over_substeps(
+            sim._contact_forces_from(self._step_contact_geoms[steps], self._step_contact_forces[steps])
+        )
         lowest = sim._lowest_points(self._foot_centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:

@@ -7,8 +7,8 @@ from typing import Any
 
 from floatbase._validation import as_bool, as_callable, as_integer, as_number, as_positive, as_string, as_strings
 from floatbase.errors import InputError
-from floatbase.viewer import wire
-from floatbase.viewer.window import Window
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.transport.window import Window
 
 COLUMNS = ("", "believed", "true")
 
@@ -24,7 +24,7 @@ class Controls:
     def __init__(self) -> None:
         self._controls: dict[str, Callable[[Any], None]] = {}
 
-    def slider(
+    def add_slider(
         self,
         name: str,
         changed: Callable[[float], None],
@@ -48,21 +48,21 @@ class Controls:
         """
         low, high = as_number("low", low), as_number("high", high, minimum=as_number("low", low))
         value, step = as_number("value", value, "", low, high), as_positive("step", step)
-        place = _place(name, section, column) | ({"at_most": word} if (word := as_string("at_most", at_most)) else {})
+        place = _placement(name, section, column) | ({"at_most": word} if (word := as_string("at_most", at_most)) else {})
         changed = as_callable("changed", changed, "changed(value)")
-        self._control(name, changed, value=value, min=low, max=high, step=step, **place)
+        self._add_control(name, changed, value=value, min=low, max=high, step=step, **place)
 
-    def button(self, name: str, pressed: Callable[[], None], section: str = "") -> None:
+    def add_button(self, name: str, pressed: Callable[[], None], section: str = "") -> None:
         """Add a button to the panel in the page; `pressed()` is called in the window's thread."""
         as_callable("pressed", pressed, "pressed()")
-        self._control(name, lambda _: pressed(), **_place(name, section))
+        self._add_control(name, lambda _: pressed(), **_placement(name, section))
 
-    def checkbox(self, name: str, changed: Callable[[bool], None], value: bool, section: str = "") -> None:
+    def add_checkbox(self, name: str, changed: Callable[[bool], None], value: bool, section: str = "") -> None:
         """Add a check box to the panel in the page; `changed(value)` is called in the window's thread."""
         changed = as_callable("changed", changed, "changed(value)")
-        self._control(name, changed, value=as_bool("value", value), **_place(name, section))
+        self._add_control(name, changed, value=as_bool("value", value), **_placement(name, section))
 
-    def choice(
+    def add_dropdown(
         self, name: str, changed: Callable[[int], None], choices: Sequence[str], value: int = 0, section: str = ""
     ) -> None:
         """Add a list to choose from to the panel in the page.
@@ -78,9 +78,9 @@ class Controls:
             raise InputError("choices is empty; give at least one text.")
         changed = as_callable("changed", changed, "changed(value)")
         value = as_integer("value", value, 0, len(choices) - 1)
-        self._control(name, changed, value=value, choices=list(choices), **_place(name, section))
+        self._add_control(name, changed, value=value, choices=list(choices), **_placement(name, section))
 
-    def term(self, name: str, changed: Callable[[bool], None], value: bool, symbol: str, part: str) -> None:
+    def add_toggle(self, name: str, changed: Callable[[bool], None], value: bool, symbol: str, part: str) -> None:
         """Add a switch of a term of an equation, over the picture.
 
         name: what it switches, for its tooltip and for screen readers.
@@ -90,43 +90,43 @@ class Controls:
         part: "shown" for the symbol itself, else what is written on the switch.
         """
         changed = as_callable("changed", changed, "changed(value)")
-        self._control(
+        self._add_control(
             name, changed, value=as_bool("value", value), term=as_string("symbol", symbol), part=as_string("part", part)
         )
 
-    def note(self, name: str, words: str, section: str = "", code: bool = False) -> None:
+    def add_text(self, name: str, words: str, section: str = "", code: bool = False) -> None:
         """Write a text into the panel, or change it.
 
         name: which text; words: what it says.
         section: heading that it stands under.
         code: whether it is a program, with a button that copies it.
         """
-        place = _place(name, section)
+        place = _placement(name, section)
         self.window.put(
-            [wire.page_command("set_text", name=name, text=as_string("words", words), code=as_bool("code", code), **place)]
+            [protocol.page_command("set_text", name=name, text=as_string("words", words), code=as_bool("code", code), **place)]
         )
 
-    def strip(self, name: str, t: float, value: float, unit: str = "") -> None:
+    def add_plot_point(self, name: str, t: float, value: float, unit: str = "") -> None:
         """Add a point to the line of a number over the last seconds, at the top of the panel.
 
         name: of the number; t: s; unit: of the value.
         """
         point = {"t": as_number("t", t, "s"), "value": as_number("value", value), "unit": as_string("unit", unit)}
-        self.window.put([wire.page_command("set_strip", name=as_string("name", name), **point)])
+        self.window.put([protocol.page_command("add_plot_point", name=as_string("name", name), **point)])
 
-    def move(self, name: str, value: float | bool) -> None:
+    def set_control_value(self, name: str, value: float | bool) -> None:
         """Show a control at another value, without calling what it calls. Raises `ViewerError` where there is none."""
-        self.window.scene.move_control(as_string("name", name), value, "")
+        self.window.scene.set_control_value(as_string("name", name), value, "")
         self.window.put([])
 
-    def _control(self, name: str, callback: Callable[[Any], None], **kind: Any) -> None:
+    def _add_control(self, name: str, callback: Callable[[Any], None], **kind: Any) -> None:
         self._controls[as_string("name", name)] = callback
         controls = self._controls  # not self, so that the window does not keep its viewer alive
         self.window.on_control(lambda which, value: controls[which](value) if which in controls else None)
-        self.window.put([wire.set_control(name, **kind)])
+        self.window.put([protocol.set_control(name, **kind)])
 
 
-def _place(name: str, section: str, column: str = "") -> dict[str, str]:
+def _placement(name: str, section: str, column: str = "") -> dict[str, str]:
     """Where a control stands, as its command says it. Raises `InputError` for another column, or a name without it."""
     if not isinstance(column, str) or column not in COLUMNS or not as_string("name", name).endswith(column):
         raise InputError(f'column is {column!r} of {name!r}; it must be "believed" or "true", and end the name.')

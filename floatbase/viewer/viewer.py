@@ -27,15 +27,18 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import film, legend, marks, page, published, recording, shapes, still, walks, wire
 from floatbase.viewer.camera import PRESETS, View, target_and_eye
-from floatbase.viewer.canvas import ROOT, Canvas
-from floatbase.viewer.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.controls import Controls
-from floatbase.viewer.ground import STEEPEST, Plane, Planes, way
-from floatbase.viewer.painter import Painter, below, kinds
-from floatbase.viewer.shapes import Item, Picture
-from floatbase.viewer.window import Window
+from floatbase.viewer.export import film, recording, thumbnail
+from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
+from floatbase.viewer.scene import gait_overlay, legend, markers, protocol, shapes
+from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
+from floatbase.viewer.scene.diff import ROOT, DiffRenderer
+from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes, displacement
+from floatbase.viewer.scene.painter import Painter, legend_kinds, prefixed
+from floatbase.viewer.scene.shapes import Item, Picture
+from floatbase.viewer.transport.window import Window
+from floatbase.viewer.web import pages
 
 if TYPE_CHECKING:
     from ipywidgets import Widget
@@ -86,20 +89,28 @@ class Viewer(Controls):
         if not isinstance(background, str) or background not in BACKGROUNDS:
             raise InputError(f"background is {short_repr(background)}; it must be one of {', '.join(BACKGROUNDS)}.")
         # raises for wrong ones
-        cut = FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation)
+        polyhedron = FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation)
         self.robot, self.background = robot, background
         self.height = as_integer("height", height, 1, _MOST_PIXELS, "pixels")
         requested = None if scale is None else as_positive("scale", scale, "m/N")
-        paper, _, lines, text = BACKGROUNDS[background]
+        background_colour, _, line_colour, text_colour = BACKGROUNDS[background]
         self.painter = Painter(
-            robot, requested, facets, cut.inner_approximation, cut.facet_rotation, _ground(ground), lines, text, paper
+            robot,
+            requested,
+            facets,
+            polyhedron.inner_approximation,
+            polyhedron.facet_rotation,
+            _ground(ground),
+            line_colour,
+            text_colour,
+            background_colour,
         )
         self.window = Window(port)
-        self.canvas = Canvas(self.window)
-        self._moving, self._follow = False, as_bool("follow", follow)
+        self.renderer = DiffRenderer(self.window)
+        self._is_playing, self._follow = False, as_bool("follow", follow)
         self._last: State | None = None
-        self._seen: State | None = None  # where the robot was when the camera was set
-        self._own: dict[str, tuple[RGB, str]] = {}  # kinds of items that the legend explains beside its own
+        self._camera_state: State | None = None  # where the robot was when the camera was set
+        self._legend_entries: dict[str, tuple[RGB, str]] = {}  # kinds of items that the legend explains beside its own
         super().__init__()
         self._set_stage(background)
 
@@ -116,7 +127,7 @@ class Viewer(Controls):
         """Length of a drawn force, m/N, the same for forces and cones."""
         return self.painter.scale
 
-    def stand_on(self, ground: Ground | npt.ArrayLike | None) -> None:
+    def set_ground(self, ground: Ground | npt.ArrayLike | None) -> None:
         """Draw another ground from the next picture on. ground: as for the viewer."""
         self.painter = self.painter.replace(ground=_ground(ground))
 
@@ -157,7 +168,7 @@ class Viewer(Controls):
         ghost: another state of the robot, drawn translucent.
         frames: names of frames whose axes to draw.
         labels: whether to write the names of the contact points.
-        extra: path -> item, more items from `floatbase.viewer.shapes`, `marks` or `props`.
+        extra: path -> item, more items from `floatbase.viewer.shapes` or `floatbase.viewer.markers`.
         title: a line in the corner.
         ghost_name: what the legend calls the ghost.
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
@@ -172,22 +183,22 @@ class Viewer(Controls):
         self.draw(picture, title, ghost_name)
         if self._last is None:
             self._last = state
-            self.canvas.set(*self._looking(View()))
+            self.renderer.set(*self._camera_commands(View()))
         self._last = state
         return self
 
-    def explain(self, kind: str, colour: RGB, meaning: str) -> None:
+    def add_legend_entry(self, kind: str, colour: RGB, meaning: str) -> None:
         """Let the legend explain items of one's own, from the next picture on that has any.
 
         kind: first part of their paths. colour: RGB, from 0 to 1. meaning: what the legend says.
         """
         red, green, blue = np.clip(as_array("colour", colour, (3,)), 0.0, 1.0).tolist()
-        self._own[as_string("kind", kind)] = (red, green, blue), as_string("meaning", meaning)
+        self._legend_entries[as_string("kind", kind)] = (red, green, blue), as_string("meaning", meaning)
 
-    def prices(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
+    def multiplier_labels(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
         """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle, of a normal force on top.
 
-            view.show(state, contacts, planned=command.forces, extra=view.prices(state, contacts, command.solution))
+            view.show(state, contacts, planned=command.forces, extra=view.multiplier_labels(state, contacts, command.solution))
 
         A multiplier is what one newton more of room would lower the objective by; two significant digits are shown.
         state, contacts: those that the controller was given.
@@ -196,37 +207,42 @@ class Viewer(Controls):
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         positions, height = as_instance("contacts", contacts, Contacts).positions(state), self.painter.cone_height(contacts)
-        drawn = marks.prices(positions, contacts, as_instance("solution", solution, Solution), height, self.painter.size)
-        return below("price", drawn)
+        drawn = markers.multiplier_labels(
+            positions, contacts, as_instance("solution", solution, Solution), height, self.painter.size
+        )
+        return prefixed("multiplier", drawn)
 
-    def walking(self, walk: Walk, state: State) -> Picture:
+    def walk_overlay(self, walk: Walk, state: State) -> Picture:
         """Marks for `extra` of `show`: planned footholds, swing paths, the capture point, and the planned ZMP of a `Walk`.
 
-            view.show(state, walk.contacts, extra=view.walking(walk, state))
+            view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 
         walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of the robot, then.
         Raises `InputError` for those of another robot.
         """
         self.painter.check_robot("walk", as_instance("walk", walk, Walk).robot)
         self.painter.check_robot("state", as_instance("state", state, State).robot)
-        return walks.walking(walk, state, self._look)
+        return gait_overlay.walk_overlay(walk, state, self._overlay_style)
 
-    def step(self, step: StepPlan, t: float, state: State) -> Picture:
+    def step_overlay(self, step: StepPlan, t: float, state: State) -> Picture:
         """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s. state: of the robot, then."""
         self.painter.check_robot("state", as_instance("state", state, State).robot)
-        return walks.step(step, t, state, self._look)
+        return gait_overlay.step_overlay(step, t, state, self._overlay_style)
 
     @property
-    def _look(self) -> walks.Look:
-        return walks.Look(self.painter.size, self.painter.floor, self.painter.text)
+    def _overlay_style(self) -> gait_overlay.Style:
+        return gait_overlay.Style(self.painter.size, self.painter.drawn_ground, self.painter.text_colour)
 
     def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
         """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove everything else."""
-        if self._moving:
-            self.window.put([self._following(ROBOT), *wire.end_animation()])
-            self._moving = False
-        settings = *self._caption(kinds(picture), title, ghost_name), wire.set_ground(self.painter.floor.planes)
-        self.canvas.draw(picture, *settings)  # at once: a second frame would wait
+        if self._is_playing:
+            self.window.put([self._following(ROBOT), *protocol.end_animation()])
+            self._is_playing = False
+        settings = (
+            *self._caption(legend_kinds(picture), title, ghost_name),
+            protocol.set_ground(self.painter.drawn_ground.planes),
+        )
+        self.renderer.draw(picture, *settings)  # at once: a second frame would wait
 
     def play(
         self,
@@ -253,20 +269,23 @@ class Viewer(Controls):
         rate: pictures drawn for each second of the record.
         planned: whether to draw the planned forces too.
         com, cones, support, ghost, title, ghost_name: as for `show`.
-        steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step` makes them.
+        steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step_overlay` makes them.
         follow: whether the camera goes with the robot, smoothly and at one height over the viewer's ground; afterwards, too.
         paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
-        self.painter.check_robot("record", recording.checked_rollout(rollout).robot)
+        self.painter.check_robot("record", recording.as_rollout(rollout).robot)
         if not len(rollout.time):
             raise InputError("the record has no rows, so there is nothing to play.")
         _check_flags(planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused)
         _check_texts(title=title, ghost_name=ghost_name)
-        rows, planned_steps = recording.thinned(rollout.time, as_positive("rate", rate, "1/s")), walks.checked_steps(steps)
+        rows, planned_steps = (
+            recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s")),
+            gait_overlay.as_steps(steps),
+        )
         states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
         times = rollout.time[rows].tolist()
-        contacts, columns = recording.drawn_contacts(rollout.contacts)
+        contacts, columns = recording.point_force_contacts(rollout.contacts)
         pictures = [
             self.painter.picture(
                 state,
@@ -274,17 +293,17 @@ class Viewer(Controls):
                 rollout.measured[i, columns],
                 rollout.planned[i, columns] if planned and np.isfinite(rollout.planned[i, columns]).all() else None,
                 com=com, cones=cones, support=support, ghost=ghost, push=recording.push_at(rollout, i),
-                lifted=recording.lifted_at(rollout, i),
-                extra=None if (step := walks.step_at(planned_steps, t)) is None else self.step(step, t, state),
+                swing_feet=recording.swing_feet_at(rollout, i),
+                extra=None if (step := gait_overlay.step_at(planned_steps, t)) is None else self.step_overlay(step, t, state),
             )
             for i, t, state in zip(rows, times, states, strict=True)
         ]  # fmt: skip
         if follow and self.robot.is_floating:
             places = recording.smoothed(times, np.array([state.joint_transforms[1][:3, 3] for state in states]))
-            pictures = [picture | {FOLLOWED: shapes.nothing(at)} for picture, at in zip(pictures, places, strict=True)]
+            pictures = [picture | {FOLLOWED: shapes.invisible_point(at)} for picture, at in zip(pictures, places, strict=True)]
         self.play_pictures(times, pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name)
         self._last, self._follow = states[0], follow
-        self.canvas.set(*self._looking(View(), FOLLOWED))
+        self.renderer.set(*self._camera_commands(View(), FOLLOWED))
         return self
 
     def play_pictures(
@@ -299,9 +318,9 @@ class Viewer(Controls):
         """
         moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
-        self.canvas.set(*self._caption(set[str]().union(*map(kinds, pictures)), title, ghost_name))
+        self.renderer.set(*self._caption(set[str]().union(*map(legend_kinds, pictures)), title, ghost_name))
         self.window.put([moving.command])
-        self._moving = True
+        self._is_playing = True
         return self
 
     def camera(self, view: str | View = "default", follow: bool | None = None) -> Viewer:
@@ -317,33 +336,37 @@ class Viewer(Controls):
         if not isinstance(view, View):
             raise InputError(f"camera view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, or a View.")
         self._follow = self._follow if follow is None else as_bool("follow", follow)
-        self.canvas.set_again(*self._looking(view, FOLLOWED if self._moving else ROBOT))
+        self.renderer.force_set(*self._camera_commands(view, FOLLOWED if self._is_playing else ROBOT))
         return self
 
-    def _looking(self, view: View, followed: str = ROBOT) -> tuple[wire.Update, ...]:
+    def _camera_commands(self, view: View, followed: str = ROBOT) -> tuple[protocol.Update, ...]:
         """The commands for a view of the robot where it is now, for what the camera follows from there, and for the presets."""
-        self._seen = self._last
-        presets = wire.set_views({name: self._from(preset) for name, preset in PRESETS.items()})
-        return wire.set_camera(*self._from(view)), self._following(followed), presets
+        self._camera_state = self._last
+        presets = protocol.set_views({name: self._position_target_angle(preset) for name, preset in PRESETS.items()})
+        return protocol.set_camera(*self._position_target_angle(view)), self._following(followed), presets
 
-    def _from(self, view: View) -> tuple[Array, Array, float]:
-        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a view of the robot `_seen`."""
+    def _position_target_angle(self, view: View) -> tuple[Array, Array, float]:
+        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a view of the robot
+        `_camera_state`.
+        """
         low, high = self.painter.feet_box if view.feet else self.painter.box
-        moved = self._moved + [0.0, 0.0, self.painter.floor.height(self.painter.home.com)]
+        moved = self._displacement + [0.0, 0.0, self.painter.drawn_ground.height(self.painter.standing.com)]
         target, eye = target_and_eye(view, low + moved, high + moved)
         return eye, target, view.angle
 
-    def _following(self, followed: str) -> wire.Update:
+    def _following(self, followed: str) -> protocol.Update:
         """The command that lets the camera follow the robot, or what stands for it in a recording, if it is to follow."""
         base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
         follows = self._follow and self.robot.is_floating
-        start = (self._seen or self.painter.home).joint_transforms[1][:3, 3]
-        return wire.set_follow(ROOT + base if follows else "", start, self._moved, smooth=followed == ROBOT)
+        start = (self._camera_state or self.painter.standing).joint_transforms[1][:3, 3]
+        return protocol.set_follow(ROOT + base if follows else "", start, self._displacement, smooth=followed == ROBOT)
 
     @property
-    def _moved(self) -> Array:
+    def _displacement(self) -> Array:
         """How far the robot was from where it stands at home when the camera was set, (3,), m, along the ground."""
-        return way(self.painter.floor, self.painter.home.com, (self._seen or self.painter.home).com)
+        return displacement(
+            self.painter.drawn_ground, self.painter.standing.com, (self._camera_state or self.painter.standing).com
+        )
 
     def save(self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)) -> Path:
         """Write the scene to a file, by its name's ending, and return its path.
@@ -358,12 +381,12 @@ class Viewer(Controls):
         target = Path(path if isinstance(path, Path) else as_string("path", path))
         if self.window.scene.is_empty:
             raise ViewerError("nothing is drawn yet, so there is nothing to save; call show(state) or play(rollout) first.")
-        size = film.pixels(size)
-        if target.suffix.lower() not in (".html", ".htm", *film.RATES):
+        size = film.checked_size(size)
+        if target.suffix.lower() not in (".html", ".htm", *film.FRAME_RATES):
             raise ViewerError(f"cannot save {target.name!r}: end the name in .html, .mp4, .gif or .png.")
         try:
-            if target.suffix.lower() in film.RATES:
-                film.shoot(self.static_html(title), target, size)
+            if target.suffix.lower() in film.FRAME_RATES:
+                film.capture(self.static_html(title), target, size)
             else:
                 target.write_text(self.static_html(title), encoding="utf-8")
         except OSError as error:
@@ -373,11 +396,11 @@ class Viewer(Controls):
     def static_html(self, title: str | None = None) -> str:
         """The scene as it is now, as one HTML page that needs neither server nor network."""
         _check_texts(title=title)
-        return page.file_page(self.window.scene.file_commands(), title or self.robot.name)
+        return pages.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
-    def ending(self, words: str) -> None:
+    def set_disconnect_message(self, words: str) -> None:
         """What the page says when this viewer has been closed. words: the text."""
-        self.canvas.set(wire.page_command("set_ending", text=as_string("words", words)))
+        self.renderer.set(protocol.page_command("set_disconnect_message", text=as_string("words", words)))
 
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
@@ -388,51 +411,58 @@ class Viewer(Controls):
 
         Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a still copy of the scene.
         """
-        if self._is_still:
+        if self._is_static:
             import ipywidgets
 
-            return ipywidgets.HTML(self._frame(), layout=ipywidgets.Layout(width="auto"))
-        return self.window.widget(self.robot.name, self.height, still.png(self.canvas.picture, self.window.scene, self.height))
+            return ipywidgets.HTML(self._static_frame(), layout=ipywidgets.Layout(width="auto"))
+        return self.window.widget(
+            self.robot.name, self.height, thumbnail.render_png(self.renderer.picture, self.window.scene, self.height)
+        )
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The live picture, and an image of it for wherever no widget can be; for a site, see `published`."""
-        if published.display() == "site":
-            return published.Pack([self]).bundle()
-        if self._is_still:
-            return {"text/html": self._frame()}
+        """The live picture, and an image of it for wherever no widget can be; a program that stores notebooks may have
+        another, see `MIMEBUNDLES`.
+        """
+        if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
+            return bundle(self)
+        if self._is_static:
+            return {"text/html": self._static_frame()}
         picture = self.widget()
-        data, metadata = still.with_image(picture._repr_mimebundle_(**kwargs), picture)
+        data, metadata = thumbnail.with_thumbnail(picture._repr_mimebundle_(**kwargs), picture)
         return {**data, "text/plain": repr(self)}, metadata
 
     @property
-    def _is_still(self) -> bool:
+    def _is_static(self) -> bool:
         """Whether a display is a copy of the scene and no more."""
-        return published.display() == "static" or not self.window.is_open
+        return display_mode() == "static" or not self.window.is_open
 
-    def _frame(self) -> str:
+    def _static_frame(self) -> str:
         """HTML of the scene as it is now, which needs no kernel."""
         name, style = html.escape(self.robot.name), f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px"
         return f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" style="{style}"></iframe>'
 
     def __repr__(self) -> str:
-        address = f", {self.url}" if self.window.listens else ""
+        address = f", {self.url}" if self.window.is_listening else ""
         return f"Viewer({self.robot.name}{address}{'' if self.window.is_open else ', closed'})"
 
     def _set_stage(self, background: str) -> None:
         """Set the background, and hide meshcat's own grid and axes."""
         top, bottom = BACKGROUNDS[background][:2]
-        self.canvas.set(
-            wire.set_property("/Background", "top_color", list(top)),
-            wire.set_property("/Background", "bottom_color", list(bottom)),
-            wire.set_property("/Grid", "visible", False),
-            wire.set_property("/Axes", "visible", False),
-            wire.page_command("set_theme", name=background),
+        self.renderer.set(
+            protocol.set_property("/Background", "top_color", list(top)),
+            protocol.set_property("/Background", "bottom_color", list(bottom)),
+            protocol.set_property("/Grid", "visible", False),
+            protocol.set_property("/Axes", "visible", False),
+            protocol.page_command("set_theme", name=background),
         )
 
-    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[wire.Update, wire.Update]:
+    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[protocol.Update, protocol.Update]:
         """The commands for the title, and for the legend of the colours in the picture."""
-        return wire.page_command("set_title", text=title or ""), legend.command(
-            frozenset(shown), ghost_name, self.painter.text, tuple((kind, *own) for kind, own in self._own.items())
+        return protocol.page_command("set_title", text=title or ""), legend.command(
+            frozenset(shown),
+            ghost_name,
+            self.painter.text_colour,
+            tuple((kind, *entry) for kind, entry in self._legend_entries.items()),
         )
 
 
@@ -455,7 +485,7 @@ def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
     made = ground if isinstance(ground, Ground) else Ground(normal=unit_vector("ground", ground))
     planes = []
     for (x, y, z), offset in zip(made.normals.tolist(), made.offsets.tolist(), strict=True):
-        if z < STEEPEST:
+        if z < MIN_VERTICAL:
             raise InputError(f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] does.")
         planes.append(Plane((x, y, z), offset))
     return planes[0] if len(planes) == 1 else Planes(tuple(planes))

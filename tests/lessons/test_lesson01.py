@@ -49,7 +49,7 @@ def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(go2: Robot, 
     try:
         sliders = lesson01.thruster_panel(view, go2.standing(), contacts).sliders
         sliders["left_feet"].value = sliders["right_feet"].value = thrust
-        arrows = [view.canvas.picture[f"thrust/{name}"].matrix for name in contacts.names]
+        arrows = [view.renderer.picture[f"thrust/{name}"].matrix for name in contacts.names]
         for arrow, foot in zip(arrows, contacts.positions(go2.standing()), strict=True):
             ends = arrow[2, 3], arrow[2, 3] + arrow[2, 2]
             assert ends[1] - ends[0] == pytest.approx(0.003 * thrust)
@@ -82,7 +82,7 @@ def test_the_centre_of_mass_leaves_every_point_of_the_base(go2: Robot) -> None:
         seen = []
         for swung in (slider.min, slider.max):
             slider.value = swung
-            seen.append((view.canvas.picture, panel.note.value))
+            seen.append((view.renderer.picture, panel.note.value))
         (back, note), (forth, other_note) = seen
         np.testing.assert_array_equal(back["axes/axes"].matrix, forth["axes/axes"].matrix)
         assert (forth["com/ball"].matrix - back["com/ball"].matrix)[0, 3] > 0.02 and note != other_note

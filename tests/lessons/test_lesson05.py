@@ -79,13 +79,13 @@ def test_the_pictures_are_drawn() -> None:
         forces = leaning().minimiser()
         note = show_forces(view, EOM.state, EOM.contacts, forces, wish=[60, 0, 0])
         assert "(60, 0, 0) N" in note and "(0, 0, 0) N·m" in note
-        assert {"wish", "wrench"} <= {path.split("/")[0] for path in view.canvas.picture}
-        assert "(60" in show_forces(view, EOM.state, EOM.contacts, forces) and "wish" not in view.canvas.picture
+        assert {"wish", "wrench"} <= {path.split("/")[0] for path in view.renderer.picture}
+        assert "(60" in show_forces(view, EOM.state, EOM.contacts, forces) and "wish" not in view.renderer.picture
     finally:
         view.close()
     arm_view = fb.Viewer(reaching(0.0).robot)
     try:
-        drawn = show_moved_com(arm_view, reaching(1.0), reaching(0.0), "before").canvas.picture
+        drawn = show_moved_com(arm_view, reaching(1.0), reaching(0.0), "before").renderer.picture
         np.testing.assert_allclose(drawn["earlier/spot"].matrix[:2, 3], reaching(0.0).com[:2], atol=ROUNDING)
     finally:
         arm_view.close()

@@ -26,7 +26,8 @@ from floatbase.lessons.lesson06 import (
     with_feet,
 )
 from floatbase.objectives import com_wrench_map
-from floatbase.viewer import CONE, GREYS, MEASURED, Picture, hexadecimal, shapes
+from floatbase.viewer import Picture, shapes
+from floatbase.viewer.scene.colours import CONE, GREYS, MEASURED, hex_code
 
 UP = np.array([0.0, 0.0, 1.0])
 LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
@@ -102,19 +103,19 @@ def test_a_single_cone_has_the_colour_of_its_force(force: tuple[float, ...], sta
     view = fb.Viewer(judges.load("go2"))
     try:
         text = show_force(view, force, 0.7)
-        picture = view.canvas.picture
+        picture = view.renderer.picture
     finally:
         view.close()
     margin = FrictionCone(UP, 0.7).margin(force)
     assert f"= {margin:.0f} N" in text and ("no friction" in text) == (margin < 0)
-    assert {hexadecimal(MEASURED), hexadecimal(CONE[status])} <= colours(picture)
+    assert {hex_code(MEASURED), hex_code(CONE[status])} <= colours(picture)
 
 
 def colours(picture: Picture) -> set[str]:
     """Colours of a picture's items: of those that may change theirs, and of arrows."""
-    found = {hexadecimal(item.colour[:3]) for item in picture.values() if item.colour is not None}
+    found = {hex_code(item.colour[:3]) for item in picture.values() if item.colour is not None}
     arrow = shapes.arrow(np.zeros(3), UP, MEASURED)
-    return found | {hexadecimal(MEASURED) for item in picture.values() if item.shape is arrow.shape}
+    return found | {hex_code(MEASURED) for item in picture.values() if item.shape is arrow.shape}
 
 
 def test_the_pictures_are_drawn() -> None:
@@ -147,5 +148,5 @@ def test_drawings_from_above_have_greys_and_the_colour_of_text() -> None:
     finally:
         view.close()
     for svg in drawn:
-        assert set(re.findall(r"#[0-9A-F]{6}", svg)) <= {hexadecimal(grey) for grey in GREYS}
+        assert set(re.findall(r"#[0-9A-F]{6}", svg)) <= {hex_code(grey) for grey in GREYS}
         assert 'fill="currentColor"' in svg and re.findall(r"<text[^>]*\sfill=", svg) == []

@@ -22,7 +22,7 @@ from floatbase.lessons.lesson07 import (
     rose_controller,
     tuned,
 )
-from floatbase.viewer import GREYS, hexadecimal
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 STATE = standing_go2().state
 GO2 = STATE.robot
@@ -59,7 +59,7 @@ def test_pictures_show_what_they_are_given() -> None:
     )
     assert feet.lines[0].get_ydata().max() == pytest.approx(1e3 * record.slip().max())
     lines = [line for drawn in (figure, ways) for axis in drawn.axes for line in axis.lines]
-    assert {line.get_color() for line in lines} <= {hexadecimal(grey) for grey in GREYS}
+    assert {line.get_color() for line in lines} <= {hex_code(grey) for grey in GREYS}
     plt.close("all")
 
 

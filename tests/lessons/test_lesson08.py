@@ -29,7 +29,7 @@ from floatbase.lessons.lesson08 import (
     triangles,
     uneven_stance,
 )
-from floatbase.viewer import GREYS, hexadecimal
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
 
@@ -84,7 +84,7 @@ def test_plots_have_greys_and_the_colours_of_forces_alone() -> None:
     state, contacts = robot.standing(), fb.Contacts.points(robot)
     drawn = triangles(state, contacts, "FL_foot", "RR_foot").data
     assert drawn.count("<polygon") == 4 and "without RR_foot" in drawn
-    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hexadecimal(grey) for grey in GREYS}
+    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hex_code(grey) for grey in GREYS}
     record = run_of(Stand(robot, contacts), 0.2)
     assert len(plot_loads({"a": record, "b": record}, "FR_foot", 0.0, 0.2).axes) == 2
     falls = plot_fall([0.0, 0.1], [0.01, 0.02], 5.0).axes[0].lines

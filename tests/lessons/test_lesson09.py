@@ -37,7 +37,7 @@ from floatbase.lessons.lesson09 import (
     talos,
 )
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, MEASURED, PLANNED, hexadecimal
+from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 
 TALOS = talos()
 STATE = TALOS.standing()
@@ -132,16 +132,16 @@ def test_soles_are_drawn_with_their_forces_and_crosses(view: fb.Viewer) -> None:
     forces = np.tile([0.0, 0.0, TALOS.weight / 8], 8)
     drawn = show_soles(view, STATE, SOLES, forces)
     assert drawn.count("<polygon") == 2 and drawn.count("<circle") == 8 + 1 and drawn.count("<path") == 3
-    assert sum(path.startswith("planned/") for path in view.canvas.picture) == 8
+    assert sum(path.startswith("planned/") for path in view.renderer.picture) == 8
     right_foot_up = np.concatenate([forces[:12], np.zeros(12)])
     assert soles_from_above(STATE, SOLES, right_foot_up).count("<path") == 2
-    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hexadecimal(colour) for colour in (*GREYS, PLANNED)}
+    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hex_code(colour) for colour in (*GREYS, PLANNED)}
 
 
 def test_one_sole_says_which_rows_are_broken(view: fb.Viewer) -> None:
     weight = np.array([0.0, 0.0, 443.0, 0.0, 0.0, 0.0])
     assert "corner forces exist" in show_sole(view, STATE, LEFT, limits(), weight)
-    assert "planned/sum" in view.canvas.picture
+    assert "planned/sum" in view.renderer.picture
     for change, kind in (((0, 300.0), "sliding"), ((4, -60.0), "tipping"), ((5, 40.0), "twisting")):
         wrench = weight.copy()
         wrench[change[0]] = change[1]
@@ -164,7 +164,9 @@ def test_a_plan_without_corners_is_played_with_its_resultants(view: fb.Viewer) -
     bolts = fb.Contacts([LinearConstraint(sole.name, 6, sole.constraint) for sole in SOLES])
     record = held(bolts, 0.1)
     assert play_resultants(view, record, 0.5, "bolted") is view
-    assert [path for path in view.canvas.picture if path.startswith("planned/")] == [f"planned/{name}" for name in bolts.names]
+    assert [path for path in view.renderer.picture if path.startswith("planned/")] == [
+        f"planned/{name}" for name in bolts.names
+    ]
 
 
 def test_a_walk_and_a_lean_are_plotted_in_greys() -> None:
@@ -177,5 +179,5 @@ def test_a_walk_and_a_lean_are_plotted_in_greys() -> None:
         assert np.allclose(corners.mean(axis=0), record.state(i).point(foot)[:2], atol=1e-6)
     for axis, patches in ((plot_walk(record, walk.history), 1), (plot_lean(leaned(1.5, 0.01)), 0)):
         colours = {to_hex(line.get_color()).upper() for line in axis.get_lines()}
-        assert colours == {hexadecimal(GREYS[0]), hexadecimal(GREYS[1])} and hexadecimal(MEASURED) not in colours
+        assert colours == {hex_code(GREYS[0]), hex_code(GREYS[1])} and hex_code(MEASURED) not in colours
         assert sum(isinstance(patch, Polygon) for patch in axis.patches) >= patches

@@ -13,7 +13,7 @@ import pytest
 import floatbase as fb
 from floatbase.lessons.lessonA import circling, figure_of_eight, play_travel, plot_errors, show_ride, show_tumble, tool_error
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, hexadecimal
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 FEET = ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
 
@@ -77,7 +77,7 @@ def test_the_rider_sees_what_the_particle_does_and_the_table_has_turned() -> Non
     view = fb.Viewer(judges.load("go2"))
     try:
         drawn = show_ride(view, 2.0, 0.0, 0.5)
-        picture = view.canvas.picture
+        picture = view.renderer.picture
         rest = show_ride(view, 0.0, 0.5, 1.0)
     finally:
         view.close()
@@ -90,7 +90,7 @@ def test_the_rider_sees_what_the_particle_does_and_the_table_has_turned() -> Non
     assert np.allclose(puck[:2], [-0.7, 0.3])
     assert not [path for path in picture if path.startswith("way/")]  # at rest in the world
     assert len([path for path in picture if path.startswith("chalk/")]) == 24
-    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hexadecimal(grey) for grey in GREYS}
+    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hex_code(grey) for grey in GREYS}
     assert re.findall(r"<text[^>]*\sfill=", drawn) == []
 
 
@@ -98,10 +98,10 @@ def test_both_ways_to_write_a_tumble_give_one_acceleration() -> None:
     view = fb.Viewer(judges.load("go2"))
     try:
         told = show_tumble(view, 3.0, 2.0)
-        called = [path for path in view.canvas.picture if path.startswith("called/")]
+        called = [path for path in view.renderer.picture if path.startswith("called/")]
         slower = show_tumble(view, 1.0, 2.0)
         still = show_tumble(view, 3.0, 0.0)
-        none = [path for path in view.canvas.picture if path.startswith("called/")]
+        none = [path for path in view.renderer.picture if path.startswith("called/")]
     finally:
         view.close()
     assert told.endswith("0.0 m/s² apart") and still.endswith("0.0 m/s² apart")
@@ -124,7 +124,7 @@ def test_the_travelling_feet_are_played_with_marks_where_they_began() -> None:
     view = fb.Viewer(robot)
     try:
         play_travel(view, fb.rollout(fb.Simulation(robot), controller, 0.3))
-        picture = view.canvas.picture
+        picture = view.renderer.picture
     finally:
         view.close()
     pins = np.array([picture[f"pin/{i}"].matrix[:3, 3] for i in range(4)])

@@ -25,7 +25,7 @@ from floatbase.lessons.lessonB import (
     show_crank,
     show_step,
 )
-from floatbase.viewer import GREYS, hexadecimal
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 ROBOT = judges.load("go2")
 KNEE = ROBOT.joint_names.index("FL_calf_joint")
@@ -103,7 +103,7 @@ def test_a_valve_told_to_open_more_than_it_can_is_all_open() -> None:
 
 def test_the_crank_is_drawn_with_its_lever_and_what_is_out_of_reach_is_said(view: fb.Viewer) -> None:
     best = show_crank(view, 0.0, 12.0)
-    picture = view.canvas.picture
+    picture = view.renderer.picture
     rod, crank = picture["cylinder/rod"].matrix, picture["crank"].matrix
     assert np.allclose(rod[:3, 2] / np.linalg.norm(rod[:3, 2]) @ crank[:3, 2], 0.0, atol=1e-6)  # square
     assert np.allclose(rod[:3, 3] + rod[:3, 2], crank[:3, 3] + crank[:3, 2])
@@ -126,7 +126,7 @@ def test_the_step_response_tells_when_the_torque_comes_and_when_oil_boils() -> N
     bench = Bench(held_then_turned(20.0), hydraulics=replace(Hydraulics(), supply_pressure=60e5))
     boiled = sum(min(row.a, row.b) <= VACUUM for row in run_loop(bench, 50.0, 0.4))
     assert f"boils for {boiled} ms" in torn
-    assert set(re.findall(r"#[0-9A-F]{6}", torn)) <= {hexadecimal(grey) for grey in GREYS}
+    assert set(re.findall(r"#[0-9A-F]{6}", torn)) <= {hex_code(grey) for grey in GREYS}
     assert re.findall(r"<text[^>]*\sfill=", torn) == []
 
 

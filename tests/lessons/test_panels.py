@@ -128,7 +128,7 @@ class Pushed:
     @property
     def arrow(self) -> np.ndarray | None:
         """Direction of the push in the picture, shape (3,), m."""
-        item = self.view.canvas.picture.get("push")
+        item = self.view.renderer.picture.get("push")
         return None if item is None else np.array(item.matrix[:3, 2])
 
 

@@ -16,10 +16,10 @@ import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium, served
 
 import floatbase as fb
-from floatbase.lessons import ConstantTorques, live, push_panel, slider_panel
+from floatbase.lessons import ConstantTorques, live, push_panel, slider_panel, static_export
 from floatbase.lessons.publish import pictures
 from floatbase.lessons.stops import MOST, places, stops
-from floatbase.viewer import published, wire
+from floatbase.viewer.scene import protocol
 
 Pictures = pictures.Pictures
 STATIC = Path(pictures.__file__).with_name("site") / "static"
@@ -64,16 +64,16 @@ def squat(view: fb.Viewer, **ranges: Any) -> Any:
 
 
 def data_of(shown: Any) -> dict[str, Any]:
-    return dict(shown._repr_mimebundle_()[published.MIME])
+    return dict(shown._repr_mimebundle_()[static_export.MIME])
 
 
 def scene_at(data: dict[str, Any], stop: str | None = None, view: int = 0) -> dict[tuple[str, ...], bytes]:
     """Key -> command of the first scene, or of that of a stop, put together as pictures.js does it."""
-    commands, scene = published.commands(data), {}
+    commands, scene = static_export.commands(data), {}
     changes = data["stops"][stop][1 + view] if stop is not None else []
     for numbers in (data["first"][view], changes):
         for key, command in zip(numbers[::2], numbers[1::2], strict=True):
-            scene[key] = None if command == published.GONE else commands[command]
+            scene[key] = None if command == static_export.REMOVED else commands[command]
     return {tuple(data["keys"][key]): command for key, command in scene.items() if command is not None}
 
 
@@ -120,7 +120,7 @@ def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more
         )
         assert kept == dict(view.window.scene.file_entries())
     meshes = sum(len(command) for key, command in scene_at(data).items() if "/robot/" in key[0] and key[1] == "set_object")
-    changed = sum(len(published.commands(data)[n]) for stop in data["stops"].values() for n in stop[1][1::2] if n >= 0)
+    changed = sum(len(static_export.commands(data)[n]) for stop in data["stops"].values() for n in stop[1][1::2] if n >= 0)
     assert changed < 0.3 * meshes  # the robot's shape is held once
 
 
@@ -154,7 +154,7 @@ def test_a_panel_without_a_view_keeps_its_notes() -> None:
 
 def test_stops_of_a_control_must_be_there() -> None:
     with pytest.raises(fb.errors.ViewerError, match="stop 3"):
-        published.Control("x", ("0", "1"), 3)
+        static_export.Control("x", ("0", "1"), 3)
 
 
 def test_a_picture_that_moves_no_more_keeps_no_animation(view: fb.Viewer) -> None:
@@ -189,7 +189,7 @@ def test_a_push_panel_becomes_recorded_runs(view: fb.Viewer) -> None:
 def parts_of(path: Path) -> list[bytes]:
     found = re.fullmatch(r'floatbasePictures\.take\("([^"]+)","([^"]+)"\)\n', path.read_text(encoding="ascii"))
     assert found is not None and found.group(1) == path.stem
-    return wire.unframe(gzip.decompress(base64.b64decode(found.group(2))))
+    return protocol.unframe(gzip.decompress(base64.b64decode(found.group(2))))
 
 
 def placed(html: str) -> str:
@@ -200,7 +200,7 @@ def test_files_hold_what_outputs_held_and_shared_meshes_once(view: fb.Viewer, tm
     made, data, names = Pictures(tmp_path), [], []
     for title in ("one", "two"):
         bundle = view.show(view.robot.standing(), title=title)._repr_mimebundle_()
-        data.append(bundle[published.MIME])
+        data.append(bundle[static_export.MIME])
         names.append(placed(made.place(bundle) or ""))
     made.write()
     files = {path.stem: path for path in (tmp_path / "pictures").glob("go2-*.js")}
@@ -210,7 +210,7 @@ def test_files_hold_what_outputs_held_and_shared_meshes_once(view: fb.Viewer, tm
         head, *own = parts_of(tmp_path / "pictures" / f"{name}.js")
         known = json.loads(head)
         assert known["shared"] == list(files)
-        assert [[*shared, *own][i] for i in known["at"]] == published.commands(about)
+        assert [[*shared, *own][i] for i in known["at"]] == static_export.commands(about)
         assert sum(map(len, own)) < 0.05 * sum(map(len, shared))
 
 

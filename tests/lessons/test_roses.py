@@ -40,7 +40,7 @@ def test_the_former_lesson_is_grey_or_a_second_rose_of_the_same_robot(lesson: st
     expected = [measured_rose(name).pushes for name in [lesson, *former]]
     assert np.array_equal([line.get_ydata()[:-1] for line in axis.get_lines()], expected)
     plt.close(axis.figure)
-    assert {path.split("/")[0] for path in draw_roses(lesson)} == {"rose", *["before" for _ in former]}
+    assert {path.split("/")[0] for path in draw_roses(lesson)} == {"push_recovery", *["previous" for _ in former]}
 
 
 def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> None:
@@ -54,7 +54,7 @@ def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> Non
 @pytest.mark.parametrize("scale", [0.002, 0.003])
 def test_roses_on_the_ground_are_drawn_in_a_scale_that_is_asked_for(scale: float) -> None:
     items = draw_roses("06", scale)
-    apart = items["rose/label 200 N"].matrix[:2, 3] - items["rose/label 100 N"].matrix[:2, 3]
+    apart = items["push_recovery/label 200 N"].matrix[:2, 3] - items["push_recovery/label 100 N"].matrix[:2, 3]
     assert np.isclose(np.linalg.norm(apart), 100.0 * scale)
 
 

@@ -14,7 +14,7 @@ from waiting import until
 
 import floatbase as fb
 from floatbase.simulation import AUTO_PAUSED, PUSH_DISPLAY_TIME, LiveSimulation, status_message
-from floatbase.viewer import push_at
+from floatbase.viewer.export.recording import push_at
 
 ROBOT = judges.load("go2")
 
@@ -48,7 +48,9 @@ def test_it_runs_pauses_and_goes_on_where_it_was(run: LiveSimulation, slices: li
 
 
 @pytest.mark.parametrize("error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")])
-def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: LiveSimulation, slices: list[fb.Rollout], error: Exception) -> None:
+def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(
+    run: LiveSimulation, slices: list[fb.Rollout], error: Exception
+) -> None:
     def broken(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
         raise error
 
@@ -73,7 +75,10 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run: LiveSimula
     ],
 )
 def test_what_stopped_a_run_is_told_in_one_sentence(status: str, line: str) -> None:
-    assert line in status_message(status) and not {"\n", "Why", "6"} & {*status_message(status), *status_message(status).split()}
+    assert line in status_message(status) and not {"\n", "Why", "6"} & {
+        *status_message(status),
+        *status_message(status).split(),
+    }
 
 
 class Held:

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 import floatbase as fb
 from floatbase.errors import InfeasibleError, InputError, SimulationError, UnknownNameError
 from floatbase.simulation import PushRecovery
-from floatbase.viewer import roses
+from floatbase.viewer.plots import push_recovery_plots
 
 STEP, WATCH = 25.0, 1.2
 QUICK = {"resolution": STEP, "observation_time": WATCH, "start": 0.1, "progress": False}
@@ -58,7 +58,10 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(r
     omega = np.sqrt(robot.gravity / height)
     # an impulse moves the capture point to the border; a push for ever tips the robot over it
     for duration, farther in ((1e-6, 1e-6 / (robot.mass * omega)), (1e2, height / robot.weight)):
-        moved = com[:2] + (replace(recovery, duration=duration).capture_point_bound * farther)[:, None] * recovery.unit_vectors[:, :2]
+        moved = (
+            com[:2]
+            + (replace(recovery, duration=duration).capture_point_bound * farther)[:, None] * recovery.unit_vectors[:, :2]
+        )
         beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
         assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-5)  # m
     # between them: the pendulum on the border, s away, pushed for a while, has its capture point there at the end
@@ -82,29 +85,32 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(r
 
 
 def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
-    axis = roses.plot(recovery)
+    axis = push_recovery_plots.plot(recovery)
     measured = axis.get_lines()[0]
     assert np.allclose(measured.get_ydata(), [*recovery.pushes, recovery.pushes[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
         "largest push survived", "theory: capture point", "theory: steady push",
     ]  # fmt: skip
     plt.close(axis.figure)
-    refused(lambda: roses.plot(recovery, plt.figure().add_subplot()), InputError, "polar")
+    refused(lambda: push_recovery_plots.plot(recovery, plt.figure().add_subplot()), InputError, "polar")
     plt.close("all")
-    near, far = (roses.picture(recovery, scale) for scale in (0.001, 0.002))
-    assert {path.split("/")[0] for path in near} == {"rose", "capture", "steady"}
-    assert {path.split("/")[0] for path in roses.picture(recovery, theory=False)} == {"rose"}
-    assert near.keys() == far.keys() and "rose/ring 100 N" in near
+    near, far = (push_recovery_plots.picture(recovery, scale) for scale in (0.001, 0.002))
+    assert {path.split("/")[0] for path in near} == {"push_recovery", "capture_point_bound", "static_bound"}
+    assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False)} == {"push_recovery"}
+    assert near.keys() == far.keys() and "push_recovery/ring 100 N" in near
     assert all(np.allclose(near[path].matrix[:2, 3], recovery.state.q[:2]) for path in near if "label" not in path)
     before = replace(recovery, pushes=recovery.pushes / 2)
-    axis = roses.plot(recovery, theory=False, before=before)
+    axis = push_recovery_plots.plot(recovery, theory=False, previous=before)
     grey = axis.get_lines()[1]
     assert np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2) and grey.get_label() == "largest push survived before"
     plt.close(axis.figure)
-    assert {path.split("/")[0] for path in roses.picture(recovery, theory=False, before=before)} == {"rose", "before"}
+    assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False, previous=before)} == {
+        "push_recovery",
+        "previous",
+    }
     other = replace(recovery, directions=recovery.directions[:-1], pushes=recovery.pushes[:-1])
-    refused(lambda: roses.plot(recovery, before=other), InputError, 6, 5)
-    ends = [picture["rose/label 100 N"].matrix[:2, 3] - recovery.state.q[:2] for picture in (near, far)]
+    refused(lambda: push_recovery_plots.plot(recovery, previous=other), InputError, 6, 5)
+    ends = [picture["push_recovery/label 100 N"].matrix[:2, 3] - recovery.state.q[:2] for picture in (near, far)]
     assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
 
 

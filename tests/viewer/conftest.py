@@ -11,7 +11,8 @@ from browsers import launched
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
-from floatbase.viewer import Viewer, Window
+from floatbase.viewer import Viewer
+from floatbase.viewer.transport.window import Window
 
 from .looks import CONTEXTS, SIZE, Screen
 

@@ -8,7 +8,9 @@ import numpy as np
 from browsers import SCREENSHOTS
 from PIL import Image
 
-from floatbase.viewer import Viewer, Window, wire
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.transport.window import Window
 
 SIZE = {"width": 900, "height": 600}
 SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
@@ -35,15 +37,15 @@ class Screen:
 
     def __init__(self, page, window: Window):
         self.page, self.window = page, window
-        window.put([wire.page_command("set_title", text="")])
+        window.put([protocol.page_command("set_title", text="")])
         page.goto(window.web_url)
         settle(page)
 
     def show(self, viewer: Viewer) -> None:
         """Show what a viewer has drawn, and nothing else."""
-        commands = [wire.encode(command) for command in viewer.window.scene.commands().values()]
+        commands = [protocol.encode(command) for command in viewer.window.scene.commands().values()]
         handled = self.page.evaluate("viewer.num_messages_received")
-        self.window.put([wire.delete("/meshcat"), *commands])
+        self.window.put([protocol.delete("/meshcat"), *commands])
         self.page.wait_for_function(f"viewer.num_messages_received > {handled} && !viewer.needs_render")
 
 

@@ -98,7 +98,7 @@ window.show = async (id, state) => {
   const fire = (name, ...args) => [...(heard.get(name) || [])].forEach((call) => call(...args));
   const layout = {comm_live: true};
   const model = {
-    get: (name) => name == "still" ? bytes(state.still) : name == "layout" ? layout : state[name],
+    get: (name) => name == "thumbnail" ? bytes(state.thumbnail) : name == "layout" ? layout : state[name],
     send: (content) => socket.send(JSON.stringify(content)),
     on: (name, call) => heard.set(name, [...(heard.get(name) || []), call]),
     off: (name, call) => heard.set(name, (heard.get(name) || []).filter((other) => other !== call)),
@@ -158,8 +158,8 @@ class Notebook:
         self.widgets[widget.model_id] = widget
         widget.send = lambda content, buffers=None: self._send(widget.model_id, content, buffers or [])
         state = {name: getattr(widget, name) for name in ("version", "name", "height")}
-        still = base64.b64encode(widget.still).decode()
-        page.evaluate("([id, state]) => show(id, state)", [widget.model_id, {**state, "still": still}])
+        thumbnail = base64.b64encode(widget.thumbnail).decode()
+        page.evaluate("([id, state]) => show(id, state)", [widget.model_id, {**state, "thumbnail": thumbnail}])
         return page.locator(".output").last.locator("iframe").element_handle().content_frame()
 
     def _send(self, name: str, content: dict[str, Any], buffers: list[bytes]) -> None:

@@ -13,7 +13,10 @@ import pytest
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Simulation, rollout
-from floatbase.viewer import ALARM, CALM, COM, MEASURED, WARNING, X_AXIS, Viewer, Window, wire
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.scene.colours import ALARM, CALM, COM, MEASURED, WARNING, X_AXIS
+from floatbase.viewer.transport.window import Window
 
 from .looks import EYE, SMALL, WHERE, Screen, hue_pixels, picture, settle
 
@@ -72,9 +75,9 @@ def test_the_page_comes_back_when_the_window_does(page) -> None:
     first.close()
     page.wait_for_function(f"{NOTICE} == 'block'")
     with Window(port=first.port) as second:
-        second.put([wire.page_command("set_title", text="back again")])
+        second.put([protocol.page_command("set_title", text="back again")])
         second.wait()
-        assert second.browsers == 1
+        assert second.n_pages == 1
         settle(page, "back again")
         assert page.evaluate(NOTICE) == "none"
 
@@ -259,9 +262,9 @@ VALUES = "Object.values(viewer.gui_controllers).map((one) => one.getValue()).fil
 def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser, viewer: Viewer) -> None:
     heard: defaultdict[str, list[object]] = defaultdict(list)
     for name in NAMES:
-        viewer.slider(name, heard[name].append, 0.0, -1.0, 1.0)
-        viewer.checkbox(f"box {name}", heard[f"box {name}"].append, True)
-        viewer.button(f"button {name}", lambda name=name: heard[f"button {name}"].append("pressed"))
+        viewer.add_slider(name, heard[name].append, 0.0, -1.0, 1.0)
+        viewer.add_checkbox(f"box {name}", heard[f"box {name}"].append, True)
+        viewer.add_button(f"button {name}", lambda name=name: heard[f"button {name}"].append("pressed"))
     names = [text for name in NAMES for text in (name, f"box {name}", f"button {name}")]
     page.goto(viewer.url)
     page.wait_for_function(f"window.viewer && Object.keys(viewer.gui_controllers).length == {len(names)}")
@@ -281,7 +284,7 @@ def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser,
         assert one.evaluate("window.hit") is None
     page.reload()
     page.wait_for_function(f"window.viewer && {now} == '{present}'")
-    viewer.slider(NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0)  # made again, as a cell that is run again does
+    viewer.add_slider(NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0)  # made again, as a cell that is run again does
     other.wait_for_function(f"{VALUES}[0] == 1")
     other.close()
     picture(page, "controls")
@@ -311,7 +314,7 @@ def test_every_robot_is_in_the_page(screen: Screen) -> None:
         screen.show(viewer)
         viewer.close()
         parts = screen.page.evaluate("Object.keys(viewer.scene_tree.children.meshcat.children.robot.children).length")
-        assert parts == len([path for path in viewer.canvas.picture if path.startswith("robot/")]), name
+        assert parts == len([path for path in viewer.renderer.picture if path.startswith("robot/")]), name
         rows, columns = np.nonzero(np.abs(picture(screen.page, f"robot_{name}") - 255).sum(axis=2) > 150)
         assert np.ptp(rows) > 0.45 * 300 or np.ptp(columns) > 0.45 * 450, name
 

@@ -23,7 +23,9 @@ from waiting import PATIENCE, until
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
-from floatbase.viewer import Viewer, Window, wire
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.transport.window import Window
 
 from .test_window import window_threads
 
@@ -71,7 +73,7 @@ def test_a_killed_browser_leaves_nothing_behind(
             os.killpg(browser.pid, signal.SIGKILL)
         browser.wait(PATIENCE)
     assert slowest < HUNG
-    until(lambda: viewer.window.browsers == 0)
+    until(lambda: viewer.window.n_pages == 0)
     until(lambda: len(os.listdir("/proc/self/fd")) <= files)
     assert threading.active_count() == threads
     assert len(viewer.window.scene) <= entries + 2  # title and legend
@@ -87,25 +89,25 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
             f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{window.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
             "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
         )
-        until(lambda: window.browsers == 1)
+        until(lambda: window.n_pages == 1)
         yield client
 
 
 @pytest.mark.front_end
 def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(window: Window, sleeper: socket.socket) -> None:
-    (_, command) = wire.set_object("/meshcat/a", umsgpack.packb({"data": "x" * 20_000}))
+    (_, command) = protocol.set_object("/meshcat/a", umsgpack.packb({"data": "x" * 20_000}))
 
     def draw(n: int) -> None:
         for i in range(n):
             path = f"/meshcat/{i % 5}"
-            window.put([((path, "set_object", ""), command), wire.set_transform(path, np.eye(4))])
+            window.put([((path, "set_object", ""), command), protocol.set_transform(path, np.eye(4))])
 
     draw(5_000)
     before = memory()
     draw(45_000)  # 0.9 GB, had it been kept
     assert memory() - before < 20 * MB
     assert len(window.scene) == 10
-    assert window.browsers == 1
+    assert window.n_pages == 1
     threads = len(window_threads())
     window.close()
     assert len(window_threads()) == threads - 1
@@ -113,12 +115,12 @@ def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(w
 
 
 def test_a_page_that_never_reads_is_dropped(window: Window, sleeper: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("floatbase.viewer.connection.PATIENCE", 0.2)
+    monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     files = len(os.listdir("/proc/self/fd"))
 
     def drawn_and_gone() -> bool:
-        window.put([wire.set_transform("/meshcat/a", np.eye(4))])
-        return window.browsers == 0
+        window.put([protocol.set_transform("/meshcat/a", np.eye(4))])
+        return window.n_pages == 0
 
     until(drawn_and_gone)
     until(lambda: len(os.listdir("/proc/self/fd")) < files)
@@ -180,7 +182,7 @@ def test_a_kernel_is_interrupted_and_restarted_under_a_viewer() -> None:
         # In the text, not as the error's name: where the interrupt lands on an instruction without a line, Python 3.11 and
         # IPython's formatter of tracebacks print "KeyboardInterrupt" as text instead.
         assert "KeyboardInterrupt" in "".join(told)
-        assert kernel.run("view.show(s); print(view.window.is_open, len(view.canvas.picture) > 0)") == "True True\n"
+        assert kernel.run("view.show(s); print(view.window.is_open, len(view.renderer.picture) > 0)") == "True True\n"
 
         kernel.manager.restart_kernel(now=False)
         until(lambda: not answers(port))
@@ -216,7 +218,7 @@ def test_a_kernel_that_shows_pictures_listens_where_jupyter_does_and_nowhere_els
     try:
         jupyters = json.loads(kernel.run(PORTS))
         assert jupyters
-        assert kernel.run(IN_A_NOTEBOOK).endswith("Viewer(go2) Playground(go2) NotebookPicture\n")
+        assert kernel.run(IN_A_NOTEBOOK).endswith("Viewer(go2) Playground(go2) NotebookWidget\n")
         assert json.loads(kernel.run(PORTS)) == jupyters
         port = int(kernel.run("print(view.window.port)"))  # whoever asks gets one
         assert json.loads(kernel.run(PORTS)) == sorted([*jupyters, port])

@@ -104,7 +104,7 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
         page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
 
     def drawn() -> set[str]:
-        return {path for path in playground.view.canvas.picture if path.startswith("measured/")}
+        return {path for path in playground.view.renderer.picture if path.startswith("measured/")}
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")

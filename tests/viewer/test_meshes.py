@@ -12,7 +12,8 @@ import pytest
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import catalogue, load, load_urdf, with_floating_base
-from floatbase.viewer import robot_meshes, urdf_visuals
+from floatbase.viewer.scene.meshes import robot_meshes
+from floatbase.viewer.scene.visuals import urdf_visuals
 
 MESHES = Path(__file__).parents[2] / "assets" / "meshes"
 BOX = 0.01  # m: by which decimation may move an outermost vertex; three pixels in a picture of a whole robot

@@ -22,8 +22,10 @@ from nbformat.v4 import new_code_cell, new_notebook
 from waiting import until
 
 from floatbase.robots import State
-from floatbase.viewer import Viewer, Window, wire
-from floatbase.viewer import page as pages
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.transport.window import Window
+from floatbase.viewer.web import pages
 
 from .looks import DRAWN, picture
 from .notebook import Client, Notebook, hear
@@ -50,7 +52,7 @@ NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 
 
 def put(window: Window, number: float) -> None:
-    window.put([wire.set_transform("/meshcat/a", np.eye(4) * number)])
+    window.put([protocol.set_transform("/meshcat/a", np.eye(4) * number)])
 
 
 def newest(commands: list[dict]) -> float:
@@ -102,12 +104,12 @@ def test_a_page_that_answers_gets_the_pace_and_no_more(window: Window) -> None:
 
 
 def test_a_hundred_thousand_updates_for_a_stalled_page_take_no_memory(window: Window) -> None:
-    (_, command) = wire.set_object("/meshcat/a", wire.umsgpack.packb({"data": "x" * 20_000}))
+    (_, command) = protocol.set_object("/meshcat/a", protocol.umsgpack.packb({"data": "x" * 20_000}))
 
     def draw(n: int) -> None:
         for i in range(n):
             path = f"/meshcat/{i % 5}"
-            window.put([((path, "set_object", ""), command), wire.set_transform(path, np.eye(4))])
+            window.put([((path, "set_object", ""), command), protocol.set_transform(path, np.eye(4))])
 
     draw(5)
     client = Client(window.widget("a", 100))
@@ -171,7 +173,7 @@ def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(
     shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window = window_of_shell
-    monkeypatch.setattr("floatbase.viewer.connection.MOST_BLIND", 1000)
+    monkeypatch.setattr("floatbase.viewer.transport.connection.MAX_UNANSWERED", 1000)
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=True)
     client.commands()
@@ -184,7 +186,7 @@ def test_a_long_cell_does_not_make_a_page_look_lost(
     shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window = window_of_shell
-    monkeypatch.setattr("floatbase.viewer.connection.PATIENCE", 0.4)
+    monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.4)
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=True)
     client.commands()
@@ -193,18 +195,18 @@ def test_a_long_cell_does_not_make_a_page_look_lost(
     put(window, -1)
     frames = frames_of(client)
     client.drawn(1 + frames)
-    assert newest(client.commands()) == -1 and window.browsers == 1
+    assert newest(client.commands()) == -1 and window.n_pages == 1
 
 
 def test_a_page_that_is_let_go_is_told_and_comes_back(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("floatbase.viewer.connection.PATIENCE", 0.2)
+    monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     put(window, 0)
     client = Client(window.widget("a", 100))
     client.frame()
 
     def let_go() -> bool:
         put(window, 1)
-        return window.browsers == 0
+        return window.n_pages == 0
 
     until(let_go)
     while "lost" not in client.message()[0]:
@@ -212,9 +214,9 @@ def test_a_page_that_is_let_go_is_told_and_comes_back(window: Window, monkeypatc
     client.drawn(1)  # it has not heard yet
     assert "lost" in client.message()[0]
     client.say("hello")
-    assert client.frame()[0] == 1 and window.browsers == 1
+    assert client.frame()[0] == 1 and window.n_pages == 1
     client.say("bye")
-    until(lambda: window.browsers == 0)
+    until(lambda: window.n_pages == 0)
 
 
 def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window: Window) -> None:
@@ -224,7 +226,7 @@ def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window: Window) ->
     assert content["code"] and gzip.decompress(viewer) == pages.viewer_code()
     assert gzip.decompress(html).decode() == pages.notebook_page()
     assert len(html) + len(viewer) < 300_000
-    assert window.browsers == 0
+    assert window.n_pages == 0
 
 
 def test_what_no_page_of_a_notebook_says_is_ignored(window: Window, caplog: pytest.LogCaptureFixture) -> None:
@@ -248,7 +250,7 @@ def test_pages_that_leave_without_a_word_are_forgotten_in_the_end(window: Window
     widget = window.widget("a", 100)
     for i in range(60):
         Client(widget, f"page {i}")
-    until(lambda: window.browsers == 50)
+    until(lambda: window.n_pages == 50)
 
 
 def test_a_closed_window_says_so_to_its_pages_once_and_to_those_that_ask(window: Window) -> None:

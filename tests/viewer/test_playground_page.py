@@ -84,7 +84,7 @@ def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, fi
     page.wait_for_function("document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')")
     page.evaluate("viewer.gui_controllers['mass [×] believed'].setValue(1.5)")
     until(lambda: abs(sunk()) < 0.01, work)
-    page.wait_for_function("document.querySelector('#panel p.strip').textContent.includes('differ by')")
+    page.wait_for_function("document.querySelector('#panel p.plot').textContent.includes('differ by')")
     assert gap(field.session.last) < 0.5 * field.robot.weight
 
 
@@ -132,7 +132,7 @@ def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(page, field
 
     def shown() -> list:
         scene = field.view.window.scene
-        said = [[scene.command(("/", kind, name)) for kind in ("move_control", "set_control")] for name in controls]
+        said = [[scene.command(("/", kind, name)) for kind in ("set_control_value", "set_control")] for name in controls]
         return [(moved or made)["value"] for moved, made in said]
 
     before = shown()
@@ -140,11 +140,11 @@ def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(page, field
     for name, value in (("speed", 0.1), ("push [N]", 200.0), ("show forces", "false"), ("show gravity", "true")):
         page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
     until(lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old], lambda: page.wait_for_timeout(20))
-    until(lambda: "term gravity/m g" in field.view.canvas.picture, lambda: page.wait_for_timeout(20))
+    until(lambda: "term gravity/m g" in field.view.renderer.picture, lambda: page.wait_for_timeout(20))
     page.evaluate("viewer.gui_controllers['all as at first'].fire()")
     until(lambda: shown() == before and (field.force, field.towards) == first, lambda: page.wait_for_timeout(20))
-    until(lambda: "measured/FL_foot" in field.view.canvas.picture, lambda: page.wait_for_timeout(20))
-    assert "term gravity/m g" not in field.view.canvas.picture
+    until(lambda: "measured/FL_foot" in field.view.renderer.picture, lambda: page.wait_for_timeout(20))
+    assert "term gravity/m g" not in field.view.renderer.picture
 
 
 def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(field: Playground) -> None:

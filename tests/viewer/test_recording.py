@@ -18,7 +18,10 @@ from floatbase.dynamics import Contacts, LinearConstraint
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Push, Rollout
-from floatbase.viewer import ALARM, CONE, CONE_ALPHA, MEASURED, Picture, Viewer, plots, recording, wire
+from floatbase.viewer import Picture, Viewer, plots
+from floatbase.viewer.export import recording
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.scene.colours import ALARM, CONE, CONE_ALPHA, MEASURED
 
 from .looks import SMALL, picture, settle
 
@@ -66,15 +69,15 @@ def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(viewer: 
     held = LinearConstraint("held", 2, lambda state, t: (np.eye(2, go2.nv), np.zeros(2)))
     forces = np.hstack([made.measured, np.full((len(made), 2), np.nan)])
     viewer.play(dataclasses.replace(made, contacts=made.contacts + Contacts([held]), measured=forces, planned=forces))
-    drawn = {path for path in viewer.canvas.picture if path.startswith("measured/")}
+    drawn = {path for path in viewer.renderer.picture if path.startswith("measured/")}
     assert drawn == {f"measured/{name}" for name in made.contacts.names}
 
 
 def test_a_record_is_thinned_to_thirty_pictures_a_second() -> None:
-    rows = recording.thinned(np.arange(0.0, 2.0, 1e-3), 30.0)
+    rows = recording.sampled_rows(np.arange(0.0, 2.0, 1e-3), 30.0)
     assert rows[0] == 0 and rows[-1] == 1999
     assert 60 <= rows.size <= 62
-    assert list(recording.thinned([0.0], 30.0)) == [0]
+    assert list(recording.sampled_rows([0.0], 30.0)) == [0]
 
 
 def test_the_robot_and_its_forces_move_as_recorded(viewer: Viewer, go2: Robot) -> None:
@@ -117,8 +120,8 @@ def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer: Viewer, g
         times, visible = moving[part, ".visible"]
         np.testing.assert_array_equal(visible[:, 0], (times < 0.4 + 1e-6) | (times > 1.0 - 1e-6))
     assert not {("cone/FR_foot/surface", ".visible"), ("measured/FL_foot", ".visible")} & set(moving)
-    regions = [item for path, item in viewer.canvas.picture.items() if path.startswith("support")]
-    points = [item.shape.lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data for item in regions]
+    regions = [item for path, item in viewer.renderer.picture.items() if path.startswith("support")]
+    points = [item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data for item in regions]
     assert {3, 4} <= {len(numbers) // 6 for numbers in points}
 
 
@@ -276,7 +279,7 @@ def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer: Viewer, stan
     settle(page)
     page.evaluate("viewer.animator.seek(1.0)")
     page.evaluate(WITHHOLD)
-    viewer.window.put([wire.set_property("/Grid", "visible", True)])  # the page is busy with this one
+    viewer.window.put([protocol.set_property("/Grid", "visible", True)])  # the page is busy with this one
     page.wait_for_function("Boolean(window.release)")
     viewer.play_pictures([0, 1], leaning(viewer, standing, contacts, [0.9, 0.9]), title="second")
     page.evaluate("release()")
@@ -315,8 +318,8 @@ def test_controls_in_the_page_call_back(page, viewer: Viewer, standing: State) -
     heard: list[object] = []
     page.set_viewport_size(SMALL)
     viewer.show(standing)
-    viewer.slider("friction", heard.append, 0.6, 0.1, 1.5)
-    viewer.button("push", lambda: heard.append("pushed"))
+    viewer.add_slider("friction", heard.append, 0.6, 0.1, 1.5)
+    viewer.add_button("push", lambda: heard.append("pushed"))
     page.goto(viewer.url)
     settle(page)
     page.evaluate("viewer.gui_controllers['friction'].setValue(0.9)")

@@ -17,22 +17,8 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Ground, Simulation
-from floatbase.viewer import (
-    ALARM,
-    BACKGROUNDS,
-    CALM,
-    IDLE,
-    MEASURED,
-    PLANNED,
-    PRESETS,
-    WARNING,
-    Item,
-    Picture,
-    View,
-    Viewer,
-    hexadecimal,
-    shapes,
-)
+from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
+from floatbase.viewer.scene.colours import ALARM, BACKGROUNDS, CALM, IDLE, MEASURED, PLANNED, WARNING, hex_code
 
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
@@ -196,8 +182,8 @@ def test_a_valley_is_drawn_where_it_is_and_nothing_of_a_side_below_the_other(go2
     state = Simulation(go2, ground).state
     viewer = Viewer(go2, ground=ground)
     viewer.show(state, Contacts.points(go2), support=True)
-    item = viewer.canvas.picture["ground"]
-    points = item.shape.lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data
+    item = viewer.renderer.picture["ground"]
+    points = item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data
     points = np.frombuffer(points, "<f4").reshape(-1, 3)
     clearances = ground.clearances(points)
     np.testing.assert_allclose(clearances.min(axis=1), 0.0, atol=1e-5)
@@ -352,7 +338,7 @@ def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contact
 
 
 def test_the_legend_explains_items_of_ones_own_while_they_are_shown(viewer: Viewer, standing: State) -> None:
-    viewer.explain("wish", MEASURED, "force wished for")
+    viewer.add_legend_entry("wish", MEASURED, "force wished for")
     viewer.show(standing, com=False, extra={"wish": shapes.arrow([0, 0, 1], [0, 0, 1], MEASURED)})
     assert legend(viewer) == ["force wished for"]
     viewer.show(standing, com=False)
@@ -363,20 +349,20 @@ def test_forces_that_are_not_drawn_still_colour_their_cones(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
     def cones() -> dict:
-        return {path: item.colour for path, item in viewer.canvas.picture.items() if path.startswith("cone/")}
+        return {path: item.colour for path, item in viewer.renderer.picture.items() if path.startswith("cone/")}
 
     viewer.show(standing, contacts, forces)
     seen = cones()
     viewer.show(standing, contacts, forces, arrows=False)
     assert cones() == seen and len(set(seen.values())) > 1
-    assert not [path for path in viewer.canvas.picture if path.startswith(("measured", "planned"))]
+    assert not [path for path in viewer.renderer.picture if path.startswith(("measured", "planned"))]
 
 
 def test_a_flat_foot_has_one_name_and_a_number_at_each_corner() -> None:
     talos = load("talos")
     view = Viewer(talos)
     view.show(talos.standing(), Contacts.feet(talos), labels=True)
-    words = [item.shape.name for path, item in view.canvas.picture.items() if path.startswith("label/")]
+    words = [item.shape.name for path, item in view.renderer.picture.items() if path.startswith("label/")]
     view.close()
     assert sorted(words) == sorted(["left_sole_link", "right_sole_link", *2 * "0123"])
 
@@ -387,7 +373,7 @@ def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing
     view.show(standing, push=("base", [0.0, 30.0, 0.0]))
     assert material(view, "/meshcat/push")["depthTest"] is False
     assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [
-        hexadecimal(BACKGROUNDS[background][3]),
+        hex_code(BACKGROUNDS[background][3]),
         "push",
         "patch",
     ]
@@ -446,7 +432,7 @@ def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
 def test_the_colours_are_those_of_the_code(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
     viewer.show(standing, contacts, forces=forces, planned=forces)
     for kind, colour in (("measured", MEASURED), ("planned", PLANNED)):
-        assert f"#{material(viewer, f'/meshcat/{kind}/FL_foot')['color']:06X}" == hexadecimal(colour)
+        assert f"#{material(viewer, f'/meshcat/{kind}/FL_foot')['color']:06X}" == hex_code(colour)
 
 
 def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer: Viewer, go2: Robot) -> None:

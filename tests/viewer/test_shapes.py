@@ -15,27 +15,14 @@ from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.friction import FrictionPolyhedron, wrench_set
+from floatbase.lessons import FIGURES, props
 from floatbase.objectives import CoMTask, standing_tasks
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import (
-    BACKGROUNDS,
-    CONE,
-    FIGURES,
-    GREYS,
-    LEGEND,
-    MEASURED,
-    PLANNED,
-    View,
-    Viewer,
-    below,
-    geometry,
-    hexadecimal,
-    marks,
-    props,
-    roses,
-    shapes,
-)
+from floatbase.viewer import View, Viewer, markers, prefixed, shapes
+from floatbase.viewer.plots import push_recovery_plots
+from floatbase.viewer.scene import geometry
+from floatbase.viewer.scene.colours import BACKGROUNDS, CONE, GREYS, LEGEND, MEASURED, PLANNED, hex_code
 
 from .looks import SMALL, Screen, picture, settle
 
@@ -43,10 +30,10 @@ from .looks import SMALL, Screen, picture, settle
 @pytest.mark.parametrize(
     ("mesh", "volume"),
     [
-        (geometry.ball(1.0), 4 / 3 * np.pi),
-        (geometry.rod([0, 0, 0], [1, 2, 2], 0.5), 0.75 * np.pi),
-        (geometry.revolved([(0, 0), (1, 0), (1, 1), (0, 1)]), np.pi),
-        (geometry.revolved([(0, 0), (1, 1), (0, 1)]), np.pi / 3),
+        (geometry.sphere(1.0), 4 / 3 * np.pi),
+        (geometry.cylinder([0, 0, 0], [1, 2, 2], 0.5), 0.75 * np.pi),
+        (geometry.surface_of_revolution([(0, 0), (1, 0), (1, 1), (0, 1)]), np.pi),
+        (geometry.surface_of_revolution([(0, 0), (1, 1), (0, 1)]), np.pi / 3),
     ],
     ids=["ball", "rod", "cylinder", "cone"],
 )
@@ -58,7 +45,7 @@ def test_closed_meshes_face_outwards_and_hold_their_volume(mesh: geometry.Mesh, 
 
 @pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (-0.36, 0.48, 0.8)])
 def test_frame_along_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
-    turned = geometry.frame_along(direction)
+    turned = geometry.rotation_with_z_axis(direction)
     np.testing.assert_allclose(turned[:, 2], direction, atol=1e-12)
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(turned) == pytest.approx(1.0)
@@ -66,14 +53,14 @@ def test_frame_along_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]
 
 def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
     moment = np.array([0.1, -0.2, 0.2])
-    item = marks.curled_arrow([1.0, 2.0, 3.0], moment)
+    item = markers.curled_arrow([1.0, 2.0, 3.0], moment)
     assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
     np.testing.assert_allclose(item.matrix[:3, 2], moment)
     assert np.linalg.det(item.matrix[:3, :3]) > 0
 
 
 def test_a_curled_arrow_has_heads_all_round_so_that_its_sense_is_seen_from_anywhere() -> None:
-    data = marks.curled_arrow([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]).shape.lowered["geometries"][0]["data"]["attributes"]["position"]
+    data = markers.curled_arrow([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]).shape.data["geometries"][0]["data"]["attributes"]["position"]
     points = np.frombuffer(data["array"].data, "<i2").reshape(-1, 3).astype(float)
     points *= 1.0 / np.median(np.linalg.norm(points[:, :2], axis=1))
     beside = np.abs(np.linalg.norm(points[:, :2], axis=1) - 1.0) > 0.1  # what is wider than the ring
@@ -99,11 +86,11 @@ NAN = float("nan")
         (lambda: shapes.label([0, 0, 0], "x", 0.0), "height", 0),
         (lambda: shapes.label([0, 0, NAN], "x", 0.1), "position", NAN),
         (lambda: shapes.rod([0, 0, 0], np.eye(3), 0.0, 0.1, MEASURED), "length", 0),
-        (lambda: shapes.placed([0, 0, 0], np.eye(3) * NAN), "axes", NAN),
+        (lambda: shapes.transform([0, 0, 0], np.eye(3) * NAN), "axes", NAN),
         (lambda: shapes.flat_polygon([[0, 0, 0], [1, 0, 0]], MEASURED, 0.5), "corners", 2),
-        (lambda: marks.curled_arrow([0, 0, 0], [0, 0, 0]), "arrow"),
-        (lambda: marks.frame_axes(np.eye(3), 0.1), "pose", 3, 4),
-        (lambda: marks.frame_axes(np.eye(4), 0.0), "length", 0),
+        (lambda: markers.curled_arrow([0, 0, 0], [0, 0, 0]), "arrow"),
+        (lambda: markers.frame_axes(np.eye(3), 0.1), "pose", 3, 4),
+        (lambda: markers.frame_axes(np.eye(4), 0.0), "length", 0),
         (lambda: props.wheel([0, 0, 0], [0, 0, 0], 0.1, 0.0), "axis"),
         (lambda: props.wheel([0, 0, 0], [0, 1, 0], 0.0, 0.0), "radius", 0),
         (lambda: props.turntable([0, 0, 0], 0.0, 0.0), "radius", 0),
@@ -120,15 +107,15 @@ def test_what_cannot_be_drawn_is_refused_by_name(case: tuple[Any, ...]) -> None:
 
 
 def test_a_push_ends_where_it_acts() -> None:
-    item = marks.push([1.0, 0.0, 0.5], [0.0, 0.2, 0.0], 1.0)
+    item = markers.push([1.0, 0.0, 0.5], [0.0, 0.2, 0.0], 1.0)
     np.testing.assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
 
 
 def test_two_points_have_no_support_region() -> None:
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
-    assert set(marks.support_region(square, 0.0)) == {""}
-    assert marks.support_region(square[:2], 0.0) == {}
-    assert marks.support_region(np.outer(np.arange(4.0), [1.0, 2.0, 0.0]), 0.0) == {}
+    assert set(markers.support_region(square, 0.0)) == {""}
+    assert markers.support_region(square[:2], 0.0) == {}
+    assert markers.support_region(np.outer(np.arange(4.0), [1.0, 2.0, 0.0]), 0.0) == {}
 
 
 def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
@@ -156,7 +143,7 @@ def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> Non
 
 
 def test_braces_lower_a_part_of_a_label() -> None:
-    images = [shapes.label([0, 0, 0], text, 0.1, plate=False).shape.lowered["images"][0]["url"] for text in ("fc", "f{c}")]
+    images = [shapes.label([0, 0, 0], text, 0.1, plate=False).shape.data["images"][0]["url"] for text in ("fc", "f{c}")]
     plain, lowered = (np.frombuffer(i["data"].data, np.uint8).reshape(i["height"], i["width"], 2)[::-1] for i in images)
     assert lowered.shape[1] < plain.shape[1]
     rows = [np.flatnonzero(image[:, :, 1].any(axis=1)).max() for image in (plain, lowered)]
@@ -195,7 +182,7 @@ def test_the_middle_grey_shows_on_every_background() -> None:
 
 def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_the_push() -> None:
     for paper, _, _, text in BACKGROUNDS.values():
-        outlined = marks.push([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 1.0, text, paper).shape.lowered
+        outlined = markers.push([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 1.0, text, paper).shape.data
         data = outlined["geometries"][0]["data"]["attributes"]["color"]["array"].data
         first, *_, last = np.frombuffer(data, np.uint8).reshape(-1, 3) / 255  # painted in this order
         for painted, colour in ((first, paper), (last, text)):
@@ -206,15 +193,15 @@ def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_
 
 def test_a_pushs_outline_is_as_wide_at_its_ends_as_along_it() -> None:
     for vector in ([0.02, 0.0, 0.0], [0.3, 0.0, 0.0], [1.5, 0.0, 0.0]):
-        item = marks.push([0.0, 0.0, 0.0], vector, 1.0)
-        attributes = item.shape.lowered["geometries"][0]["data"]["attributes"]
+        item = markers.push([0.0, 0.0, 0.0], vector, 1.0)
+        attributes = item.shape.data["geometries"][0]["data"]["attributes"]
         unit = np.frombuffer(attributes["position"]["array"].data, "<i2").reshape(-1, 3)
-        points = unit * item.shape.lowered["object"]["matrix"][0] @ item.matrix[:3, :3].T  # m, seen from where it begins
+        points = unit * item.shape.data["object"]["matrix"][0] @ item.matrix[:3, :3].T  # m, seen from where it begins
         colours = np.frombuffer(attributes["color"]["array"].data, np.uint8).reshape(-1, 3)
         outline, arrow = points[colours[:, 0] == 255], points[colours[:, 0] < 255]
         radius = np.linalg.norm(item.matrix[:3, 0])
         back = arrow[:, 0].min() - outline[:, 0].min()
-        assert back == pytest.approx(marks.OUTLINE * radius, rel=0.1)
+        assert back == pytest.approx(markers.OUTLINE * radius, rel=0.1)
         assert outline[:, 0].max() > arrow[:, 0].max() + 0.9 * back
 
 
@@ -238,22 +225,24 @@ def test_figures(screen: Screen) -> None:
 def test_the_compass_is_plotted_and_drawn_to_scale(viewer: Viewer, standing: State, contacts: Contacts) -> None:
     wrenches = wrench_set(standing, contacts)
     forces = wrenches.max_horizontal_forces(8)[1]
-    axis = roses.plot_compass(wrenches, n=8)
+    axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
     np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == ["reachable horizontal force"]
     plt.close(axis.figure)
-    near, far = (roses.compass(wrenches, scale, n=8) for scale in (0.001, 0.002))
-    assert {path.split("/")[0] for path in near} == {"compass"} and near.keys() == far.keys()
+    near, far = (push_recovery_plots.horizontal_force_limits(wrenches, scale, n=8) for scale in (0.001, 0.002))
+    assert {path.split("/")[0] for path in near} == {"horizontal_force"} and near.keys() == far.keys()
     ring = next(path for path in near if "label" in path)
     ends = [picture[ring].matrix[:2, 3] - standing.com[:2] for picture in (near, far)]
     np.testing.assert_allclose(np.linalg.norm(ends, axis=1), float(ring.split()[-2]) * np.array([0.001, 0.002]))
-    np.testing.assert_allclose(near["compass/line"].matrix[:2, 3], standing.com[:2])
+    np.testing.assert_allclose(near["horizontal_force/line"].matrix[:2, 3], standing.com[:2])
     viewer.show(standing, contacts, extra=near)
     inwards = {name: [0.0, -1.0 if name[1] == "L" else 1.0, 0.1] for name in contacts.names}
     walls = Contacts.points(standing.robot, normals=inwards)
     with raises(InputError, "max_normal_force"):
-        roses.plot_compass(wrench_set(standing, walls, inner_approximation=False, facets=8), n=8)
-    refused(lambda: roses.compass(wrench_set(standing, contacts.only("FL_foot"))), InfeasibleError)
+        push_recovery_plots.plot_horizontal_force_limits(wrench_set(standing, walls, inner_approximation=False, facets=8), n=8)
+    refused(
+        lambda: push_recovery_plots.horizontal_force_limits(wrench_set(standing, contacts.only("FL_foot"))), InfeasibleError
+    )
 
 
 @pytest.mark.parametrize(("facets", "turn"), [(4, 0.0), (5, 0.4)])
@@ -268,26 +257,26 @@ def test_prices_stand_at_the_middle_of_their_facets(
         go2, contacts, tasks, facets=facets, facet_rotation=turn, min_normal_force=20.0, backend="reference"
     )
     answer = controller(standing.q, standing.v).solution
-    picture = viewer.prices(standing, contacts, answer)
+    picture = viewer.multiplier_labels(standing, contacts, answer)
     shown = {name: price for name, price in answer.multipliers.items() if "torque" not in name}
-    assert {path.removeprefix("price/") for path in picture} == set(shown)
+    assert {path.removeprefix("multiplier/") for path in picture} == set(shown)
     assert any("facet" in name for name in shown) and any("normal force" in name for name in shown)
     height = viewer.painter.cone_height(contacts)
     for name, price in shown.items():
         i = contacts.point_names.index(name.owner)
         normal = contacts.normals[i]
-        arm = picture[f"price/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
+        arm = picture[f"multiplier/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
         if name.kind == "friction":
             rays = FrictionPolyhedron(normal, 0.6, facets, facet_rotation=turn).rays
             np.testing.assert_allclose(arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9)
         else:
             np.testing.assert_allclose(arm, height * normal, atol=1e-9)
-        assert float(picture[f"price/{name}"].shape.name) == pytest.approx(price, rel=0.05)
+        assert float(picture[f"multiplier/{name}"].shape.name) == pytest.approx(price, rel=0.05)
     viewer.show(standing, contacts, extra=picture)
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
-    assert [hexadecimal(viewer.painter.text), "price of a limit: its multiplier", "patch"] in legend
+    assert [hex_code(viewer.painter.text_colour), "price of a limit: its multiplier", "patch"] in legend
     with raises(InputError, "contacts", "solution"):
-        viewer.prices(standing, contacts.only("FL_foot"), answer)
+        viewer.multiplier_labels(standing, contacts.only("FL_foot"), answer)
 
 
 def test_a_price_that_is_nearly_nothing_beside_another_gets_no_label(viewer: Viewer, standing: State) -> None:
@@ -295,17 +284,17 @@ def test_a_price_that_is_nearly_nothing_beside_another_gets_no_label(viewer: Vie
     qp = WholeBodyController(standing.robot, contacts, standing_tasks(standing)).qp(standing)
     mu = np.zeros(len(qp.G))
     mu[[0, 1, 2]] = 1e4, 9.0, 11.0  # of FL's facets
-    picture = viewer.prices(standing, contacts, Solution(qp, np.zeros(qp.n), mu, "made up"))
-    assert set(picture) == {"price/FL_foot facet 0", "price/FL_foot facet 2"}
+    picture = viewer.multiplier_labels(standing, contacts, Solution(qp, np.zeros(qp.n), mu, "made up"))
+    assert set(picture) == {"multiplier/FL_foot facet 0", "multiplier/FL_foot facet 2"}
 
 
 def test_figure_1_adds_up() -> None:
     """f_c is the sum of the f_i, and the bolts' moment balances the wall's force."""
     right, left = FIGURES["figure_1_right"](), FIGURES["figure_1_left"]()
-    drawn = right.canvas.picture
+    drawn = right.renderer.picture
     feet = [item.matrix[:3, 2] for path, item in drawn.items() if path.startswith("measured/")]
     np.testing.assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
-    force, ring = left.canvas.picture["f/wall"].matrix, left.canvas.picture["f/base"].matrix
+    force, ring = left.renderer.picture["f/wall"].matrix, left.renderer.picture["f/base"].matrix
     balance = -np.cross(force[:3, 3], force[:3, 2])
     np.testing.assert_allclose(ring[:3, 2] / np.linalg.norm(ring[:3, 2]), balance / np.linalg.norm(balance), atol=1e-9)
     right.close(), left.close()
@@ -313,11 +302,11 @@ def test_figure_1_adds_up() -> None:
 
 @pytest.mark.front_end
 def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
-    extra = below("wheel", {"": props.wheel([0.7, -0.5, 0.15], [0, 1, 0], 0.15, 0.6)})
-    extra |= below("cylinder", props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)))
-    extra |= below("wall", {"": props.wall([-0.6, 0, 0.3], [1, 0, 0], 0.6, 0.6)})
-    extra |= below("table", {"": props.turntable([-0.7, -0.6, 0.2], 0.3, 0.4)})
-    extra |= below("bolts", props.bolts([0.3, -0.6, 0.0], 0.1))
+    extra = prefixed("wheel", {"": props.wheel([0.7, -0.5, 0.15], [0, 1, 0], 0.15, 0.6)})
+    extra |= prefixed("cylinder", props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)))
+    extra |= prefixed("wall", {"": props.wall([-0.6, 0, 0.3], [1, 0, 0], 0.6, 0.6)})
+    extra |= prefixed("table", {"": props.turntable([-0.7, -0.6, 0.2], 0.3, 0.4)})
+    extra |= prefixed("bolts", props.bolts([0.3, -0.6, 0.0], 0.1))
     forces = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
     q = standing.q.copy()
     q[2] += 0.08
@@ -332,7 +321,7 @@ def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, st
         "(() => { let n = 0; viewer.scene_tree.children.meshcat.object.traverse((o) => { n += o.name == 'shape'; });"
         " return n; })()"
     )
-    assert drawn == len(viewer.canvas.picture)
+    assert drawn == len(viewer.renderer.picture)
     picture(page, "shapes")
 
 

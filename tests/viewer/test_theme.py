@@ -9,12 +9,13 @@ import pytest
 
 from floatbase import Contacts
 from floatbase.robots import Robot, State
-from floatbase.viewer import BACKGROUNDS, COM, GREYS, LEGEND, MEASURED, NIGHT, Viewer, hexadecimal
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene.colours import BACKGROUNDS, COM, DARK_SHADES, GREYS, LEGEND, MEASURED, hex_code
 
 from .looks import picture
 
 RGB = tuple[float, float, float]
-AS_TEXT = ("push", "price", "zmp")  # drawn in the colour of text
+AS_TEXT = ("push", "multiplier", "zmp")  # drawn in the colour of text
 SEEN = 3.0  # contrast that WCAG 2.2 asks for between parts of a picture and what is around them
 READ = 4.5  # and for text
 DRAWN = "window.viewer && viewer.num_messages_received > 0"
@@ -43,8 +44,8 @@ def test_text_is_read_and_what_hides_in_the_dark_has_another_shade_there(backgro
         assert contrast(text, paper) > READ
         assert contrast(text, paper) > 3.0 * contrast(lines, paper)  # the ground keeps behind
     if background == "dark":
-        drawn = {colour for kind, colour, _ in LEGEND if kind not in AS_TEXT} | {*GREYS, *NIGHT}
-        shades = [NIGHT.get(colour, colour) for colour in drawn]
+        drawn = {colour for kind, colour, _ in LEGEND if kind not in AS_TEXT} | {*GREYS, *DARK_SHADES}
+        shades = [DARK_SHADES.get(colour, colour) for colour in drawn]
         assert min(contrast(shade, paper) for shade in shades for paper in (top, bottom)) > SEEN
         assert contrast(MEASURED, bottom) < SEEN  # so that the shades are there for something
 
@@ -67,12 +68,12 @@ def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path
     inner.wait_for_function(DRAWN)
     assert not inner.evaluate(DARK)
     seen = {part: inner.evaluate(*part) for part in ((COLOUR, "meshcat/measured/FL_foot"), (COLOUR, "meshcat/ground"), (GREY,))}
-    assert f"#{seen[COLOUR, 'meshcat/measured/FL_foot']}" == hexadecimal(MEASURED).lower()
+    assert f"#{seen[COLOUR, 'meshcat/measured/FL_foot']}" == hex_code(MEASURED).lower()
     page.evaluate("document.body.style.color = '#eee'")
     inner.wait_for_function(f"{DARK} && !viewer.needs_render")
-    assert f"#{inner.evaluate(COLOUR, 'meshcat/measured/FL_foot')}" == hexadecimal(NIGHT[MEASURED]).lower()
-    assert f"#{inner.evaluate(COLOUR, 'meshcat/ground')}" == hexadecimal(BACKGROUNDS["dark"][2]).lower()
-    assert hexadecimal(NIGHT[COM]).lower() in inner.evaluate(
+    assert f"#{inner.evaluate(COLOUR, 'meshcat/measured/FL_foot')}" == hex_code(DARK_SHADES[MEASURED]).lower()
+    assert f"#{inner.evaluate(COLOUR, 'meshcat/ground')}" == hex_code(BACKGROUNDS["dark"][2]).lower()
+    assert hex_code(DARK_SHADES[COM]).lower() in inner.evaluate(
         "[...document.querySelectorAll('#lines i')].map((one) => one.style.color.match(/\\d+/g).map("
         "(x) => Number(x).toString(16).padStart(2, '0')).join(''))"
         ".map((code) => '#' + code)"

@@ -31,9 +31,11 @@ from waiting import PATIENCE, until
 
 from floatbase.errors import FloatbaseError, ViewerError
 from floatbase.robots import State
-from floatbase.viewer import Viewer, Window, wire
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.transport.window import Window
 
-UPDATES = [wire.set_transform(f"/meshcat/{i}", np.eye(4)) for i in range(100)]
+UPDATES = [protocol.set_transform(f"/meshcat/{i}", np.eye(4)) for i in range(100)]
 
 
 def window_threads() -> list[threading.Thread]:
@@ -77,7 +79,7 @@ def test_meshcat_draws_into_the_window(window: Window) -> None:
 def test_the_fast_transform_is_the_same_command_as_meshcats(window: Window) -> None:
     matrix = np.arange(16.0).reshape(4, 4)
     meshcat.Visualizer(window=window)["a"].set_transform(matrix)
-    window.put([wire.set_transform("/meshcat/b", matrix)])
+    window.put([protocol.set_transform("/meshcat/b", matrix)])
     scene = window.scene.commands()
     ours, theirs = (scene[f"/meshcat/{name}", "set_transform", ""] for name in "ba")
     assert ours | {"path": ""} == theirs | {"path": ""}
@@ -132,10 +134,10 @@ def test_a_picture_has_a_port_only_once_its_address_is_asked_for(viewer: Viewer,
     viewer.save(tmp_path / "scene.html")
     assert set(viewer._repr_mimebundle_()[0]) >= {"image/png"}
     assert repr(viewer) == "Viewer(go2)" and repr(viewer.window) == "Window(open)"
-    assert listening() == before and not viewer.window.listens
+    assert listening() == before and not viewer.window.is_listening
     assert viewer.url == f"http://127.0.0.1:{viewer.window.port}/"
     assert listening() - before == {viewer.window.port}
-    assert viewer.window.listens and repr(viewer) == f"Viewer(go2, {viewer.url})"
+    assert viewer.window.is_listening and repr(viewer) == f"Viewer(go2, {viewer.url})"
     assert urllib.request.urlopen(viewer.url, timeout=PATIENCE).status == 200
     viewer.close()
     assert listening() == before
@@ -202,7 +204,7 @@ def test_a_port_is_free_at_once_after_close() -> None:
 def test_no_browser_is_an_error_at_once(window: Window) -> None:
     start = time.monotonic()
     refused(window.get_image, ViewerError, "web_url")
-    assert not window.listens
+    assert not window.is_listening
     assert window.web_url == f"http://127.0.0.1:{window.port}/"
     refused(window.get_image, ViewerError, window.web_url)
     refused(lambda: window.wait(timeout=0.1), ViewerError, window.web_url, 0.1)
@@ -238,7 +240,7 @@ def test_another_host_name_is_refused(window: Window) -> None:
 
 def test_a_page_that_opens_late_gets_the_whole_scene_in_one_frame(window: Window) -> None:
     for i in range(5):
-        window.put([wire.set_transform(f"/meshcat/{i}", np.eye(4) * (i + 1))])
+        window.put([protocol.set_transform(f"/meshcat/{i}", np.eye(4) * (i + 1))])
 
     async def look() -> list[dict]:
         client = await connect(window)
@@ -254,7 +256,7 @@ def test_a_page_that_does_not_read_costs_nothing_and_gets_the_newest_values(wind
         client = await connect(window)
         await asyncio.sleep(0.05)
         for i in range(updates):
-            window.put([wire.set_transform(f"/meshcat/{i % 7}", np.eye(4) * i)])
+            window.put([protocol.set_transform(f"/meshcat/{i % 7}", np.eye(4) * i)])
         assert len(window.scene) == 7
         first = commands_in(await asyncio.wait_for(client.read_message(), PATIENCE))
         await client.write_message(json.dumps({"type": "done"}))
@@ -269,11 +271,11 @@ def test_a_page_that_does_not_read_costs_nothing_and_gets_the_newest_values(wind
 def test_deletes_and_objects_keep_their_order_on_the_way_to_a_busy_page(window: Window) -> None:
     async def sleepy() -> list[str]:
         client = await connect(window)
-        window.put([wire.set_object("/meshcat/a", umsgpack.packb({"n": 1}))])
+        window.put([protocol.set_object("/meshcat/a", umsgpack.packb({"n": 1}))])
         await asyncio.wait_for(client.read_message(), PATIENCE)
         for n in range(5):
-            window.put([wire.delete("/meshcat/a")])
-            window.put([wire.set_object("/meshcat/a", umsgpack.packb({"n": n}))])
+            window.put([protocol.delete("/meshcat/a")])
+            window.put([protocol.set_object("/meshcat/a", umsgpack.packb({"n": n}))])
         await asyncio.sleep(0.1)
         await client.write_message(json.dumps({"type": "done"}))
         return [command["type"] for command in commands_in(await asyncio.wait_for(client.read_message(), PATIENCE))]
@@ -284,7 +286,7 @@ def test_deletes_and_objects_keep_their_order_on_the_way_to_a_busy_page(window: 
 def test_threads_draw_at_the_same_time(window: Window) -> None:
     def draw(name: str) -> None:
         for i in range(500):
-            window.put([wire.set_transform(f"/meshcat/{name}", np.eye(4) * i)])
+            window.put([protocol.set_transform(f"/meshcat/{name}", np.eye(4) * i)])
 
     threads = [threading.Thread(target=draw, args=(f"t{k}",)) for k in range(8)]
     for thread in threads:
@@ -357,7 +359,7 @@ def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) ->
     def draw() -> None:
         nonlocal drawn
         drawn += 1
-        window.put([wire.set_transform("/meshcat/a", np.eye(4) * drawn)])
+        window.put([protocol.set_transform("/meshcat/a", np.eye(4) * drawn)])
 
     stop = time.monotonic() + PATIENCE
     with interrupting() as interrupted:
@@ -388,8 +390,10 @@ def test_what_no_page_says_is_ignored(window: Window, caplog: pytest.LogCaptureF
         if name == "broken":
             raise ZeroDivisionError("of the callback")
 
-    window.put([wire.set_control("slider", value=0.0, min=-1.0, max=1.0, step=0.1), wire.set_control("box", value=True)])
-    window.put([wire.set_control("broken")])
+    window.put(
+        [protocol.set_control("slider", value=0.0, min=-1.0, max=1.0, step=0.1), protocol.set_control("box", value=True)]
+    )
+    window.put([protocol.set_control("broken")])
     window.on_control(hear)
     ours = [("slider", 0.5), ("slider", 9), ("box", False), ("broken", None)]
 

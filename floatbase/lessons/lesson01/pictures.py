@@ -9,13 +9,16 @@ import numpy.typing as npt
 
 import floatbase as fb
 from floatbase._validation import Array
+from floatbase.lessons import props
 from floatbase.lessons.exercises import vector_text
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.lessons.rounding import about
 from floatbase.objectives import Task, centroidal_momentum_rate
 from floatbase.robots import PLATE_SIZE
 from floatbase.simulation import Rollout
-from floatbase.viewer import MEASURED, Item, Picture, View, Viewer, below, marks, props, recording, shapes
+from floatbase.viewer import Item, Picture, View, Viewer, markers, prefixed, shapes
+from floatbase.viewer.export import recording
+from floatbase.viewer.scene.colours import MEASURED
 
 PRESSING = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
 PRESSING_VIEW = View(100.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
@@ -24,7 +27,7 @@ PRESSING_VIEW = View(100.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
 def show_arm(view: Viewer, state: fb.State) -> Viewer:
     """The arm in front of the wall, with the axes x, y, z of the world at its base."""
     tool = state.point("tool0")
-    extra = _wall(tool) | below("axes", marks.frame_axes(np.eye(4), 0.28))
+    extra = _wall(tool) | prefixed("axes", markers.frame_axes(np.eye(4), 0.28))
     names: dict[str, npt.ArrayLike] = {
         "x": [0.32, 0.0, 0.03],
         "y": [0.0, 0.33, 0.03],
@@ -45,9 +48,9 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
     view.show(state, com=False)
     view.camera(PRESSING_VIEW)
     tool = state.point("tool0")
-    scene = _wall(tool) | below("bolts", props.bolts(np.zeros(3), 0.11))
+    scene = _wall(tool) | prefixed("bolts", props.bolts(np.zeros(3), 0.11))
 
-    view.explain("f", MEASURED, "forces on the arm, and the moment of the bolts")
+    view.add_legend_entry("f", MEASURED, "forces on the arm, and the moment of the bolts")
 
     def draw(press: float) -> str:
         force = np.array([-press, 0.0, 0.0])
@@ -59,7 +62,7 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
             start = end - view.scale * bolts
             extra["f/wall"] = shapes.arrow(tool, view.scale * force, MEASURED, view.painter.size)
             extra["f/bolts"] = shapes.arrow(start, view.scale * bolts, MEASURED, view.painter.size)
-            extra["f/moment"] = marks.curled_arrow([0.0, 0.16, 0.1], 0.003 * moment, MEASURED)
+            extra["f/moment"] = markers.curled_arrow([0.0, 0.16, 0.1], 0.003 * moment, MEASURED)
             extra["label/wall"] = shapes.label(tip + [0.0, 0.0, -0.08], "f{r}", 0.06)
             extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06)
             extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06)
@@ -78,7 +81,7 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
 def play_pressing(view: Viewer, record: Rollout) -> Viewer:
     """The arm on its plate in front of the wall, as the record has it, with the wall's force on the tool."""
     scene = _wall(record.state(0).point("tool0"))
-    view.explain("f", MEASURED, "force of the wall")
+    view.add_legend_entry("f", MEASURED, "force of the wall")
 
     def picture(state: fb.State, i: int) -> Picture:
         drawn = _free_arm(view, state) | scene | {"plate": _plate(state)}
@@ -109,7 +112,7 @@ def centre_panel(view: Viewer, state: fb.State) -> SliderPanel:
     swing = np.zeros(state.robot.nv)
     swing[[first + i for i, name in enumerate(state.robot.joint_names) if "thigh" in name]] = -1.0
     pose = state.frame_pose("base")
-    axes = below("axes", marks.frame_axes(pose.homogeneous, 0.2))
+    axes = prefixed("axes", markers.frame_axes(pose.homogeneous, 0.2))
 
     def draw(swing_forwards: float) -> str:
         now = state.replace(q=state.integrate(swing_forwards * swing))
@@ -169,7 +172,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
         view.draw(drawn)
         return f"f<sub>c</sub> = {vector_text(rate[:3])} N, τ<sub>c</sub> = {vector_text(rate[3:])} N·m"
 
-    view.explain("thrust", MEASURED, "force of a thruster")
+    view.add_legend_entry("thrust", MEASURED, "force of a thruster")
     each = (-40.0, 30.0, 40.0, "N")
     panel = slider_panel(view, draw, left_feet=each, right_feet=each, twist=(-40.0, 0.0, 40.0, "N"))
     view.camera(View(50.0, 14.0, 1.0, around=((0.0, 0.0, 0.38), 0.6)))
@@ -184,7 +187,7 @@ def _afloat(picture: Picture) -> Picture:
 def _wall(tool: Array) -> Picture:
     """The wall that the tool touches, 0.6 m wide and 0.9 m high. tool: shape (3,), m, world."""
     normal = np.array([-1.0, 0.0, 0.0])
-    return below("wall", {"/slab": props.wall([tool[0] + 0.003, tool[1], 0.45], normal, 0.6, 0.9)})
+    return prefixed("wall", {"/slab": props.wall([tool[0] + 0.003, tool[1], 0.45], normal, 0.6, 0.9)})
 
 
 def _plate(state: fb.State) -> Item:
@@ -193,20 +196,20 @@ def _plate(state: fb.State) -> Item:
     slab = props.wall(np.zeros(3), [1.0, 0.0, 0.0], 1.0, 1.0)
     pose = state.frame_pose("base_link")
     centre = pose.translation - pose.rotation[:, 2] * thick / 2
-    return Item(slab.shape, shapes.placed(centre, pose.rotation, (width, width, thick)))
+    return Item(slab.shape, shapes.transform(centre, pose.rotation, (width, width, thick)))
 
 
 def _free_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> Picture:
     """The arm. first: a state to show as a veil; then axes on the base and the centre of mass are drawn too."""
     drawn = view.painter.picture(state, com=first is not None, ghost=first)
     if first is not None:
-        drawn |= below("axes", marks.frame_axes(state.frame_pose("base_link").homogeneous, 0.25))
+        drawn |= prefixed("axes", markers.frame_axes(state.frame_pose("base_link").homogeneous, 0.25))
     return drawn
 
 
 def _play(view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Picture], look: View, speed: float = 1.0) -> Viewer:
     """Play a record as pictures, 30 a second. picture: (state, row of the record) -> `Picture`."""
-    rows = recording.thinned(record.time, 30.0)
+    rows = recording.sampled_rows(record.time, 30.0)
     pictures = [picture(record.state(int(i)), int(i)) for i in rows]
     view.play_pictures(record.time[rows], pictures, speed=speed, ghost_name="where it was first")
     return view.camera(look)

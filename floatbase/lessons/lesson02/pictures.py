@@ -13,12 +13,15 @@ from matplotlib.figure import Figure
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
+from floatbase.lessons import props
 from floatbase.lessons.exercises import vector_text
 from floatbase.lessons.lesson02.helpers import DISC_RADIUS, park, wheel
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
-from floatbase.viewer import COM, GREYS, MEASURED, PLANNED, Picture, View, Viewer, geometry, hexadecimal, marks, props, shapes
+from floatbase.viewer import Picture, View, Viewer, markers, shapes
+from floatbase.viewer.scene import geometry
+from floatbase.viewer.scene.colours import COM, GREYS, MEASURED, PLANNED, hex_code
 
 MOMENT = 0.01  # m drawn for a newton metre
 
@@ -33,7 +36,7 @@ def draw_equation(eom: EquationsOfMotion) -> Figure:
     for axis, (name, part, first) in zip(axes, parts, strict=True):
         filled = np.abs(part) > 1e-9 * np.abs(part).max()
         axis.imshow(np.where(filled, 1.0, 0.0), cmap="Greys", vmin=0.0, vmax=2.0, aspect="equal")
-        axis.axhline(5.5, color=hexadecimal(GREYS[0]), linewidth=2.0)
+        axis.axhline(5.5, color=hex_code(GREYS[0]), linewidth=2.0)
         axis.set_title(name, fontsize=14)
         axis.set(xlabel=f"{part.shape[0]} × {part.shape[1]}", xticks=[], yticks=[])
         if first is not None:
@@ -60,7 +63,7 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         forces = np.zeros((len(contacts), 3))
         forces[where] = force
         size, scale = view.painter.size, view.scale
-        drawn = marks.wrench(base.translation, scale * f, MOMENT * moment, size)
+        drawn = markers.wrench(base.translation, scale * f, MOMENT * moment, size)
         extra = {f"base{path}": item for path, item in drawn.items()} if np.linalg.norm(force) > 1e-6 else {}
         if extra:
             above = base.translation + np.maximum(scale * f, [-np.inf, -np.inf, 0.1]) + [0.0, 0.0, 0.04]  # and above the trunk
@@ -76,8 +79,8 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
             f"joints of this leg {torques} N·m; all other joints {np.abs(rest).max():.0f}"
         )
 
-    view.explain("force", PLANNED, "force on the foot")
-    view.explain("base", COM, "force and moment on the base")
+    view.add_legend_entry("force", PLANNED, "force on the foot")
+    view.add_legend_entry("base", COM, "force and moment on the base")
     panel = slider_panel(view, draw, forwards=(-40.0, 0.0, 40.0, "N"), up=(0.0, 60.0, 80.0, "N"))
     view.camera(View(76.0, 14.0, 1.0, around=((0.0, 0.0, 0.31), 0.47)))
     return panel
@@ -89,8 +92,8 @@ def plot_both(record: Rollout, title: str) -> Axes:
     names = list(record.contacts.names)
     for foot, where in (("FL_foot", "front"), ("RL_foot", "rear")):
         row = 3 * names.index(foot) + 2
-        (by_equation,) = axis.plot(record.time, record.planned[:, row], color=hexadecimal(PLANNED), linewidth=4, alpha=0.7)
-        (by_engine,) = axis.plot(record.time, record.measured[:, row], color=hexadecimal(MEASURED))
+        (by_equation,) = axis.plot(record.time, record.planned[:, row], color=hex_code(PLANNED), linewidth=4, alpha=0.7)
+        (by_engine,) = axis.plot(record.time, record.measured[:, row], color=hex_code(MEASURED))
         axis.annotate(f"each {where} foot", (record.time[90], record.measured[90, row]), (0, 8), textcoords="offset points")
     axis.set(xlabel="time [s]", ylabel="vertical force [N]", title=title)
     axis.grid(alpha=0.25)
@@ -103,7 +106,7 @@ def plot_strayed(curves: dict[str, Array], duration: float) -> Axes:
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
     for (name, curve), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
         time = np.linspace(0.0, duration, len(curve))
-        axis.semilogy(time[1:], curve[1:], style, color=hexadecimal(colour), linewidth=2.0, label=name)
+        axis.semilogy(time[1:], curve[1:], style, color=hex_code(colour), linewidth=2.0, label=name)
     axis.set(xlabel="time [s]", ylabel="worst foot strayed [mm]", ylim=(1e-3, 1e2))
     axis.grid(alpha=0.25)
     axis.legend(loc="lower right", fontsize="small")
@@ -115,18 +118,20 @@ def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
 
     forgotten, kept: records without and with b, equally long.
     """
-    home, colour = forgotten.state(0).point("tool0"), view.painter.text
+    home, colour = forgotten.state(0).point("tool0"), view.painter.text_colour
     pin = {"home/pin": shapes.rod(home, np.eye(3), 0.24, 0.005, colour)}
     pin["home/name"] = shapes.label(home + [0.0, 0.0, 0.27], "home", 0.035, colour)
     rows = np.linspace(0, len(kept) - 1, 30).astype(int)
-    view.explain("way", GREYS[2], "from home to the tool")
+    view.add_legend_entry("way", GREYS[2], "from home to the tool")
     pictures = []
     for i in rows:
         drawn = view.painter.picture(forgotten.state(i), com=False, ghost=kept.state(i)) | pin
         way = forgotten.state(i).point("tool0") - home
         length = float(np.linalg.norm(way))
         if length > 2e-3:
-            drawn["way"] = shapes.rod(home, geometry.frame_along(way / length), length, 0.012, GREYS[2])  # the arm is dark
+            drawn["way"] = shapes.rod(
+                home, geometry.rotation_with_z_axis(way / length), length, 0.012, GREYS[2]
+            )  # the arm is dark
         pictures.append(drawn)
     view.play_pictures(forgotten.time[rows], pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))
@@ -151,11 +156,13 @@ def play_collapse(
             length = float(np.linalg.norm(way))
             if length > 2e-3:  # beside the foot, where it is seen
                 start = a + [0.0, 0.06 * np.sign(a[1]), 0.0]
-                drawn[f"way/{i}"] = shapes.rod(start, geometry.frame_along(way / length), length, 0.006, view.painter.text)
+                drawn[f"way/{i}"] = shapes.rod(
+                    start, geometry.rotation_with_z_axis(way / length), length, 0.006, view.painter.text_colour
+                )
         return drawn
 
     rows = np.linspace(0, len(kept) - 1, 30).astype(int)
-    view.explain("way", view.painter.text, "from where a foot belongs to where it is")
+    view.add_legend_entry("way", view.painter.text_colour, "from where a foot belongs to where it is")
     pictures = [picture(forgotten[i], kept[i]) for i in rows]
     view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(72.0, 10.0, 1.0, around=((0.0, 0.0, 0.16), 0.36)))
@@ -169,12 +176,12 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
 
     def draw(way: float, turn: float, time: float) -> str:
         states = park(robot, way, turn)
-        picture = view.painter.stage()
+        picture = view.painter.ground_only()
         corners = [wheel().positions(state)[0] for state in states[::20]]
         for i, (a, b) in enumerate(pairwise(corners)):
             length = float(np.linalg.norm(b - a))
             if length > 1e-6:
-                rod = shapes.rod(a, geometry.frame_along((b - a) / length), length, 0.006, view.painter.text)
+                rod = shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, 0.006, view.painter.text_colour)
                 picture[f"way/{i}"] = rod
         picture["wheel/now"] = _drawn(states[min(round(time * 20), len(states) - 1)], way, time)
         ends = {"start": corners[0], "end": corners[-1]}

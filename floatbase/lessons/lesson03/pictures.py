@@ -16,7 +16,8 @@ from floatbase.dynamics import FeasibleSpace
 from floatbase.lessons.lesson03.helpers import upright
 from floatbase.linear_algebra import rank
 from floatbase.robots import Robot
-from floatbase.viewer import GHOST, GREYS, PLANNED, Viewer, hexadecimal
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene.colours import GHOST, GREYS, PLANNED, hex_code
 
 GHOST_TIME = 0.25  # s: the veil shows where an acceleration leads in this time from rest
 FULL = (20.0, 20.0, 100.0)  # m/s² or rad/s², N·m, N: bars of full length
@@ -60,7 +61,7 @@ def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tu
         ("λ", "N", PLANNED, [(leg, axes, "N") for leg in legs], forces, full[2]),
     )
     drawn = [
-        _group(f"{name}, ± {most:g} {units}", hexadecimal(colour), blocks, np.reshape(values, (-1, 3)), most)
+        _group(f"{name}, ± {most:g} {units}", hex_code(colour), blocks, np.reshape(values, (-1, 3)), most)
         for name, units, colour, blocks, values, most in groups
     ]
     return f'<div style="display: flex; flex-wrap: wrap; gap: 10px 16px">{"".join(drawn)}</div>'
@@ -110,7 +111,7 @@ def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[s
     figure.colorbar(shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="size, as a power of ten", shrink=0.8)
     _name_blocks(left, rows, columns)
     values = np.linalg.svd(A, compute_uv=False)
-    right.semilogy(np.arange(1, len(values) + 1), values, "o", color=hexadecimal(GREYS[0]))
+    right.semilogy(np.arange(1, len(values) + 1), values, "o", color=hex_code(GREYS[0]))
     right.set(xlabel="number", ylabel="singular value", title=f"{len(values)} singular values, rank {rank(A)}")
     right.grid(alpha=0.3)
     plt.close(figure)
@@ -124,7 +125,7 @@ def _name_blocks(axes: Any, rows: Mapping[str, int], columns: Mapping[str, int])
     ):
         ends = np.cumsum(list(mapping.values()))
         for end in ends[:-1]:
-            line(end - 0.5, color=hexadecimal(GREYS[0]), linewidth=0.8)
+            line(end - 0.5, color=hex_code(GREYS[0]), linewidth=0.8)
         ticks(ends - np.array(list(mapping.values())) / 2 - 0.5)
         names([f"{name}\n{size}" for name, size in mapping.items()])
     axes.xaxis.tick_top()

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.viewer import COM, GREYS, Viewer, hexadecimal, shapes
+from floatbase.viewer import Viewer, shapes
+from floatbase.viewer.scene.colours import COM, GREYS, hex_code
 
 ARROW = 0.5  # m drawn for 1 m/s²
 LEVELS = (0.02, 0.125, 0.4, 1.0, 2.0)  # of a cost above its least value
@@ -27,7 +28,7 @@ def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, lengt
     state = eom.state
     a = state.com_jacobian @ fb.accelerations_from_torques(eom)(tau) + state.com_drift
     arrow = {}
-    view.explain("acceleration", COM, "its acceleration")
+    view.add_legend_entry("acceleration", COM, "its acceleration")
     if np.linalg.norm(a) > 1e-6:
         arrow["acceleration"] = shapes.arrow(state.com, length * a, COM, view.painter.size)
     view.show(state, contacts=eom.contacts, planned=fb.forces_from_torques(eom)(tau), extra=arrow)
@@ -49,7 +50,7 @@ def slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
         ax.contour(x, y, height, levels=LEVELS, colors="white", linewidths=0.8)
         flat, curved = np.linalg.eigvalsh(cost.H)
         if flat > VALLEY * curved:
-            ax.plot(*cost.minimiser(), "o", color=hexadecimal(GREYS[0]), markeredgecolor="white", markersize=8)
+            ax.plot(*cost.minimiser(), "o", color=hex_code(GREYS[0]), markeredgecolor="white", markersize=8)
         ax.set(xlabel=x_name, ylabel=y_name, title=title.replace("_", " "), aspect="equal")
     plt.close(figure)
     return figure
@@ -69,7 +70,7 @@ def level_curves(cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: 
     s = 130.0 / half  # pixels for 1
     x, y = (np.array([1, -1]) * s * np.asarray(point)) + 130
     at = f'transform="translate({130 + s * centre[0]:.1f} {130 - s * centre[1]:.1f}) rotate({turn:.2f})"'
-    grey = hexadecimal(GREYS[1])
+    grey = hex_code(GREYS[1])
     rings = "".join(
         f'<ellipse rx="{s * (2 * level / values[1]) ** 0.5:.1f}" ry="{s * (2 * level / values[0]) ** 0.5:.1f}" {at} '
         f'fill="{grey}" fill-opacity="0.15" stroke="{grey}" stroke-width="1.5"/>'
@@ -90,7 +91,7 @@ def effort_picture(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]) ->
     """Curves of effort over the acceleration to the left: name -> (accelerations, efforts)."""
     figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
     for (name, (x, y)), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
-        ax.plot(x, y, style, color=hexadecimal(colour), label=name, linewidth=2)
+        ax.plot(x, y, style, color=hex_code(colour), label=name, linewidth=2)
     ax.set(xlabel="acceleration of the base to the left [m/s²]", ylabel="½‖τ‖² [(N·m)²]", ylim=(0, None))
     ax.grid(alpha=0.3)
     ax.legend()

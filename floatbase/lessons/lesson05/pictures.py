@@ -12,7 +12,8 @@ from floatbase._validation import as_forces
 from floatbase.lessons.rounding import about
 from floatbase.objectives import com_wrench_map
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, View, Viewer, below, hexadecimal, marks, plots, shapes
+from floatbase.viewer import View, Viewer, markers, plots, prefixed, shapes
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 LEAST_FORCE, LEAST_MOMENT = 5e-3, 5e-4  # N, N·m: less is shown as zero
 RANGE = (-40.0, 100.0)  # N: a plan that has lost its robot asks for thousands
@@ -31,9 +32,9 @@ def show_forces(
     wrench = np.where(np.abs(wrench) > np.repeat([LEAST_FORCE, LEAST_MOMENT], 3), wrench, 0.0)
     size, scale = view.painter.size, view.scale
     above = np.array([state.com[0], state.com[1], view.painter.box[1][2] + 0.12 * size])
-    drawn = below("wrench", marks.wrench(above, scale * wrench[:3], scale / size * wrench[3:], size))
+    drawn = prefixed("wrench", markers.wrench(above, scale * wrench[:3], scale / size * wrench[3:], size))
     if wish is not None and np.linalg.norm(wish) > LEAST_FORCE:
-        view.explain("wish", GREYS[1], "force wished for")
+        view.add_legend_entry("wish", GREYS[1], "force wished for")
         higher = above + [0.0, 0.0, 0.1 * size]
         drawn["wish"] = shapes.arrow(higher, scale * np.asarray(wish, dtype=float), GREYS[1], size)
     view.show(state, contacts=contacts, planned=forces, extra=drawn)
@@ -57,7 +58,7 @@ def planned_pull(record: Rollout, until: float) -> Figure:
     """Normal forces that were planned and measured up to a time in s, N, with a line at zero. Beyond `RANGE` they are cut."""
     figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
     plots.plot_forces(record, axis)
-    axis.axhline(0.0, color=hexadecimal(GREYS[0]), linewidth=1.0)
+    axis.axhline(0.0, color=hex_code(GREYS[0]), linewidth=1.0)
     axis.set(xlim=(0.0, until), ylim=RANGE)
     axis.legend(loc="lower left", fontsize="small")
     plt.close(figure)

@@ -11,7 +11,9 @@ from scipy.spatial import ConvexHull
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, wrench_set
-from floatbase.viewer import GREYS, MEASURED, PLANNED, View, Viewer, below, hexadecimal, roses, shapes
+from floatbase.viewer import View, Viewer, prefixed, shapes
+from floatbase.viewer.plots import push_recovery_plots
+from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 
 NEWTON = 0.01  # m drawn for 1 N at a single foot
 TALL = 0.7  # m: height of a single cone
@@ -32,7 +34,7 @@ def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
     }
     if np.any(f):
         picture["measured"] = shapes.arrow(np.zeros(3), NEWTON * f, MEASURED, view.painter.size)
-    view.draw(view.painter.stage() | picture)
+    view.draw(view.painter.ground_only() | picture)
     parts, margin = decompose(f, cone.normal), cone.margin(f)
     sizes = f"α⊥ = {parts.alpha_perp:.0f} N, α∥ = {parts.alpha_par:.0f} N, μ α⊥ - α∥ = {margin:.0f} N: "
     if margin < 0:
@@ -49,11 +51,11 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
     """
     inner, outer = (FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside) for inside in (True, False))
     most = 45.0 * np.array([inner.mu_facet, 0.0, 1.0])  # N: the furthest that facet 0 lets a force lean forwards
-    picture = below("cone", shapes.friction_polyhedron(np.zeros(3), inner, TALL, inner.status(most)))
+    picture = prefixed("cone", shapes.friction_polyhedron(np.zeros(3), inner, TALL, inner.status(most)))
     picture["planned"] = shapes.arrow(np.zeros(3), NEWTON * most, PLANNED, view.painter.size)
     picture["round"] = shapes.friction_cone(np.zeros(3), inner.normal, mu, TALL, "idle")
     picture["patch"] = shapes.contact_patch(np.zeros(3), inner.normal, 0.05)
-    view.draw(view.painter.stage() | picture)
+    view.draw(view.painter.ground_only() | picture)
     rays = {"inside": (inner.rays, ""), "outside": (outer.rays, "6 4")}
     half = SIDE / 2
     s = 0.64 * half / mu  # pixels for 1: a triangle outside reaches 2 μ, and its corners may be cut
@@ -70,7 +72,7 @@ def compass_row(**stances: WrenchSet) -> Figure:
     figure, grid = plt.subplots(1, len(stances), figsize=(4 * len(stances), 5.0), subplot_kw=polar)
     axes = np.atleast_1d(grid)
     for axis, (title, wrenches) in zip(axes, stances.items(), strict=True):
-        roses.plot_compass(wrenches, axis, n=48).set_title(title.replace("_", " "), pad=14)
+        push_recovery_plots.plot_horizontal_force_limits(wrenches, axis, n=48).set_title(title.replace("_", " "), pad=14)
     most = max(axis.get_rmax() for axis in axes)
     for axis in axes:
         axis.set_rlim(0.0, most)
@@ -140,7 +142,7 @@ def region_picture(state: fb.State, feet: Array, region: Array) -> str:
         drawn += _polygon(seen(region), "", 0.35)
     x, y = seen(state.com[None, :2])[0]
     dots = "".join(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="currentColor"/>' for a, b in seen(feet[:, :2]))
-    dots += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="{hexadecimal(GREYS[1])}" stroke="currentColor"/>'
+    dots += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="{hex_code(GREYS[1])}" stroke="currentColor"/>'
     return _svg(drawn + dots, "from above; forwards is up", words, "dashed: the feet's hull, dot: the CoM")
 
 
@@ -150,7 +152,7 @@ def _from_above(points: Array) -> Array:
 
 
 def _polygon(corners: Array, dashes: str, opacity: float = 0.12) -> str:
-    points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hexadecimal(GREYS[1])
+    points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hex_code(GREYS[1])
     fill = f'fill="{grey}" fill-opacity="{0 if dashes else opacity}"'
     return f'<polygon points="{points}" {fill} stroke="{grey}" stroke-width="2" stroke-dasharray="{dashes}"/>'
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from floatbase.lessons.rounding import about
 from floatbase.qp import Solution
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, hexadecimal
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _STYLES = ("-", "--", ":")
 _MOST = 4  # rows that a note lists
@@ -22,7 +22,7 @@ def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figur
     """Rounds of the active-set method in each tick. ms: (n,), the time of each. rounds: how it started -> (n,) numbers."""
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for (name, numbers), colour, style in zip(rounds.items(), GREYS[:2], _STYLES, strict=False):
-        ax.plot(ms, numbers, style, color=hexadecimal(colour), label=name, linewidth=2)
+        ax.plot(ms, numbers, style, color=hex_code(colour), label=name, linewidth=2)
     ax.set(xlabel="time since the push began [ms]", ylabel="rounds in a tick", ylim=(0, None))
     ax.grid(alpha=0.3)
     ax.legend()
@@ -37,7 +37,7 @@ def plot_ways(records: Mapping[str, Rollout]) -> Figure:
         feet = np.linalg.norm(record.foot_positions - record.foot_positions[0], axis=2).max(axis=1)
         com = np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
         for ax, away in zip(axes, (com, feet), strict=True):
-            ax.plot(record.time, 1e3 * away, style, color=hexadecimal(colour), label=name, linewidth=2)
+            ax.plot(record.time, 1e3 * away, style, color=hex_code(colour), label=name, linewidth=2)
     for ax, title in zip(axes, ("centre of mass, away [mm]", "foot that strayed most [mm]"), strict=True):
         ax.set(xlabel="time [s]", title=title, ylim=(0, None))
         ax.grid(alpha=0.3)

@@ -19,7 +19,11 @@ from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.panels import live
 from floatbase.lessons.stops import recorded_pushes
 from floatbase.simulation import LiveSimulation, Rollout, status_message
-from floatbase.viewer import GREYS, Picture, Viewer, geometry, hexadecimal, plots, published, shapes, with_image
+from floatbase.viewer import Picture, Viewer, shapes
+from floatbase.viewer.export.display_mode import display_mode
+from floatbase.viewer.export.thumbnail import with_thumbnail
+from floatbase.viewer.scene import geometry
+from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
@@ -44,8 +48,8 @@ def plot_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
     """The distance of the centre of mass from the line of two feet, m, over time, s, and that of the pendulum of ω, 1/s."""
     t, d = np.asarray(time), np.asarray(away)
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
-    ax.plot(t, 1e3 * d, color=hexadecimal(GREYS[0]), linewidth=2, label="MuJoCo")
-    ax.plot(t, 1e3 * d[0] * np.cosh(omega * t), "--", color=hexadecimal(GREYS[1]), linewidth=2, label="pendulum, d cosh ωt")
+    ax.plot(t, 1e3 * d, color=hex_code(GREYS[0]), linewidth=2, label="MuJoCo")
+    ax.plot(t, 1e3 * d[0] * np.cosh(omega * t), "--", color=hex_code(GREYS[1]), linewidth=2, label="pendulum, d cosh ωt")
     ax.set(xlabel="time [s]", ylabel="away from the line [mm]", ylim=(0, None))
     ax.grid(alpha=0.3)
     ax.legend()
@@ -58,9 +62,9 @@ def plot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: flo
     figure, axes = plt.subplots(1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained")
     for ax, (title, record) in zip(np.atleast_1d(axes), records.items(), strict=True):
         rows = (record.time >= begin) & (record.time <= end)
-        for kind, colour, width in (("planned", plots.PLANNED, 3.5), ("measured", plots.MEASURED, 1.2)):
+        for kind, colour, width in (("planned", PLANNED, 3.5), ("measured", MEASURED, 1.2)):
             normal = record.force(foot, kind)[rows, 2]  # type: ignore[arg-type]
-            ax.plot(record.time[rows], normal, color=hexadecimal(colour), linewidth=width, label=kind)
+            ax.plot(record.time[rows], normal, color=hex_code(colour), linewidth=width, label=kind)
         ax.set(title=title, xlabel="time [s]")
         ax.grid(alpha=0.3)
     np.atleast_1d(axes)[0].set_ylabel(f"{foot}, normal force [N]")
@@ -88,7 +92,7 @@ def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
     if len(ends) == 2:
         way = ends[1] - ends[0]
         length = float(np.linalg.norm(way))
-        picture["line"] = shapes.rod(ends[0], geometry.frame_along(way / length), length, _LIFTED, GREYS[1])
+        picture["line"] = shapes.rod(ends[0], geometry.rotation_with_z_axis(way / length), length, _LIFTED, GREYS[1])
     return picture
 
 
@@ -145,12 +149,14 @@ class PushTogether(widgets.VBox):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """The pictures are put in only here, as those of a slider panel; a site has some recorded pushes of both."""
-        if published.display() == "site":
+        if display_mode() == "site":
             titles = {title: (self.views[title], run.sim, run.controller) for title, run in self.runs.items()}
             return recorded_pushes(titles, _RECORDED, ["forwards", "to the left"])
         for title, picture in self._pictures.items():
             picture.children = [self.views[title].widget()]
-        return with_image(super()._repr_mimebundle_(**kwargs), *(picture.children[0] for picture in self._pictures.values()))
+        return with_thumbnail(
+            super()._repr_mimebundle_(**kwargs), *(picture.children[0] for picture in self._pictures.values())
+        )
 
 
 def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:

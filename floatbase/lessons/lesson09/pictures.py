@@ -16,7 +16,8 @@ from floatbase.behaviours import StepPlan
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.lesson09.helpers import corner_forces, pressure
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, PLANNED, Picture, View, Viewer, below, hexadecimal, shapes
+from floatbase.viewer import Picture, View, Viewer, prefixed, shapes
+from floatbase.viewer.scene.colours import GREYS, PLANNED, hex_code
 
 SOLES = View(30.0, 30.0, 1.0, around=((0.0, 0.03, 0.06), 0.27))  # where Talos stands
 ONE_SOLE = View(30.0, 30.0, 1.0, around=((0.0, 0.1, 0.07), 0.2))
@@ -44,8 +45,8 @@ def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
     """A picture of Talos without what is above its feet, its scale of forces beside them. side: of the one foot to keep."""
     feet = tuple(f"robot/leg_{name}_6" for name in ("left", "right") if side in ("", name))
     kept = {path: item for path, item in picture.items() if path.startswith(feet) or path.split("/")[0] not in _ABOVE}
-    bar = shapes.scale_bar(_BESIDE, 100.0, 100.0 * view.scale, _SIZE, view.painter.text)
-    return kept | below("scale", bar)
+    bar = shapes.scale_bar(_BESIDE, 100.0, 100.0 * view.scale, _SIZE, view.painter.text_colour)
+    return kept | prefixed("scale", bar)
 
 
 def soles_from_above(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
@@ -62,12 +63,12 @@ def soles_from_above(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLi
         drawn += _polygon(corners)
         for (x, y), normal in zip(corners, own[2::3], strict=True):
             radius = 0.8 * np.sqrt(max(float(normal), 0.0))
-            drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{hexadecimal(PLANNED)}"/>'
+            drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{hex_code(PLANNED)}"/>'
         if own[2::3].sum() > QUIET:
             drawn += _cross(_seen(centre_of_pressure(state, one, own)[None])[0], 5)
     drawn += _cross(_seen(centre_of_pressure(state, contacts, flat)[None])[0], 9)
     x, y = _seen(state.com[None])[0]
-    drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="9" fill="none" stroke="{hexadecimal(GREYS[1])}" stroke-width="3"/>'
+    drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="9" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
     words = ("small crosses: where each sole is pushed", "large cross: both together; ring: x_c")
     return _svg(drawn, "from above; forwards is up", *words)
 
@@ -142,7 +143,7 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     across = np.concatenate([x[there], x[there][::-1]])
     twist = np.concatenate([highest[there], lowest[there][::-1]])
     corners = np.column_stack([WIDE / 2 + sx * across, HIGH / 2 - sy * twist])
-    drawn = f'<path d="M0 {HIGH / 2}H{WIDE}M{WIDE / 2} 0V{HIGH}" stroke="{hexadecimal(GREYS[2])}" stroke-width="1"/>'
+    drawn = f'<path d="M0 {HIGH / 2}H{WIDE}M{WIDE / 2} 0V{HIGH}" stroke="{hex_code(GREYS[2])}" stroke-width="1"/>'
     drawn += _polygon(corners, 0.35) if len(corners) else ""
     at = -1e3 * wrench[4] / wrench[2], wrench[5]
     drawn += f'<circle cx="{WIDE / 2 + sx * at[0]:.1f}" cy="{HIGH / 2 - sy * at[1]:.1f}" r="6" fill="currentColor"/>'
@@ -158,10 +159,10 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
         for name in step.stance:
             corners = record.contacts.only(name).positions(state)[:, :2]
             label = "_" if axis.patches else "soles"
-            axis.add_patch(Polygon(corners, closed=True, color=hexadecimal(GREYS[2]), alpha=0.3, linewidth=0, label=label))
+            axis.add_patch(Polygon(corners, closed=True, color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label=label))
     pushed, com = pressure(record), record.com
-    axis.plot(pushed[:, 0], pushed[:, 1], color=hexadecimal(GREYS[1]), linewidth=1.5, label="centre of pressure")
-    axis.plot(com[:, 0], com[:, 1], "--", color=hexadecimal(GREYS[0]), linewidth=2.5, label="x_c")
+    axis.plot(pushed[:, 0], pushed[:, 1], color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
+    axis.plot(com[:, 0], com[:, 1], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="forwards [m]", ylabel="to the left [m]", aspect="equal")
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
     plt.close(figure)
@@ -173,10 +174,10 @@ def plot_lean(record: Rollout) -> Axes:
     figure, axis = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     edges = record.foot_positions[..., 0]
     axis.fill_between(
-        record.time, edges.min(axis=1), edges.max(axis=1), color=hexadecimal(GREYS[2]), alpha=0.3, linewidth=0, label="soles"
+        record.time, edges.min(axis=1), edges.max(axis=1), color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label="soles"
     )
-    axis.plot(record.time, pressure(record)[:, 0], color=hexadecimal(GREYS[1]), linewidth=1.5, label="centre of pressure")
-    axis.plot(record.time, record.com[:, 0], "--", color=hexadecimal(GREYS[0]), linewidth=2.5, label="x_c")
+    axis.plot(record.time, pressure(record)[:, 0], color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
+    axis.plot(record.time, record.com[:, 0], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="time [s]", ylabel="forwards [m]", ylim=(-0.15, 0.15))
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
     plt.close(figure)
@@ -196,7 +197,7 @@ def _cross(at: Array, half: float) -> str:
 
 
 def _polygon(corners: Array, opacity: float = 0.12) -> str:
-    points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hexadecimal(GREYS[1])
+    points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hex_code(GREYS[1])
     return f'<polygon points="{points}" fill="{grey}" fill-opacity="{opacity}" stroke="{grey}" stroke-width="2"/>'
 
 

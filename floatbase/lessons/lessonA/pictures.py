@@ -12,9 +12,12 @@ from matplotlib.axes import Axes
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, view_from_rotating_frame
+from floatbase.lessons import props
 from floatbase.lessons.exercises import vector_text
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, Picture, View, Viewer, geometry, hexadecimal, props, shapes
+from floatbase.viewer import Picture, View, Viewer, shapes
+from floatbase.viewer.scene import geometry
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 TABLE, HEIGHT = 1.0, 0.3  # m: radius of the turntable, and height of its top
 START = np.array([-0.7, 0.3, 0.0])  # m: where the puck begins, from the axis
@@ -40,7 +43,7 @@ def show_ride(view: Viewer, omega: float, speed: float, time: float) -> str:
     top = np.array([0.0, 0.0, HEIGHT])
     straight = START + np.outer(times, [speed, 0.0, 0.0])
     chalk = seen.position @ seen.rotation[-1].T  # where the table has carried it by now
-    picture = view.painter.stage() | {"table": props.turntable(top, TABLE, omega * time)}
+    picture = view.painter.ground_only() | {"table": props.turntable(top, TABLE, omega * time)}
     picture |= _path("chalk", chalk + top + [0.0, 0.0, 0.006], 0.012, GREYS[0])
     picture |= _path("way", straight + top + [0.0, 0.0, 0.05], 0.006, GREYS[1])
     puck = straight[-1] + top
@@ -56,7 +59,9 @@ def _path(name: str, points: Array, radius: float, colour: tuple[float, float, f
 
 def _rod(a: Array, b: Array, radius: float, colour: tuple[float, float, float]) -> shapes.Item | None:
     length = float(np.linalg.norm(b - a))
-    return shapes.rod(a, geometry.frame_along((b - a) / length), length, radius, colour) if length > SEEN / 10 else None
+    return (
+        shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, radius, colour) if length > SEEN / 10 else None
+    )
 
 
 def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str:
@@ -71,7 +76,7 @@ def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str
     tip = seen(np.array([0.95 * TABLE, 0.0]))
     drawn = f'<circle cx="{half}" cy="{half}" r="{scale * TABLE:.1f}" fill="none" stroke="currentColor"/>'
     drawn += f'<line x1="{half}" y1="{half}" x2="{tip[0]:.1f}" y2="{tip[1]:.1f}" stroke="currentColor" stroke-width="3"/>'
-    drawn += f'<polyline points="{path}" fill="none" stroke="{hexadecimal(GREYS[1])}" stroke-width="3"/>'
+    drawn += f'<polyline points="{path}" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
     drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7"/>'
     for acceleration, dashes in ((centrifugal, "4 3"), (coriolis, "")):
         drawn += _arrow(seen(position[-1]), seen(position[-1] + ACCELERATION * acceleration), dashes)
@@ -145,7 +150,7 @@ def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) 
     _, axis = plt.subplots(figsize=(7, 3.4), layout="constrained")
     for (name, curve), colour, style in zip(errors.items(), GREYS, ("o-", "s--", "^:"), strict=False):
         slope = np.log(curve[-1] / curve[0]) / np.log(speeds[-1] / speeds[0])
-        axis.loglog(speeds, curve, style, color=hexadecimal(colour), linewidth=2.0, label=f"{name}: slope {abs(slope):.1f}")
+        axis.loglog(speeds, curve, style, color=hex_code(colour), linewidth=2.0, label=f"{name}: slope {abs(slope):.1f}")
     axis.set_xticks(speeds, [f"{speed:g}" for speed in speeds])
     axis.minorticks_off()
     axis.set(xlabel="speed, 1 for an eight in 6 s", ylabel="tool's error [mm]", ylim=(1e-2, 1e2))

@@ -12,10 +12,13 @@ from matplotlib.axes import Axes
 
 from floatbase._validation import Array
 from floatbase.actuators import VACUUM, Hydraulics
+from floatbase.lessons import props
 from floatbase.lessons.lessonB.bench import Bench, Row, held_then_turned, run_loop
 from floatbase.lessons.rounding import about
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, View, Viewer, below, geometry, hexadecimal, props, shapes
+from floatbase.viewer import View, Viewer, prefixed, shapes
+from floatbase.viewer.scene import geometry
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 BAR = 1e5  # Pa
 LARGER = 3.0  # times: how the crank and its cylinder are drawn
@@ -41,7 +44,9 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
     least, most = bench.reach()
     a, b = _pressures(bench, min(most, max(least, torque)))
     supply = bench.hydraulics.supply_pressure
-    picture = view.painter.stage() | below("cylinder", props.hydraulic_cylinder(foot, end, stroke, (a / supply, b / supply)))
+    picture = view.painter.ground_only() | prefixed(
+        "cylinder", props.hydraulic_cylinder(foot, end, stroke, (a / supply, b / supply))
+    )
     beside = np.cross([0.0, 1.0, 0.0], end - foot) / np.linalg.norm(end - foot)
     for name, chamber in (("A", "base chamber"), ("B", "rod chamber")):
         filled = picture[f"cylinder/{chamber}"].matrix
@@ -54,8 +59,10 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
         way = tip - start
         length = float(np.linalg.norm(way))
         aside = np.array([0.0, 0.09 if name == "thigh" else 0.0, 0.0])  # behind the cylinder
-        picture[name] = shapes.rod(start + aside, geometry.frame_along(way / length), length, radius, GREYS[1])
-    picture["joint"] = shapes.rod(JOINT + [0.0, -0.05, 0.0], geometry.frame_along([0.0, 1.0, 0.0]), 0.16, 0.028, GREYS[0])
+        picture[name] = shapes.rod(start + aside, geometry.rotation_with_z_axis(way / length), length, radius, GREYS[1])
+    picture["joint"] = shapes.rod(
+        JOINT + [0.0, -0.05, 0.0], geometry.rotation_with_z_axis([0.0, 1.0, 0.0]), 0.16, 0.028, GREYS[0]
+    )
     view.draw(picture)
     told = f"lever <b>{about(1000 * bench.lever, 'mm', floor=0.05)}</b>; within reach: {least:.0f} to {most:.0f} N·m; "
     if not least <= torque <= most:
@@ -79,18 +86,18 @@ def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
 def plot_lever(angles: npt.ArrayLike, levers: npt.ArrayLike) -> Axes:
     """A lever, mm, over the joint's angle from its best, °."""
     axis = _axes("angle of the joint from the best one [°]", "lever [mm]")
-    axis.plot(angles, levers, color=hexadecimal(GREYS[0]), linewidth=2.0)
-    axis.axhline(0.0, color=hexadecimal(GREYS[2]), linewidth=1.0)
+    axis.plot(angles, levers, color=hex_code(GREYS[0]), linewidth=2.0)
+    axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
     return axis
 
 
 def plot_torques(runs: Mapping[str, Sequence[Row]], wanted: float = 12.0) -> Axes:
     """Torques on the bench over time; name -> rows of a run. A thin line is what was wanted."""
     axis = _axes("time [ms]", "torque at the joint [N·m]")
-    axis.axhline(wanted, color=hexadecimal(GREYS[2]), linewidth=1.0)
+    axis.axhline(wanted, color=hex_code(GREYS[2]), linewidth=1.0)
     for i, (name, rows) in enumerate(runs.items()):
         times, torques = [1000 * row.time for row in rows], [row.torque for row in rows]
-        axis.plot(times, torques, DASHES[i % 4], color=hexadecimal(GREYS[min(i, 2)]), linewidth=1.8, label=name)
+        axis.plot(times, torques, DASHES[i % 4], color=hex_code(GREYS[min(i, 2)]), linewidth=1.8, label=name)
     axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axis
 
@@ -103,8 +110,8 @@ def plot_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
     axis = _axes("time [s]", f"gone to the {'left' if side > 0 else 'right'} [mm]")
     for i, (name, record) in enumerate(records.items()):
         gone = 1000 * side * (record.com - record.com[0])[:, 1]
-        axis.plot(record.time - record.time[0], gone, DASHES[i % 4], color=hexadecimal(GREYS[i % 3]), linewidth=1.8, label=name)
-    axis.axhline(0.0, color=hexadecimal(GREYS[2]), linewidth=1.0)
+        axis.plot(record.time - record.time[0], gone, DASHES[i % 4], color=hex_code(GREYS[i % 3]), linewidth=1.8, label=name)
+    axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
     axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axis
 
@@ -115,7 +122,7 @@ def plot_watts(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -
     watts = np.asarray(watts)
     for i, name in enumerate(names):
         times = step * np.arange(len(watts))
-        axis.plot(times, watts[:, i], DASHES[i % 4], color=hexadecimal(GREYS[i % 3]), linewidth=1.8, label=name)
+        axis.plot(times, watts[:, i], DASHES[i % 4], color=hex_code(GREYS[i % 3]), linewidth=1.8, label=name)
     axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axis
 
@@ -175,7 +182,7 @@ def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[f
         heights = [middle + 7.0 * up, middle - 7.0 * up]
     for (name, values), at, dash, grey in zip(curves.items(), heights, ("5 4", ""), (GREYS[2], GREYS[1]), strict=True):
         path = " ".join(f"{x(1e-3 * i):.1f},{y(value):.1f}" for i, value in enumerate(values))
-        style = f'stroke="{hexadecimal(grey)}" stroke-width="2.5" stroke-dasharray="{dash}"'
+        style = f'stroke="{hex_code(grey)}" stroke-width="2.5" stroke-dasharray="{dash}"'
         drawn += f'<polyline points="{path}" fill="none" {style}/>'
         drawn += f'<text x="{right + 6}" y="{at + 4:.1f}" font-size="12">{name}</text>'
     return drawn

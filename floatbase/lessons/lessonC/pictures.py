@@ -19,10 +19,12 @@ from PIL import Image
 
 import floatbase as fb
 from floatbase._validation import Array
+from floatbase.lessons import qp_plots, static_export
 from floatbase.lessons.lessonC.helpers import corner_table
 from floatbase.lessons.rounding import about
 from floatbase.qp import QP, table_top
-from floatbase.viewer import GREYS, hexadecimal, programs, published
+from floatbase.viewer.export.display_mode import display_mode
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _BESIDE = (-4.2, 3.4, -2.3, 3.2)  # what is seen of the table and its walls
 _COLOURS = 48
@@ -93,21 +95,21 @@ class Game(widgets.VBox):
         self._show()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        return self._all_rows() if published.display() == "site" else super()._repr_mimebundle_(**kwargs)
+        return self._all_rows() if display_mode() == "site" else super()._repr_mimebundle_(**kwargs)
 
     def _all_rows(self) -> dict[str, Any]:
         """For a site: what every set of rows shows, in every bowl. The game is left at its beginning."""
         bowls = tuple(str(i + 1) for i in range(len(self._puzzles)))
-        pack = published.Pack([], words="In the live lesson the clicks are counted.")
+        pack = static_export.StaticExport([], words="In the live lesson the clicks are counted.")
         switches = list(product((0, 1), repeat=len(self.rows)))
         for self._at, on in product(range(len(bowls)), switches):
             self.working = tuple(row for row, is_on in zip(self.rows, on, strict=True) if is_on)
             picture, faults = self._seen()
-            pack.stop((self._at, *on), f"{picture}<div>{_words(faults)}</div>")
+            pack.add_sample((self._at, *on), f"{picture}<div>{_words(faults)}</div>")
         self._at = 0
         self._begin()
-        rows = [published.Control(row, ("off", "on"), 0, kind="switch") for row in self.rows]
-        return pack.bundle([published.Control("bowl", bowls, 0, kind="choice"), *rows])
+        rows = [static_export.Control(row, ("off", "on"), 0, kind="switch") for row in self.rows]
+        return pack.bundle([static_export.Control("bowl", bowls, 0, kind="choice"), *rows])
 
     def _seen(self) -> tuple[str, list[str]]:
         """The picture of the rows that are on, HTML, and what is wrong with them."""
@@ -148,7 +150,7 @@ def verdict(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
 
 def plot_problem(qp: QP, start: npt.ArrayLike) -> Axes:
     """A problem in the plane, with a solver's start as a dot."""
-    return programs.plot(qp, _six(), point=start)
+    return qp_plots.plot(qp, _six(), point=start)
 
 
 def show_way(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
@@ -172,7 +174,7 @@ def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
     """Numbers round by round. curves: name -> (n,) numbers, one before the first round and one after each. label: of them."""
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for (name, numbers), colour, style in zip(curves.items(), GREYS, _STYLES, strict=False):
-        ax.plot(np.atleast_1d(numbers), style, color=hexadecimal(colour), marker="o", label=name, linewidth=2)
+        ax.plot(np.atleast_1d(numbers), style, color=hex_code(colour), marker="o", label=name, linewidth=2)
     ax.set(xlabel="rounds", ylabel=label)
     ax.grid(alpha=0.3)
     ax.legend()
@@ -189,7 +191,7 @@ def _flat_axis(qp: QP, box: tuple[float, float, float, float], working: Sequence
     figure = Figure(figsize=(4.6, 3.8), dpi=80)
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2))  # few: they take most of the time
-    return programs.plot(qp, box, working, x, axis)
+    return qp_plots.plot(qp, box, working, x, axis)
 
 
 def _image(axis: Axes) -> str:

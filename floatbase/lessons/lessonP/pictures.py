@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, hexadecimal
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 
 def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> Axes:
@@ -37,10 +37,10 @@ def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) ->
     x, y = np.asarray(gains, dtype=float), np.asarray(moved, dtype=float)
     stands = np.isfinite(y)
     top = 1.3 * y[stands].max(initial=1.0)
-    axis.semilogx(x[stands], y[stands], "o-", color=hexadecimal(GREYS[0]), label="stands")
+    axis.semilogx(x[stands], y[stands], "o-", color=hex_code(GREYS[0]), label="stands")
     if not stands.all():
-        axis.plot(x[~stands], np.full((~stands).sum(), top), "x", color=hexadecimal(GREYS[0]), ms=9, label="falls")
-    axis.axvline(border, color=hexadecimal(GREYS[1]), linestyle="--", label="4 ω²")
+        axis.plot(x[~stands], np.full((~stands).sum(), top), "x", color=hex_code(GREYS[0]), ms=9, label="falls")
+    axis.axvline(border, color=hex_code(GREYS[1]), linestyle="--", label="4 ω²")
     axis.set_xticks(x, [f"{gain:g}" for gain in x])
     axis.minorticks_off()
     axis.set(xlabel="kp [1/s²]", ylabel="farthest aside [mm]", ylim=(0.0, 1.1 * top))

@@ -14,7 +14,8 @@ from floatbase._validation import Array
 from floatbase.lessons.lessonX.box import BlackBox
 from floatbase.lessons.lessonX.tools import lagged
 from floatbase.simulation import Rollout
-from floatbase.viewer import GREYS, Viewer, hexadecimal
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 WIDTH, HEIGHT, EDGE = 620, 240, 40  # pixels of a drawing, and of its edge
 _LEAST = 1.0  # N: a smaller force is not worth a word
@@ -47,8 +48,8 @@ def plot_missed(box: BlackBox, missed: npt.ArrayLike) -> Figure:
     """The force on the base that (7) misses, and the weight for comparison. missed: (n - 1, nv), as of `needed`."""
     forces = np.linalg.norm(np.asarray(missed)[:, :3], axis=1)
     figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
-    ax.axhline(box.robot.weight, color=hexadecimal(GREYS[1]), linestyle="--", label="weight")
-    ax.plot(box.time[: len(forces)], forces, color=hexadecimal(GREYS[0]), label="missing on the base")
+    ax.axhline(box.robot.weight, color=hex_code(GREYS[1]), linestyle="--", label="weight")
+    ax.plot(box.time[: len(forces)], forces, color=hex_code(GREYS[0]), label="missing on the base")
     ax.set(xlabel="time [s]", ylabel="force [N]", ylim=(0, None))
     ax.legend(loc="center left")
     ax.grid(alpha=0.3)
@@ -65,7 +66,7 @@ def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
     told = box.tau[: len(got)]
     orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
     frame = _Frame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
-    drawn = frame.ticks() + frame.curve(times, got[:, joint], f'stroke="{hexadecimal(GREYS[2])}" stroke-width="6"')
+    drawn = frame.ticks() + frame.curve(times, got[:, joint], f'stroke="{hex_code(GREYS[2])}" stroke-width="6"')
     drawn += frame.curve(times, orders[:, joint], 'stroke="currentColor" stroke-width="1.5"')
     off = float(np.median(np.abs(orders - got)))
     words = (

@@ -16,7 +16,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from floatbase.viewer import page, published, wire
+from floatbase.lessons import static_export
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.web import pages
 
 _LEAST = 1500  # bytes of a command that pictures share; a smaller one each has itself
 _USUAL = 0.3  # of a robot's pictures
@@ -33,10 +35,10 @@ class Pictures:
 
     def place(self, data: Mapping[str, Any]) -> str | None:
         """HTML for the mimebundle of an output that holds a picture, a recording or a panel; None where it holds none."""
-        if published.MIME not in data:
+        if static_export.MIME not in data:
             return None
-        about = dict(data[published.MIME])
-        commands = published.commands(about)
+        about = dict(data[static_export.MIME])
+        commands = static_export.commands(about)
         del about["commands"]
         name = _name("picture", json.dumps(about, sort_keys=True).encode(), *commands)
         self._placed[name] = about, commands
@@ -45,8 +47,8 @@ class Pictures:
     def write(self) -> None:
         """Write the files, after all pictures have been placed."""
         self._folder.mkdir(parents=True, exist_ok=True)
-        self._folder.joinpath("viewer.html").write_text(page.inner_page("viewer.js"), encoding="utf-8")
-        self._folder.joinpath("viewer.js").write_bytes(page.viewer_code())
+        self._folder.joinpath("viewer.html").write_text(pages.embedded_page("viewer.js"), encoding="utf-8")
+        self._folder.joinpath("viewer.js").write_bytes(pages.viewer_code())
         groups = self._groups()
         for name, commands in groups.items():
             self._write(name, commands)
@@ -75,14 +77,14 @@ class Pictures:
         return {_name(name, *commands): commands for name, commands in found.items()}
 
     def _write(self, name: str, parts: Sequence[bytes]) -> None:
-        packed = base64.b64encode(gzip.compress(wire.frame(parts), 9, mtime=0)).decode()
+        packed = base64.b64encode(gzip.compress(protocol.frame(parts), 9, mtime=0)).decode()
         text = f'floatbasePictures.take("{name}","{packed}")\n'
         self._folder.joinpath(f"{name}.js").write_text(text, encoding="ascii")
 
 
 def _name(begin: str, *parts: bytes) -> str:
     """A name for a file with these contents."""
-    return f"{begin}-{hashlib.sha256(wire.frame(parts)).hexdigest()[:12]}"
+    return f"{begin}-{hashlib.sha256(protocol.frame(parts)).hexdigest()[:12]}"
 
 
 def _figure(name: str, about: dict[str, Any]) -> str:

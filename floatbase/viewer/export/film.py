@@ -1,0 +1,139 @@
+"""Films and images of a saved scene, drawn by a browser without a window: .mp4, .gif, .png."""
+
+from __future__ import annotations
+
+import io
+import shutil
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from tqdm.auto import tqdm
+
+from floatbase._validation import as_array, short_repr
+from floatbase.errors import InputError, ViewerError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+FRAME_RATES = {".png": 0, ".mp4": 30, ".gif": 20}  # pictures a second of each kind of file; 0: only the first one
+_MAX_DURATION = 120.0  # s
+_MIN_PIXELS, _MAX_PIXELS = 100, 4000  # pixels
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
+_FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
+_TIMEOUT_MS = 60_000  # ms until the page must have drawn
+_REQUIREMENTS = (
+    'that needs a browser (Chromium or Chrome) and two packages: pip install "floatbase[video]". A name in .html needs none.'
+)
+_IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
+_PREPARE_JS = """() => {
+    const {animator} = viewer;
+    const unused = [...["player", "panel", "fold", "board", "tools"].map(part), ...document.querySelectorAll("#legend.folded")];
+    for (const control of unused) control.style.visibility = "hidden";
+    if (!animator.duration) return 0;
+    animator.pause();
+    return animator.duration / animator.mixer.timeScale;
+}"""
+_SEEK_JS = """t => {
+    if (viewer.animator.duration) viewer.animator.seek(t * viewer.animator.mixer.timeScale);
+    viewer.render();
+}"""
+
+
+def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
+    """Width and height of films, checked: films have even ones."""
+    width, height = (int(n) if n % 2.0 == 0.0 else 0 for n in as_array("size", size, (2,), "pixels"))
+    if not (_MIN_PIXELS <= width <= _MAX_PIXELS and _MIN_PIXELS <= height <= _MAX_PIXELS):
+        raise InputError(
+            f"size is {short_repr(size)}; width and height must be even numbers of pixels from {_MIN_PIXELS} to {_MAX_PIXELS}."
+        )
+    return width, height
+
+
+def capture(page: str, target: Path, size: tuple[int, int]) -> None:
+    """Write what a page with a scene shows: its recording as .mp4 or .gif, its first picture as .png.
+
+    page: its HTML. size: width and height in pixels, see `checked_size`.
+    Raises `ViewerError` where browser or packages are missing, and for a recording that is too long.
+    """
+    unfinished = target.with_name(f"{target.stem}.part{target.suffix}")
+    unfinished.touch()  # an `OSError` now, and not after the work
+    try:
+        with ThreadPoolExecutor(1) as thread:  # playwright refuses one that has an event loop, such as a notebook's
+            thread.submit(_capture, page, unfinished, size).result()
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _capture(page: str, target: Path, size: tuple[int, int]) -> None:
+    kind = target.suffix.lower()
+    pictures = _frames(page, size, FRAME_RATES[kind])
+    if kind == ".png":
+        next(pictures).save(target)
+        pictures.close()  # type: ignore[attr-defined]
+    elif kind == ".gif":
+        _write_gif(target, pictures)
+    else:
+        _write_mp4(target, pictures, size)
+
+
+def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
+    """The recording at `rate` pictures a second of film, played at its speed, or the first picture alone."""
+    try:
+        from PIL import Image
+        from playwright.sync_api import Error, sync_playwright
+    except ImportError as error:
+        raise ViewerError(f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}") from None
+    path = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    with TemporaryDirectory() as folder, sync_playwright() as playwright:
+        file = Path(folder, "scene.html")
+        file.write_text(page, encoding="utf-8")
+        try:
+            browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
+        except Error as error:
+            raise ViewerError(
+                f"no browser starts, so no film can be made; {_REQUIREMENTS} ({str(error).splitlines()[0]})"
+            ) from None
+        with browser:
+            window = browser.new_page(viewport={"width": size[0], "height": size[1]})
+            window.goto(file.as_uri())
+            window.wait_for_function(_IS_DRAWN, timeout=_TIMEOUT_MS)
+            duration = window.evaluate(_PREPARE_JS)
+            if rate and duration > _MAX_DURATION:
+                raise ViewerError(
+                    f"the film would last {duration:.0f} s, and may last {_MAX_DURATION:g} s: play less, or faster."
+                )
+            times = np.arange(0.0, duration + 1e-9, 1.0 / rate) if rate else np.zeros(1)
+            for t in tqdm(times, desc="film", unit="picture", leave=False, disable=not rate):
+                window.evaluate(_SEEK_JS, float(t))
+                yield Image.open(io.BytesIO(window.screenshot())).convert("RGB")
+
+
+def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
+    from PIL.Image import Dither, Quantize
+
+    none = Dither.NONE
+    # one palette for all, since a palette for each flickers; the octree keeps the colour of a small thing, such as an arrow
+    first = next(pictures).quantize(method=Quantize.FASTOCTREE, dither=none)
+    rest = (picture.quantize(palette=first, dither=none) for picture in pictures)
+    first.save(target, save_all=True, append_images=rest, duration=1000 // FRAME_RATES[".gif"], loop=0)
+
+
+def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -> None:
+    try:
+        import av
+    except ImportError as error:
+        raise ViewerError(f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}") from None
+    with av.open(str(target), "w", options={"movflags": "faststart"}) as film:
+        stream = film.add_stream("libx264", rate=Fraction(FRAME_RATES[".mp4"]), options={"crf": "20"})
+        stream.width, stream.height = size
+        stream.pix_fmt = "yuv420p"  # what browsers and slides play
+        for picture in pictures:
+            film.mux(stream.encode(av.VideoFrame.from_image(picture)))
+        film.mux(stream.encode())

@@ -1,0 +1,25 @@
+"""Plots with matplotlib, in the colours of the scene: of a rollout, and in `push_recovery_plots` of push recovery."""
+
+from floatbase.viewer.plots import push_recovery_plots
+from floatbase.viewer.plots.run_plots import (
+    friction_used,
+    plot_com,
+    plot_forces,
+    plot_friction,
+    plot_gait,
+    plot_normal_forces,
+    plot_run,
+    plot_torques,
+)
+
+__all__ = [
+    "friction_used",
+    "plot_com",
+    "plot_forces",
+    "plot_friction",
+    "plot_gait",
+    "plot_normal_forces",
+    "plot_run",
+    "plot_torques",
+    "push_recovery_plots",
+]

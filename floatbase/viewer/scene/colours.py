@@ -1,0 +1,99 @@
+"""The colours of all 3-D pictures and plots, RGB from 0 to 1, safe for the colour-blind (Okabe and Ito).
+
+Measured forces are dark blue, planned forces light blue. A friction cone is green when its force is inside, orange when the
+force reaches a facet or the surface, vermilion when it is outside, and a faint grey when there is no force. What is neither
+a force nor a cone, as a curve, a place or an entry of a matrix, is grey: greys differ in lightness, which everybody sees.
+"""
+
+from __future__ import annotations
+
+RGB = tuple[float, float, float]
+RGBA = tuple[float, float, float, float]
+
+
+def _rgb(code: str) -> RGB:
+    red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return red, green, blue
+
+
+MEASURED = _rgb("#0072B2")
+PLANNED = _rgb("#56B4E9")
+COM = _rgb("#AA3377")
+CALM = _rgb("#009E73")
+WARNING = _rgb("#E69F00")
+ALARM = _rgb("#D55E00")
+IDLE = _rgb("#8A8F98")
+SUPPORT = CALM
+PUSH = _rgb("#222222")  # and the ZMP, and prices; on a dark background they are light, as text is
+LIMIT = _rgb("#888888")
+ROBOT = _rgb("#9EA3AB")
+GHOST = _rgb("#7A86A8")
+PATCH = _rgb("#444444")
+GREYS = (_rgb("#2B3440"), _rgb("#6F7885"), _rgb("#959EAA"))  # dark, middle, light; the middle one shows on any background
+
+X_AXIS = _rgb("#D55E00")
+Y_AXIS = _rgb("#009E73")
+Z_AXIS = _rgb("#0072B2")
+
+GHOST_NAME = "desired posture"  # in the legend, unless `show` gets another name
+
+# the legend, in this order: first part of the item's path, colour, meaning
+LEGEND: tuple[tuple[str, RGB, str], ...] = (
+    ("measured", MEASURED, "measured force"),
+    ("planned", PLANNED, "planned force"),
+    ("wrench", COM, "wrench at the centre of mass"),
+    ("com", COM, "centre of mass"),
+    ("push", PUSH, "push"),
+    ("cone", CALM, "friction cone: force inside"),
+    ("cone", WARNING, "friction cone: surface reached"),
+    ("cone", ALARM, "friction cone: outside (rim)"),
+    ("idle cone", IDLE, "friction cone: no force"),
+    ("multiplier", PUSH, "price of a limit: its multiplier"),
+    ("support", SUPPORT, "support region"),
+    ("dcm", COM, "capture point"),
+    ("zmp", PUSH, "planned ZMP"),
+    ("foothold", GREYS[1], "planned foothold"),
+    ("swing", GREYS[1], "swing path"),
+    ("push_recovery", MEASURED, "largest push survived"),
+    ("previous", LIMIT, "largest push survived before"),
+    ("capture_point_bound", CALM, "theory: capture point"),
+    ("static_bound", WARNING, "theory: steady push"),
+    ("horizontal_force", COM, "reachable horizontal force"),
+    ("ghost", GHOST, GHOST_NAME),
+)
+
+# how the legend marks what is not a patch of its colour: first part of the item's path -> a class of the page's style
+LEGEND_SYMBOLS = {
+    "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line", "cone": "cone", "idle cone": "cone",
+    "support": "tile", "wrench": "curl",
+}  # fmt: skip
+
+# status of a friction cone -> its colour and its opacity
+CONE = {"idle": IDLE, "inside": CALM, "active": WARNING, "outside": ALARM}
+CONE_ALPHA = {"idle": 0.12, "inside": 0.28, "active": 0.28, "outside": 0.28}
+
+# background -> colours of the page's top and bottom, of the ground's lines, and of text
+BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
+    "white": (_rgb("#FFFFFF"), _rgb("#FFFFFF"), _rgb("#DDDDDD"), _rgb("#222222")),
+    "light": (_rgb("#FBFCFE"), _rgb("#DFE5EC"), _rgb("#BCC5CF"), _rgb("#222222")),
+    "dark": (_rgb("#1E2227"), _rgb("#282C32"), _rgb("#4B525A"), _rgb("#F2F2F2")),
+}
+
+# colour -> its shade on a dark background, for those that would hide there
+DARK_SHADES = {
+    MEASURED: _rgb("#1C80C0"),
+    PLANNED: _rgb("#8CCBF2"),
+    COM: _rgb("#CD5A9B"),
+    PATCH: _rgb("#C4C9CF"),
+    GREYS[0]: _rgb("#DDE3EA"),
+}
+
+
+def hex_code(colour: RGB) -> str:
+    """The colour as "#rrggbb"."""
+    return "#" + "".join(f"{round(255 * part):02X}" for part in colour)
+
+
+def with_alpha(colour: RGB, alpha: float) -> RGBA:
+    """The colour with an opacity: 0 is invisible, 1 hides what is behind."""
+    return (*colour, alpha)

@@ -1,0 +1,186 @@
+"""What a walk plans, as marks in the picture: footholds, swing paths, capture point and zero-moment point (ZMP)."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._validation import Array, as_instance, as_number, short_repr
+from floatbase.behaviours import LIPM, StepPlan, Swing, Walk, capture_point
+from floatbase.errors import InputError, unknown_name
+from floatbase.robots import Foot, Robot, State
+from floatbase.viewer.scene import geometry, threejs
+from floatbase.viewer.scene.colours import COM, GREYS, RGB
+from floatbase.viewer.scene.ground import LEVEL, Plane, Planes
+from floatbase.viewer.scene.shapes import Item, Picture, transform
+from floatbase.viewer.scene.threejs import Shape
+
+COLOUR = GREYS[1]  # of all that is neither a force nor the centre of mass; it shows on any background
+_HEIGHT_ABOVE_GROUND = 0.005  # of the robot's size, above the ground: no flicker with its lines and the support region
+_RING_RADIUS, _DIAMOND_SIZE = (
+    0.07,
+    0.05,
+)  # radius of the capture point's mark and half the height of the ZMP's, of the robot's size
+_OUTLINE_WIDTH = 0.012  # of a foothold's outline, of the robot's size
+_MIN_LENGTH = 1e-6  # m: a path of no length still has a matrix
+_SEGMENTS = 24  # of a swing path
+
+
+@dataclass(frozen=True, eq=False)
+class Style:
+    """How marks are drawn. size: of the robot, m. ground: where they lie. colour: RGB of the ZMP, which shows on the page."""
+
+    size: float
+    ground: Plane | Planes = LEVEL
+    colour: RGB = GREYS[1]
+
+
+def walk_overlay(walk: Walk, state: State, style: Style) -> Picture:
+    """What a `Walk` plans now: its footholds and swing paths, the capture point where it is, and the planned ZMP.
+
+    walk: the behaviour, after a tick; nothing is drawn before its first one. state: of the robot, then. style: of the marks.
+    """
+    if as_instance("walk", walk, Walk).plan is None:
+        return {}
+    assert walk.plan is not None and walk.time is not None
+    yaw_changes = {foot: walk.yaw_rate * max(path.touchdown - walk.time, 0.0) for foot, path in walk.swings.items()}
+    return _capture_point_and_zmp(walk.plan, walk.time, state, style) | _footholds_and_swings(
+        walk.footholds, walk.swings, yaw_changes, state, style.size
+    )
+
+
+def step_overlay(step: StepPlan, t: float, state: State, style: Style) -> Picture:
+    """The same of a stored step, as it was planned when its stance began; the capture point is where it is at time t.
+
+    step: an entry of `walk.history`. t: s. state: of the robot, then. style: of the marks.
+    """
+    marks = _capture_point_and_zmp(as_instance("step", step, StepPlan).plan, as_number("t", t, "s"), state, style)
+    return marks | _footholds_and_swings(step.footholds, step.swings, {}, state, style.size)
+
+
+def step_at(steps: Sequence[StepPlan], t: float) -> StepPlan | None:
+    """Of the steps of a walk, in the order of time, the one in which time t, s, lies; None before the first."""
+    i = bisect_right(steps, as_number("t", t, "s") + 1e-9, key=lambda step: step.time)
+    return steps[i - 1] if i else None
+
+
+def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
+    """The steps as a list, after checking that they are some."""
+    if not isinstance(steps, Iterable):
+        raise InputError(f"steps must be those of a Walk, as walk.history, not {short_repr(steps)}.")
+    return [as_instance("a step", step, StepPlan, "one of walk.history") for step in steps]
+
+
+def _capture_point_and_zmp(plan: LIPM, t: float, state: State, style: Style) -> Picture:
+    """Capture point and ZMP. t: s."""
+    dcm, zmp = capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega), plan.zmp(t)
+    lift = _HEIGHT_ABOVE_GROUND * style.size
+    ring = transform([*dcm, style.ground.height(dcm) + lift], scale=_RING_RADIUS * style.size)
+    diamond = transform([*zmp, style.ground.height(zmp) + lift], scale=_DIAMOND_SIZE * style.size)
+    return {"dcm": Item(_ring(COM, 0.64, True), ring), "zmp": Item(_diamond(style.colour), diamond)}
+
+
+def _footholds_and_swings(
+    footholds: Mapping[str, Array],
+    swings: Mapping[str, Swing],
+    yaw_changes: Mapping[str, float],
+    state: State,
+    size: float,
+) -> Picture:
+    """An outline at each foothold, and the paths to those of the feet in the air.
+
+    yaw_changes: rad, by which the robot turns until a foot lands.
+    """
+    picture: Picture = {}
+    forward_x, forward_y, _ = state.frame_pose("base").rotation[:, 0]
+    yaw = float(np.arctan2(forward_y, forward_x))
+    for name, place in footholds.items():
+        foot, path = _foot(state.robot, name), name.replace("/", "_")
+        rotation, offset = _rotation_about_z(yaw + yaw_changes.get(name, 0.0)), _offset_to_ground(foot, state.robot.standing())
+        picture[f"foothold/{path}"] = _outline(foot, place + rotation @ offset, rotation, size)
+        if name in swings:
+            picture[f"swing/{path}"] = _swing_path(swings[name], rotation @ offset)
+    return picture
+
+
+def _foot(robot: Robot, name: str) -> Foot:
+    feet = {foot.frame: foot for foot in robot.feet}
+    if name not in feet:
+        raise unknown_name(f"foot of {robot.name}", name, feet)
+    return feet[name]
+
+
+def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
+    """Where a foot is to stand. at: (3,), m, world, below its middle. rotation: (3, 3), of the robot on the ground."""
+    at = at + [0.0, 0.0, _HEIGHT_ABOVE_GROUND * size]
+    if foot.corners is None:
+        radius = max(2.0 * foot.radius, 0.04 * size)
+        return Item(_ring(COLOUR, 0.72), transform(at, rotation, radius))
+    corners = np.round(foot.corners[:, :2] - foot.corners[:, :2].mean(axis=0), 4)
+    return Item(_foot_outline(tuple(map(tuple, corners.tolist())), round(_OUTLINE_WIDTH * size, 4)), transform(at, rotation))
+
+
+def _offset_to_ground(foot: Foot, standing: State) -> Array:
+    """From the frame of a foot to the ground below its middle, as the robot stands: (3,), m."""
+    pose = standing.frame_pose(foot.frame)
+    offset = np.array(pose.rotation @ foot.middle)
+    offset[2] = -pose.translation[2]
+    return offset
+
+
+def _swing_path(swing: Swing, offset: Array) -> Item:
+    """The path of a swing as a line, moved by an offset, (3,), m.
+
+    It is one curve, stretched; so a path that is aimed elsewhere at every tick costs a matrix, and no new shape.
+    """
+    step_vector = swing.end - swing.start
+    length = float(np.linalg.norm(step_vector))
+    x = step_vector / length if length > _MIN_LENGTH else np.array([1.0, 0.0, 0.0])
+    y = np.cross([0.0, 0.0, 1.0], x)
+    y /= max(float(np.linalg.norm(y)), _MIN_LENGTH)
+    scale = (max(length, _MIN_LENGTH), 1.0, max(swing.height, _MIN_LENGTH))
+    return Item(_unit_swing_path(), transform(swing.start + offset, np.stack([x, y, np.cross(x, y)], axis=1), scale))
+
+
+def _rotation_about_z(yaw: float) -> Array:
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@lru_cache(maxsize=8)
+def _ring(colour: RGB, inner: float, on_top: bool = False) -> Shape:
+    """A flat ring around z, of radius 1. inner: its inner radius."""
+    return threejs.mesh(*geometry.surface_of_revolution([(inner, 0.0), (1.0, 0.0)], 36), colour, lit=False, on_top=on_top)
+
+
+@lru_cache(maxsize=8)
+def _diamond(colour: RGB) -> Shape:
+    """An octahedron that stands on its tip, which looks like a diamond from all around."""
+    return threejs.mesh(
+        *geometry.surface_of_revolution([(0.0, 0.0), (0.6, 1.0), (0.0, 2.0)], 4), colour, lit=False, on_top=True
+    )
+
+
+@lru_cache(maxsize=32)
+def _foot_outline(corners: tuple[tuple[float, float], ...], width: float) -> Shape:
+    """A flat band around corners, m."""
+    inner = np.array(sorted(corners, key=lambda corner: np.arctan2(corner[1], corner[0])))
+    outer = inner * (1.0 + np.sqrt(2.0) * width / np.linalg.norm(inner, axis=1, keepdims=True))
+    n = len(inner)
+    i, j = np.arange(n), np.roll(np.arange(n), -1)
+    faces = np.vstack([np.stack([i, i + n, j + n], axis=1), np.stack([i, j + n, j], axis=1)])
+    points: npt.NDArray[np.float64] = np.hstack([np.vstack([inner, outer]), np.zeros((2 * n, 1))])
+    return threejs.mesh(points, faces, COLOUR, lit=False)
+
+
+@lru_cache(maxsize=1)
+def _unit_swing_path() -> Shape:
+    """A swing from the origin to 1 along x, 1 high."""
+    swing = Swing(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.0, 1.0, 1.0)
+    points = np.array([swing(u)[0] for u in np.linspace(0.0, 1.0, _SEGMENTS + 1)])
+    return threejs.lines(np.repeat(points, 2, axis=0)[1:-1], COLOUR)

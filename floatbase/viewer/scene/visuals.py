@@ -1,0 +1,114 @@
+"""The visuals that a robot's URDF names. The light meshes are made from them, and robots without light meshes show them.
+
+meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with wrong triangles. So
+trimesh reads the files here, material by material. Needs trimesh, and pycollada for .dae files.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase.robots import Robot
+
+if TYPE_CHECKING:
+    import trimesh
+
+GREY = (0.62, 0.64, 0.67)
+DARK = (0.2, 0.2, 0.2)  # colour of a material whose texture is missing
+
+
+@dataclass(frozen=True, eq=False)
+class VisualMesh:
+    """One piece of a robot.
+
+    joint: Pinocchio's number of the joint that moves it.
+    colour: (3,), RGB, 0-1.
+    mesh: its triangles, m, in the joint's frame.
+    source: name of its file.
+    """
+
+    joint: int
+    colour: npt.NDArray[np.float64]
+    mesh: trimesh.Trimesh
+    source: str
+
+
+def urdf_visuals(robot: Robot) -> list[VisualMesh]:
+    """All pieces of the URDF's visuals, one for each material. Raises `ImportError` without trimesh."""
+    import trimesh  # noqa: F401  raises at once if it is missing
+
+    folders = [str(folder) for folder in robot.package_dirs]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders)
+    return [piece for item in geometry.geometryObjects for piece in _pieces(item)]
+
+
+def _pieces(item: pin.GeometryObject) -> list[VisualMesh]:
+    """The pieces of one visual, one for each of its materials."""
+    import trimesh
+
+    if not Path(item.meshPath).is_file():
+        meshes = [_primitive(item.geometry)]
+    else:
+        dump = _scene(Path(item.meshPath)).dump()
+        meshes = [mesh for mesh in dump if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+    pieces = []
+    for mesh in meshes:
+        plain = trimesh.Trimesh(mesh.vertices, mesh.faces)
+        plain.apply_scale(np.asarray(item.meshScale).ravel())
+        plain.apply_transform(item.placement.homogeneous)
+        pieces.append(VisualMesh(int(item.parentJoint), _colour(item, mesh), plain, Path(item.meshPath).stem))
+    return pieces
+
+
+def _scene(path: Path) -> trimesh.Scene:
+    """The meshes in a file. If pycollada finds none because a texture is missing, the file is read without textures."""
+    import trimesh
+
+    scene = trimesh.load_scene(path)
+    if scene.geometry or path.suffix.lower() != ".dae":
+        return scene
+    return trimesh.load_scene(io.BytesIO(_without_textures(path)), file_type="dae")
+
+
+def _without_textures(path: Path) -> bytes:
+    """A .dae file with a dark colour instead of each texture."""
+    root = ElementTree.parse(path).getroot()
+    space = root.tag.rpartition("}")[0] + "}"
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag == f"{space}newparam":
+                parent.remove(child)
+            elif child.tag == f"{space}texture":
+                parent.remove(child)
+                ElementTree.SubElement(parent, f"{space}color").text = " ".join(map(str, (*DARK, 1.0)))
+    return ElementTree.tostring(root)
+
+
+def _primitive(shape: Any) -> trimesh.Trimesh:
+    """A box, cylinder or sphere of the URDF as a mesh."""
+    import trimesh
+
+    if hasattr(shape, "halfSide"):
+        return trimesh.creation.box(2.0 * np.asarray(shape.halfSide).ravel())
+    if hasattr(shape, "halfLength"):
+        return trimesh.creation.cylinder(shape.radius, 2.0 * shape.halfLength, sections=24)
+    return trimesh.creation.icosphere(2, shape.radius)
+
+
+def _colour(item: pin.GeometryObject, mesh: trimesh.Trimesh) -> npt.NDArray[np.float64]:
+    """The colour of the file's material if it has one, else of the URDF's, else grey."""
+    material = getattr(mesh.visual, "material", None)
+    if Path(item.meshPath).suffix.lower() in (".dae", ".obj") and material is not None:
+        return np.asarray(material.main_color[:3]) / 255.0
+    return np.asarray(item.meshColor).ravel()[:3] if item.overrideMaterial else np.array(GREY)

@@ -1,0 +1,159 @@
+"""The picture in a notebook: a widget whose frames travel over the kernel's own connection, as a slider's values do.
+
+So it works wherever sliders work, with no port of its own: JupyterLab, Notebook, VS Code, Colab, a hub, Voilà. The widget is
+`anywidget`'s, which brings what each of these needs in one package and leaves the rest to us: widget.js, which holds the page
+in a frame. The page's code is sent once to each page of the notebook that asks for it.
+"""
+
+from __future__ import annotations
+
+import contextvars
+import gzip
+import hashlib
+import threading
+import weakref
+from functools import cache
+from typing import Any
+
+import anywidget
+import traitlets
+
+from floatbase.viewer.transport.connection import Channel, Connection
+from floatbase.viewer.transport.notebook_events import receive_during_cells
+from floatbase.viewer.transport.server import Server
+from floatbase.viewer.web import pages
+
+FRAME_INTERVAL = (
+    1.0 / 30.0
+)  # s from frame to frame: every one is a message of the kernel, of which Jupyter takes 1000 a second at most
+_MAX_IN_FLIGHT = 2  # frames: so a page far away gets one for each half of the way there and back
+_MAX_PAGES = 50  # of one display; one that is closed without a word is forgotten after them
+
+
+class NotebookWidget(anywidget.AnyWidget):
+    """One display of a window's scene.
+
+    name: what the picture shows, for screen readers. height: pixels. thumbnail: a PNG of the scene as it is now, for the time
+    until the page has drawn, and for places where no page can; empty for none.
+    """
+
+    _esm = pages.asset("widget.js")
+    version = traitlets.Unicode().tag(sync=True)
+    name = traitlets.Unicode().tag(sync=True)
+    height = traitlets.Int().tag(sync=True)
+    thumbnail = traitlets.Bytes().tag(sync=True)
+
+    def __init__(self, server: Server, display: int, name: str, height: int, thumbnail: bytes = b""):
+        super().__init__(version=_page_code()[0], name=name, height=height, thumbnail=thumbnail)
+        self._output_pages = _OutputPages(self, server, display)
+        self.on_msg(self._output_pages.receive)
+        receive_during_cells(self)
+
+
+class _OutputPages:
+    """The pages of one widget. `receive` may be called in any thread; all else is done in the server's."""
+
+    def __init__(self, widget: NotebookWidget, server: Server, number: int):
+        self._widget, self._number = weakref.ref(widget), number
+        self._server = weakref.ref(server)
+        self._pages: dict[str, _WidgetChannel] = {}
+        server.on_stop[:] = [stop_callback for stop_callback in server.on_stop if stop_callback() is not None]
+        server.on_stop.append(weakref.WeakMethod(self._stop))
+
+    def receive(self, _: Any, content: Any, buffers: Any) -> None:
+        """A message of a page, {page, say}; what no page of ours sends is ignored."""
+        server = self._server()
+        if server is None or not server.is_running:
+            return self._send_closed()
+        if isinstance(content, dict) and isinstance(content.get("say"), str) and isinstance(content.get("page"), str):
+            answers_wait = threading.current_thread() is threading.main_thread()
+            server.call(self._handle, server, content["page"][:40], content["say"], answers_wait, contextvars.copy_context())
+
+    def _handle(self, server: Server, name: str, say: str, answers_wait: bool, context: contextvars.Context) -> None:
+        known = self._pages.get(name)
+        if known is not None:
+            known.answers_wait, known.context = answers_wait, context
+        channel = known or _WidgetChannel(self, server, name, answers_wait, context)
+        if say == "code":
+            channel.send({"code": True}, *_page_code()[1])
+        elif say in ("hello", "bye"):
+            self.drop(name)
+            if say == "hello":
+                self._connect(server, _WidgetChannel(self, server, name, answers_wait, context))
+        elif known is None:
+            channel.close_page("it was let go")
+        else:
+            known.page.receive(say)
+
+    def _connect(self, server: Server, channel: _WidgetChannel) -> None:
+        for name in list(self._pages)[: 1 - _MAX_PAGES]:
+            self.drop(name)
+        self._pages[channel.name] = channel
+        channel.page = Connection(server, channel, self._number)
+        channel.page.next_frame()
+
+    def drop(self, name: str) -> None:
+        """The page has gone."""
+        if name in self._pages:
+            self._pages.pop(name).page.close()
+
+    def send(self, content: dict[str, Any], *buffers: bytes) -> None:
+        """Send a message to the pages."""
+        widget = self._widget()
+        if widget is not None:
+            widget.send(content, list(buffers))
+
+    def _stop(self) -> None:
+        """The window closes: the pages keep their pictures."""
+        for name in list(self._pages):
+            self.drop(name)
+        self._send_closed()
+
+    def _send_closed(self) -> None:
+        self.send({"closed": True})
+
+
+class _WidgetChannel(Channel):
+    """The way to one page: messages of the widget that name the page, so that no other page takes them.
+
+    answers_wait: whether what the page says is heard only between cells. Where the notebook sends it to a subshell of
+    the kernel, it
+    is heard at once. context: of a message of the page; what is sent in it is an answer, so the page's next words go the
+    same way.
+    """
+
+    max_in_flight, min_interval = _MAX_IN_FLIGHT, FRAME_INTERVAL
+    page: Connection
+
+    def __init__(self, display: _OutputPages, server: Server, name: str, answers_wait: bool, context: contextvars.Context):
+        self.name, self.answers_wait = name, answers_wait
+        self.context = context
+        self._display, self._cells = display, server.cells
+
+    @property
+    def answers_since(self) -> float | None:
+        if not self.answers_wait:
+            return 0.0
+        return None if self._cells.is_running else self._cells.ended_at
+
+    def send(self, content: dict[str, Any], *buffers: bytes) -> None:
+        """Send a message to this page."""
+        self.context.run(self._display.send, {**content, "page": self.name}, *buffers)
+
+    def send_frame(self, number: int, data: bytes) -> None:
+        self.send({"frame": number}, data)
+
+    def send_text(self, message: str) -> None:
+        self.send({"text": message})
+
+    def close_page(self, reason: str) -> None:
+        self._display.drop(self.name)
+        self.send({"lost": reason})
+
+
+@cache
+def _page_code() -> tuple[str, tuple[bytes, bytes]]:
+    """A name of this version of the page, and its HTML and the viewer's code, each packed by gzip."""
+    parts = pages.notebook_page().encode(), pages.viewer_code()
+    packed = gzip.compress(parts[0], 9, mtime=0), gzip.compress(parts[1], 9, mtime=0)
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:16], packed

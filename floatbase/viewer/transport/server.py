@@ -1,0 +1,218 @@
+"""The server of a window: a thread with the connections to all pages, and a web server if one is asked for."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import socket
+import threading
+import weakref
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from typing import Any
+
+import tornado.httpserver
+import tornado.web
+import tornado.websocket
+
+from floatbase.errors import ViewerError
+from floatbase.viewer.scene.store import Scene
+from floatbase.viewer.transport.connection import Channel, Connection
+from floatbase.viewer.transport.notebook_events import CellEvents
+from floatbase.viewer.transport.output_history import OutputHistory
+from floatbase.viewer.web import pages
+
+FRAME_INTERVAL = 1.0 / 60.0  # s, the least time between two frames
+MAX_MESSAGE_SIZE = (
+    32 << 20
+)  # bytes of a message from a page: a picture of the largest screens, which is the longest that pages send
+
+
+class Server:
+    """The thread that serves one scene. It has no reference to its `Window`, so a window that nobody refers to can end it.
+
+    port: the port that it listens on; None until `listen`: a notebook needs none.
+    """
+
+    def __init__(self, scene: Scene):
+        self.scene = scene
+        self.port: int | None = None
+        self.outputs = OutputHistory(scene)
+        self.cells = CellEvents(self.outputs.begin_cell)
+        self.clients: list[Connection] = []
+        self.on_control: Callable[[str, Any], None] | None = None
+        # called when the window closes, in the server's thread, as far as their owners still exist
+        self.on_stop: list[weakref.WeakMethod[Callable[[], None]]] = []
+        self._http: tornado.httpserver.HTTPServer | None = None
+        self._loop = asyncio.new_event_loop()
+        # the newest change for which a wake-up was requested, and the newest that a wake-up has dealt with
+        self._requested = self._sent = 0
+        self._last_flush = 0.0
+        self._timer: asyncio.TimerHandle | None = None
+        ready = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(ready,), name=f"floatbase-window-{id(self):x}", daemon=True)
+        self._thread.start()
+        ready.wait()
+
+    def listen(self, sockets: list[socket.socket]) -> None:
+        """Serve the page on these sockets too."""
+        self.port = sockets[0].getsockname()[1]
+        self.call(self._listen, sockets)
+
+    def notify(self, number: int) -> None:
+        """Have change `number` sent. Any thread may call this; it costs little while a wake-up is under way."""
+        if not self.clients:
+            self.scene.sent_to_all = number
+        elif self._requested <= self._sent:
+            self.call(self.flush)
+            self._requested = number  # after the call: an interrupt between the two causes a second wake-up, not a missing one
+
+    def freeze_outputs(self) -> None:
+        """Make the pages of earlier displays keep their pictures."""
+        self.call(self._freeze_outputs)
+
+    def capture(self) -> Future[str]:
+        """Request a picture from the last page, as a data URL."""
+        answer: Future[str] = Future()
+        self.call(self._capture, answer)
+        return answer
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it serves pages still."""
+        return self._thread.is_alive()
+
+    def stop(self) -> None:
+        """End the thread and free the port."""
+        self.cells.unregister()
+        self.call(self._loop.stop)
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=5.0)
+
+    def call(self, function: Callable[..., Any], *args: Any) -> None:
+        """Call a function in the server's thread, where all that concerns pages is done."""
+        with suppress(RuntimeError):  # the loop may have closed since the caller checked
+            self._loop.call_soon_threadsafe(function, *args)
+
+    def _run(self, ready: threading.Event) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.call_soon(ready.set)
+        try:
+            self._loop.run_forever()
+            self._loop.run_until_complete(self._shutdown())
+        finally:
+            self._loop.close()
+
+    def _listen(self, sockets: list[socket.socket]) -> None:
+        self._http = tornado.httpserver.HTTPServer(_application(self))
+        self._http.add_sockets(sockets)
+
+    async def _shutdown(self) -> None:
+        if self._http is not None:
+            self._http.stop()
+        for stop_callback in [stop_callback() for stop_callback in self.on_stop]:
+            if stop_callback is not None:
+                stop_callback()
+        for client in list(self.clients):
+            client.channel.close_page("the window was closed")
+        if self._http is not None:
+            await self._http.close_all_connections()
+        rest = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in rest:
+            task.cancel()
+        await asyncio.gather(*rest, return_exceptions=True)
+
+    def flush(self, wait: float = 0.0) -> None:
+        """Send a frame after `wait` s, once the last one is `FRAME_INTERVAL` old. Runs in the loop's thread."""
+        when = max(self._last_flush + FRAME_INTERVAL, self._loop.time() + wait)
+        if self._timer is not None:
+            if self._timer.when() <= when:
+                return
+            self._timer.cancel()
+        self._timer = self._loop.call_at(when, self._flush)
+
+    def _flush(self) -> None:
+        """Send a frame to every page whose way is free. The others call `flush` when they have drawn theirs."""
+        self._timer, self._last_flush = None, self._loop.time()
+        self._sent = max(self.scene.newest, self._requested)
+        wait = min([client.next_frame() for client in list(self.clients)], default=math.inf)
+        if wait < math.inf:
+            self.flush(wait)
+        seen = (client.sent for client in self.clients if client.displayed is self.scene)
+        self.scene.sent_to_all = min(seen, default=self.scene.newest)
+
+    def _freeze_outputs(self) -> None:
+        for client in list(self.clients):
+            client.freeze()
+
+    def _capture(self, answer: Future[str]) -> None:
+        live = [client for client in self.clients if client.scene is self.scene]
+        if live:
+            live[-1].request_picture(answer)
+        elif self.clients:
+            answer.set_exception(ViewerError("every open page keeps an earlier picture; press 'make live' in one of them."))
+        else:
+            answer.set_exception(ViewerError("the browser closed before the picture was taken; open it again."))
+
+
+class _Guarded(tornado.web.RequestHandler):
+    """Answers only requests to 127.0.0.1 or localhost, so that no foreign page reaches us under a host name of its own."""
+
+    def prepare(self) -> None:
+        if self.request.host_name not in ("127.0.0.1", "localhost"):
+            raise tornado.web.HTTPError(403)
+
+
+class _Page(_Guarded):
+    def get(self) -> None:
+        self.set_header("Cache-Control", "no-store")
+        self.finish(pages.live_page())
+
+
+class _Code(_Guarded):
+    def get(self) -> None:
+        self.set_header("Content-Type", "text/javascript; charset=utf-8")
+        self.finish(pages.viewer_code())
+
+
+class _Socket(_Guarded, tornado.websocket.WebSocketHandler, Channel):
+    """The way to a page over a websocket. tornado's `check_origin` refuses pages of other servers."""
+
+    def initialize(self, server: Server) -> None:
+        self.server = server
+
+    def open(self, *_: str, **__: str) -> None:
+        self.set_nodelay(True)
+        self.page = Connection(self.server, self)
+        self.page.next_frame()
+
+    def on_close(self) -> None:
+        self.page.close()
+
+    def on_message(self, message: str | bytes) -> None:
+        self.page.receive(message)
+
+    def send_frame(self, number: int, data: bytes) -> None:
+        self._write(data, binary=True)
+
+    def send_text(self, message: str) -> None:
+        self._write(message, binary=False)
+
+    def close_page(self, reason: str) -> None:
+        self.close(1001, reason)
+
+    def _write(self, message: bytes | str, binary: bool) -> None:
+        """Give a message to the connection. When the page has gone, `on_close` cleans up."""
+        with suppress(tornado.websocket.WebSocketClosedError):
+            self.write_message(message, binary=binary).add_done_callback(lambda done: done.cancelled() or done.exception())
+
+
+def _application(server: Server) -> tornado.web.Application:
+    return tornado.web.Application(
+        [(r"/", _Page), (r"/main\.min\.js", _Code), (r"/socket", _Socket, {"server": server})],
+        log_function=lambda handler: None,  # do not print refused requests into the notebook
+        compress_response=True,
+        websocket_ping_interval=20,
+        websocket_max_message_size=MAX_MESSAGE_SIZE,
+    )

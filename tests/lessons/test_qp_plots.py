@@ -1,0 +1,80 @@
+"""Quadratic programs in the plane: what is drawn is what the rows say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from messages import raises, refused
+
+from floatbase.errors import InputError, UnknownNameError
+from floatbase.lessons import qp_plots
+from floatbase.qp import QP, table_top
+
+BOX = (-3.0, 3.0, -2.0, 3.0)
+NONE = np.zeros((0, 2)), np.zeros(0)
+
+
+def qp_of(H: Any, g: Any, G: Any, h: Any, names: Any = ()) -> QP:
+    """A QP of two variables without equalities."""
+    return QP(np.asarray(H), np.asarray(g), *NONE, np.reshape(G, (-1, 2)), np.asarray(h), inequality_names=names)
+
+
+def random_qp(seed: int) -> QP:
+    rng = np.random.default_rng(seed)
+    rows = int(rng.integers(1, 7))
+    return QP(np.eye(2), rng.normal(size=2), *NONE, rng.normal(size=(rows, 2)), rng.uniform(-0.3, 2.0, rows))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_grey_region_is_what_the_rows_leave_of_the_box(seed: int) -> None:
+    qp = random_qp(seed)
+    corners = qp_plots.feasible_polygon(qp, BOX)
+    assert np.all(corners @ qp.G.T <= qp.h + 1e-9)
+    sides = np.roll(corners, -1, axis=0) - corners
+    for point in np.random.default_rng(seed).uniform([BOX[0], BOX[2]], [BOX[1], BOX[3]], (200, 2)):
+        inside = bool(np.all(qp.G @ point <= qp.h))
+        to = point - corners
+        turns = sides[:, 0] * to[:, 1] - sides[:, 1] * to[:, 0]  # all to the left of the sides
+        assert inside == (len(corners) > 2 and bool(np.all(turns >= 0.0)))
+
+
+def test_rows_that_leave_nothing_leave_no_corner() -> None:
+    assert len(qp_plots.feasible_polygon(qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1]), BOX)) == 0
+
+
+def test_rows_lie_where_they_hold_with_equality_and_those_that_are_on_are_thick() -> None:
+    qp = qp_of(np.eye(2), [0, 0], [[1.0, 2.0], [0.0, -1.0]], [1.0, 0.5], ("slant", "table"))
+    axis = qp_plots.plot(qp, BOX, working_set=["table"], point=(0.5, -0.5))
+    lines: Any = axis.lines
+    slant, table, dot = lines
+    for line, G, h in zip((slant, table), qp.G, qp.h, strict=True):
+        assert np.allclose(line.get_xydata() @ G, h)
+    assert table.get_linewidth() > 2 * slant.get_linewidth()
+    assert dot.get_xydata().tolist() == [[0.5, -0.5]]
+    assert [text.get_text() for text in axis.texts] == ["slant", "table"]
+    assert axis.get_xlim() + axis.get_ylim() == BOX
+    plt.close("all")
+
+
+def test_level_curves_are_curves_of_one_objective() -> None:
+    H = np.array([[2.0, 0.5], [0.5, 1.0]])
+    for qp in (qp_of(H, [1.0, -0.5], [], []), table_top(), qp_of(np.diag([1.0, 0.0]), [0.0, 0.0], [], [])):
+        axis: Any = qp_plots.plot(qp, BOX)
+        curves = [path for path in axis.collections[0].get_paths() if len(path.vertices)]
+        spread = [np.ptp([qp.objective(point) for point in path.vertices]) for path in curves]
+        assert len(curves) >= 5
+        high = max(qp.objective(point) for path in curves for point in path.vertices)
+        assert max(spread) < 0.05 * (1.0 + abs(high))
+    plt.close("all")
+
+
+def test_problems_that_do_not_lie_in_the_plane_are_refused() -> None:
+    with raises(InputError, "QP", 3):
+        qp_plots.plot(QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0)))
+    with raises(InputError, "QP", 2, 1):
+        qp_plots.plot(QP(np.eye(2), np.zeros(2), np.eye(1, 2), np.zeros(1), *NONE))
+    refused(lambda: qp_plots.plot(table_top(), working_set=["tabel"]), UnknownNameError, "tabel", "table")
+    refused(lambda: qp_plots.plot(table_top(), (1.0, -1.0, 0.0, 2.0)), InputError, "box", 1, -1, 0, 2)

@@ -1,0 +1,134 @@
+"""The image of a picture that a notebook keeps: drawn without a browser, it shows what the page shows."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+import numpy as np
+import pytest
+import umsgpack
+from PIL import Image
+
+from floatbase.dynamics import Contacts
+from floatbase.robots import Robot, State, load
+from floatbase.simulation import Ground
+from floatbase.viewer import Viewer, shapes
+from floatbase.viewer.export.thumbnail import with_thumbnail
+from floatbase.viewer.scene.colours import ALARM, CALM, COM, MEASURED
+
+from .looks import hue_pixels
+
+KB = 1000
+
+
+def image(viewer: Viewer) -> np.ndarray:
+    """The image of a display, (height, width, 3)."""
+    data, _ = viewer._repr_mimebundle_()
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(data["image/png"]))).convert("RGB")).astype(int)
+
+
+def differing(one: np.ndarray, other: np.ndarray) -> int:
+    """How many pixels differ to the eye."""
+    return int((np.abs(one - other).max(axis=2) > 24).sum())
+
+
+def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    empty = image(viewer)
+    robot = image(viewer.show(standing, com=False))
+    assert differing(empty, robot) > 0.05 * robot[..., 0].size
+    full = image(viewer.show(standing, contacts, forces, support=True, labels=True, title="a title"))
+    for colour in (COM, MEASURED, CALM, ALARM):
+        assert hue_pixels(full, colour) > hue_pixels(robot, colour) + 50
+    lower_left = np.s_[full.shape[0] // 2 :, : full.shape[1] // 4]
+    assert differing(full[lower_left], image(viewer.show(standing, com=False))[lower_left]) > 500
+
+
+def test_what_is_nearer_hides_what_is_behind_and_translucent_things_do_not(viewer: Viewer) -> None:
+    viewer.show(viewer.robot.standing(), com=False)
+    viewer.camera("front")
+
+    def post(x: float, colour: tuple[float, float, float], radius: float = 0.08) -> shapes.Item:
+        return shapes.rod([x, 0.0, 0.2], np.eye(3), 0.2, radius, colour)
+
+    red, blue = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9)
+    viewer.draw({"far": post(-0.5, red), "near": post(0.5, blue)})
+    hidden = image(viewer)
+    viewer.draw({"far": post(-0.5, red, 0.4), "near": post(0.5, blue)})
+    beside = image(viewer)
+    assert hue_pixels(hidden, red) < 0.05 * hue_pixels(beside, red)
+    assert hue_pixels(hidden, blue) > 500
+
+
+@pytest.mark.parametrize("name", ["talos", "ur5", "solo8"])
+def test_the_image_of_any_robot_is_small(name: str) -> None:
+    viewer = Viewer(load(name))
+    viewer.show(viewer.robot.standing())
+    data, _ = viewer._repr_mimebundle_()
+    assert 5 * KB < len(data["image/png"]) < 80 * KB
+    viewer.close()
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.4])
+def test_the_image_goes_with_a_robot_that_is_followed(go2: Robot, standing: State, slope: float) -> None:
+    viewer = Viewer(go2, ground=[np.sin(slope), 0.0, np.cos(slope)], follow=True)
+    at_home = image(viewer.show(standing))
+    q = standing.q.copy()
+    q[:3] += 2.5 * np.array([np.cos(slope), 0.0, -np.sin(slope)])  # a whole jump of the grid, down the slope
+    away = image(viewer.show(State(go2, q)))
+    assert differing(at_home, away) < 0.02 * away[..., 0].size
+    viewer.close()
+
+
+def test_on_high_ground_the_image_is_the_same(go2: Robot, standing: State) -> None:
+    low, high = Viewer(go2), Viewer(go2, ground=Ground(offset=2.5))
+    images = [image(low.show(standing)), image(high.show(go2.standing(offset=2.5)))]
+    assert differing(*images) < 0.02 * images[0][..., 0].size
+    low.close()
+    high.close()
+
+
+def test_the_image_goes_on_with_the_robot_after_pictures_of_ones_own(go2: Robot, standing: State) -> None:
+    viewer = Viewer(go2, follow=True)
+    at_home = image(viewer.show(standing))
+    q = standing.q.copy()
+    q[0] += 2.5  # m, a whole jump of the grid
+    away = State(go2, q)
+    viewer.show(away)
+    viewer.play_pictures([0.0, 1.0], [viewer.painter.picture(state) for state in (standing, away)])
+    assert differing(at_home, image(viewer.show(away))) < 0.02 * at_home[..., 0].size
+    viewer.close()
+
+
+def test_another_ground_moves_the_camera_with_the_next_picture_only(go2: Robot, standing: State) -> None:
+    viewer = Viewer(go2, follow=True)
+    q = standing.q.copy()
+    q[0] += 2.5
+    viewer.show(standing).show(State(go2, q))
+    before = viewer.window.scene.newest
+    viewer.set_ground([-0.3, 0.0, 1.0])
+    assert viewer.window.scene.newest == before
+    q[2] += 2.5 * 0.3
+    raised = viewer.show(State(go2, q)).window.scene.since(before)[1]
+    assert sum(umsgpack.unpackb(command)["type"] == "set_ground" for command in raised) == 1
+    viewer.close()
+
+
+def test_several_pictures_of_a_panel_are_one_image(viewer: Viewer, standing: State) -> None:
+    viewer.show(standing)
+    one, two = viewer.widget(), viewer.widget()
+    data, _ = with_thumbnail({}, one, two)
+    both = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
+    assert both.width == 2 * Image.open(io.BytesIO(one.thumbnail)).width
+    assert with_thumbnail({"text/plain": "x"}) == ({"text/plain": "x"}, {})
+
+
+def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(
+    viewer: Viewer, standing: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLOATBASE_VIEWER", "static")
+    copy = viewer.show(standing).widget()
+    assert "<iframe" in copy.value
+    assert with_thumbnail({"text/plain": "x"}, copy) == ({"text/plain": "x", "text/html": copy.value}, {})
