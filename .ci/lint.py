@@ -130,11 +130,11 @@ def commands() -> Faults:
 
 def pages() -> Faults:
     """The pages that the code writes are up to date, and every equation has a function, a test and a lesson."""
-    from floatbase.lessons.publish import FOLDER, README, conventions, equations, lesson_table, read, readme_with_table
+    from floatbase.lessons.publish import NOTEBOOKS, README, conventions, equations, lesson_table, read_notebook, readme_with_table
 
     made = {
-        FOLDER / "equations.md": equations.table(),
-        FOLDER / "conventions.md": conventions.page(),
+        NOTEBOOKS / "equations.md": equations.table(),
+        NOTEBOOKS / "conventions.md": conventions.page(),
         README: readme_with_table(README.read_text(encoding="utf-8")),
     }
     for path, page in made.items():
@@ -147,7 +147,7 @@ def pages() -> Faults:
     taught = {name: _numbers(row) for row in lesson_table().splitlines() for name in re.findall(r"notebooks/(\w+\.ipynb)", row)}
     yield from (f"no lesson teaches {number}" for number in set(equations.TITLES) - set().union(*taught.values()))
     for name, numbers in taught.items():
-        cells = [cell.source for cell in read(FOLDER / name).cells if cell.cell_type == "markdown"]
+        cells = [cell.source for cell in read_notebook(NOTEBOOKS / name).cells if cell.cell_type == "markdown"]
         (source,) = re.findall(r"^\*\*Source\*\*.*$", "\n".join(cells), flags=re.M)
         yield from (f"the source line of {name} does not name {number}" for number in numbers - _numbers(source))
 

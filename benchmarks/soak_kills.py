@@ -18,7 +18,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from floatbase.lessons import progress
-from floatbase.lessons.publish import MINE, prepare
+from floatbase.lessons.publish import MY_FOLDER, prepare_workspace
 from floatbase.simulation import Table
 
 POINTS = 200  # of the sweep that is killed: two workers need about a second for them
@@ -43,11 +43,11 @@ def kills() -> Iterator[Callable[[], object]]:
     """`prepare` and `record`, killed at a random moment; then they run to their end, and nothing is lost."""
     dice, numbers, marks = random.Random(0), count(1), set[str]()
     with tempfile.TemporaryDirectory(prefix="floatbase-soak-") as name, patch.dict(os.environ, FLOATBASE_HOME=name):
-        course, mine = Path(name), Path(name, MINE)
+        course, mine = Path(name), Path(name, MY_FOLDER)
         for lesson in range(LESSONS):
             write(course / f"{lesson}.ipynb", ["course 0"] * CELLS)
         start = time.perf_counter()
-        prepare(course)
+        prepare_workspace(course)
         takes = time.perf_counter() - start
 
         def step() -> None:
@@ -58,9 +58,9 @@ def kills() -> Iterator[Callable[[], object]]:
                 marks.add(f"the learner's {number}")
                 path = dice.choice(sorted(mine.glob("*.ipynb")))
                 write(path, [*cells(path), f"the learner's {number}"])
-            killed(lambda tell: prepare(course), dice.uniform(0.0, takes))
+            killed(lambda tell: prepare_workspace(course), dice.uniform(0.0, takes))
             judge_copies(course, mine, marks)
-            prepare(course)
+            prepare_workspace(course)
             judge_copies(course, mine, marks, is_done=True)
             judge_tries(f"{number % 7}", dice)
 
@@ -146,7 +146,7 @@ def judge_tries(name: str, dice: random.Random) -> None:
 
     def record(tell: Callable[[], object]) -> None:
         for number in range(1000):
-            progress.record(name, right=number % 2 == 0)
+            progress.record_try(name, right=number % 2 == 0)
             tell()
 
     told = killed(record, dice.uniform(0.0, 0.01))
@@ -154,7 +154,7 @@ def judge_tries(name: str, dice: random.Random) -> None:
     now = found.pop(name, {"tries": 0})["tries"]
     assert now - before in (told, told + 1), f"{told} tries were counted before a kill, {now - before} are there after it"
     assert found == others, "a kill changed the tries of other exercises"
-    progress.record(name, right=True)
+    progress.record_try(name, right=True)
     assert progress.load()[name]["tries"] == now + 1, "after a kill a try is not counted"
 
 

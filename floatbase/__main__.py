@@ -16,7 +16,7 @@ import floatbase as fb
 if TYPE_CHECKING:
     from floatbase.playground import Playground
 
-_LOOK = 0.05  # s between looks for a page: soon enough for a reader
+_POLL_INTERVAL = 0.05  # s between looks for a page: soon enough for a reader
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,50 +44,50 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"The controller uses its {controller.backend} backend: {controller.backend_reason}.")
         return 0
     try:
-        return _view(options, sys.argv[1:] if arguments is None else arguments)
+        return _run_viewer(options, sys.argv[1:] if arguments is None else arguments)
     except fb.FloatbaseError as error:
         print(f"floatbase: {error}", file=sys.stderr)
         return 2
 
 
-def _robot(options: argparse.Namespace) -> fb.Robot:
+def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """The robot that a command line names. Raises `FloatbaseError`."""
     if not options.robot.lower().endswith((".urdf", ".xml")):
         return fb.load(options.robot)
     return fb.load_urdf(options.robot, floating=not options.fixed, feet=options.feet, foot_radius=options.foot_radius)
 
 
-def _again(given: Sequence[str], asked: int, port: int) -> str:
-    """What the page says when it has ended. given: arguments of the command line; asked: the port among them, 0 for none."""
-    command = shlex.join(["python", "-m", "floatbase", *given, *([] if asked else ["--port", str(port)])])
+def _restart_message(given: Sequence[str], requested_port: int, port: int) -> str:
+    """What the page says when it has ended. given: arguments of the command line; requested_port: the port among them, 0 for none."""
+    command = shlex.join(["python", "-m", "floatbase", *given, *([] if requested_port else ["--port", str(port)])])
     return f"This robot has gone. Start it again with\n{command}\nand this page comes back by itself."
 
 
-def start_when_seen(page: Playground, ended: threading.Event) -> None:
+def start_when_connected(page: Playground, ended: threading.Event) -> None:
     """Let the robot run once a page is connected, so that nobody finds it fallen, or paused for want of a reader."""
-    while not (page.view.window.n_pages or ended.wait(_LOOK)):
+    while not (page.view.window.n_pages or ended.wait(_POLL_INTERVAL)):
         pass
     if not ended.is_set():
         page.start()
 
 
-def _view(options: argparse.Namespace, given: Sequence[str]) -> int:
+def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
     """Show a robot until Ctrl-C or SIGTERM. given: the arguments of the command line, to be told."""
     from floatbase.playground import Playground, Settings  # loads MuJoCo and the viewer, which the other commands do without
 
     ended = threading.Event()
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        robot = _robot(options)
+        robot = _load_robot(options)
         settings = Settings(friction=(options.friction, options.friction))
         page = Playground(robot, settings, background=options.background, port=options.port)
         with closing(page):
             page.view.show(page.session.sim.state)
-            page.view.set_disconnect_message(_again(given, options.port, page.view.window.port))
+            page.view.set_disconnect_message(_restart_message(given, options.port, page.view.window.port))
             print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
                 page.view.window.open()
-            start_when_seen(page, ended)
+            start_when_connected(page, ended)
             ended.wait()
     finally:
         for number, handler in before.items():

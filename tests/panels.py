@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from floatbase.lessons import SliderPanel, stops
+from floatbase.lessons import SliderPanel, slider_samples
 
 _MADE = re.compile(r"\b(?!push_)\w+_panel\(")
 
@@ -26,14 +26,14 @@ def assert_every_slider_answers(panel: SliderPanel) -> None:
     assert any(moves) or panel.view is None, f"none of the sliders {list(panel.sliders)} changes the picture"
 
 
-def assert_every_slider_has_stops(panel: SliderPanel) -> None:
-    """A site has stops of each slider, from end to end through where it begins, few enough to be computed."""
-    found = stops.of_panel(panel)
+def assert_every_slider_has_samples(panel: SliderPanel) -> None:
+    """A site has samples of each slider, from end to end through where it begins, few enough to be computed."""
+    found = slider_samples.panel_samples(panel)
     for name, slider in panel.sliders.items():
-        assert {slider.min, slider.value, slider.max} <= set(found[name]), f"the stops of {name} are {found[name]}"
-        assert 5 <= len(found[name]) <= 25, f"{len(found[name])} stops of {name}"
-    where, together = stops.places([len(values) for values in found.values()], [0] * len(found))
-    assert len(where) <= stops.MOST and (together or len(found) > 2)
+        assert {slider.min, slider.value, slider.max} <= set(found[name]), f"the samples of {name} are {found[name]}"
+        assert 5 <= len(found[name]) <= 25, f"{len(found[name])} samples of {name}"
+    where, together = slider_samples.combinations([len(values) for values in found.values()], [0] * len(found))
+    assert len(where) <= slider_samples.MAX_COMBINATIONS and (together or len(found) > 2)
 
 
 def moved_sliders(notebook: Any) -> str:
@@ -49,7 +49,7 @@ def judge_all(count: int) -> None:
     assert len(found) == count, f"{len(found)} panels of sliders, not {count}"
     for panel in found:
         assert_every_slider_answers(panel)
-        assert_every_slider_has_stops(panel)
+        assert_every_slider_has_samples(panel)
 
 
 def _drawn(panel: SliderPanel) -> Any:

@@ -136,8 +136,8 @@ RESULTS = """
     Power Robot PushRecovery Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
-    "a widget": ("SliderPanel", "slider_panel", "push_panel", "live"),
-    "judges whatever a learner may give": ("Exercise", "Numeric", "Shaped", "check", "compare", "hand_in", "numbers", "predict",
+    "a widget": ("SliderPanel", "slider_panel", "push_panel", "live_run"),
+    "judges whatever a learner may give": ("Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in", "array_or_verdict", "predict",
         "reveal", "review"),
     "the page's server, with tests of its own": ("Window",),
     "rooms call these among themselves, with what they have checked": (
@@ -158,7 +158,7 @@ LEFT_OUT = {
     "draws what it is given": ("Viewer.draw", "Viewer.play_pictures", "prefixed", "hex_code", "robot_meshes",
     "appearance_digest"),
     "Contacts and rollout call them, and have checked": (
-        "ConstantTorques.__call__", "Torques", *(f"{kind}.{method}"
+        "ConstantTorques.__call__", "TorqueCommand", *(f"{kind}.{method}"
             for kind in ("PointContact", "FlatFootContact", "RollingWheel", "LinearConstraint")
             for method in ("positions", "jacobian", "constraint", "force_generator_matrix", "slip")),
     ),

@@ -12,7 +12,7 @@ import nbformat
 import pytest
 from browsers import browser_of_a_file, needs_chromium
 
-from floatbase.lessons.publish import FOLDER
+from floatbase.lessons.publish import NOTEBOOKS
 
 NAME = "03_feasible_space"
 # as README says: nbconvert stores the widgets' state, and a page that has it loads their code from another host
@@ -29,7 +29,7 @@ def converted(lesson: Path, to: str, *options: str) -> None:
 
 
 def test_every_picture_of_a_converted_lesson_is_there(tmp_path: Path, browser: Any) -> None:
-    lesson = Path(shutil.copy(FOLDER / f"{NAME}.ipynb", tmp_path))
+    lesson = Path(shutil.copy(NOTEBOOKS / f"{NAME}.ipynb", tmp_path))
     converted(lesson, "notebook", "--execute", "--inplace")
     notebook = nbformat.read(lesson, 4)
     assert "widgets" in notebook.metadata

@@ -40,9 +40,9 @@ from labs import (
 )
 from waiting import until
 
-from floatbase.lessons.publish import FOLDER
+from floatbase.lessons.publish import NOTEBOOKS
 
-CONFIGURATION = FOLDER.parent / ".binder" / "jupyterhub_config.py"
+CONFIGURATION = NOTEBOOKS.parent / ".binder" / "jupyterhub_config.py"
 PROXY = os.environ.get("CONFIGURABLE_HTTP_PROXY") or shutil.which("configurable-http-proxy")
 STUDENTS = ("ada", "bob")
 STANDS = 1e-3  # m: a robot that nobody pushes sways by less, one that falls goes down by 0.1 m and more

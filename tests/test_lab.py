@@ -37,7 +37,7 @@ from labs import (
     screenshot,
 )
 
-from floatbase.lessons.publish import FOLDER, MINE, prepare, read
+from floatbase.lessons.publish import MY_FOLDER, NOTEBOOKS, prepare_workspace, read_notebook
 
 LESSONS = ("00_start_here", "03_feasible_space")  # a robot that is simulated under the page; panels of many sliders
 MOVES = {LESSONS[0]: {"robot"}, LESSONS[1]: {"robot", "ghost", "planned"}}  # in their pictures; the ghost is the veil
@@ -65,8 +65,8 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A course of these lessons, prepared for a learner: without outputs, so that what is seen was made here."""
     folder = tmp_path_factory.mktemp("course")
     for name in LESSONS:
-        shutil.copy(FOLDER / f"{name}.ipynb", folder)
-    prepare(folder)
+        shutil.copy(NOTEBOOKS / f"{name}.ipynb", folder)
+    prepare_workspace(folder)
     return folder
 
 
@@ -110,7 +110,7 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
     page.set_default_timeout(1000 * LONG)
     strangers = only(page, lab)
     try:
-        page.goto(f"{lab}/lab/workspaces/{name}/tree/{MINE}/{name}.ipynb?token=a-test")
+        page.goto(f"{lab}/lab/workspaces/{name}/tree/{MY_FOLDER}/{name}.ipynb?token=a-test")
         lesson_opened(page)
         run_all(page)
         ran_without_error(page)
@@ -121,7 +121,7 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
         assert strangers == []
         page.evaluate(SAVE)
         _change(course / f"{name}.ipynb")
-        assert prepare(course) == [f"{name}.ipynb: updated"]
+        assert prepare_workspace(course) == [f"{name}.ipynb: updated"]
     finally:
         screenshot(page, f"{name.split('_')[0]}_end")
         page.evaluate("() => window.jupyterapp?.serviceManager.sessions.shutdownAll()")
@@ -129,6 +129,6 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
 
 
 def _change(lesson: Path) -> None:
-    notebook = read(lesson)
+    notebook = read_notebook(lesson)
     notebook.cells[0].source += "."
     nbformat.write(notebook, lesson)

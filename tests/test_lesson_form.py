@@ -13,17 +13,17 @@ from typing import Any
 import pytest
 
 from floatbase.lessons import all_exercises
-from floatbase.lessons.publish import FOLDER, equations, read
+from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
 
 LONGEST = 88  # characters of a line that JupyterLab shows whole in a window of 1100 px
 CLAIMS = "# claims of the text above"
-LESSONS = pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ipynb")), ids=lambda path: path.stem)
+LESSONS = pytest.mark.parametrize("path", sorted(NOTEBOOKS.glob("*.ipynb")), ids=lambda path: path.stem)
 QUESTION = re.compile(r"\*\*Predict( [^*]*)?\*\*:")
 
 
 @cache
 def cells(path: Path) -> list[Any]:
-    return list(read(path).cells)
+    return list(read_notebook(path).cells)
 
 
 def tagged(cell: Any, tag: str) -> bool:

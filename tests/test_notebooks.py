@@ -21,11 +21,11 @@ from panels import moved_sliders
 
 import floatbase as fb
 from floatbase.lessons import all_exercises, check, hand_in, progress
-from floatbase.lessons.publish import FOLDER, grades, read, run, solved
+from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook, run_and_store, with_solutions
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 HOME = 'os.environ["FLOATBASE_HOME"]'
-LESSONS = sorted(FOLDER.glob("*.ipynb"))
+LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
 LIMIT = 60.0  # s of one core: a lesson with all its answers takes up to 25, and longer where two threads share a core
 TOOK: dict[str, float] = {}  # what each run of a lesson took
 
@@ -95,7 +95,7 @@ __lessons.compare = __watched
 
 def followed_by_its_learner(path: Path) -> Any:
     """A lesson, and after it what a learner would have done: said something at each prediction, and solved all exercises."""
-    notebook, answers = read(path), solved(read(path)).cells
+    notebook, answers = read_notebook(path), with_solutions(read_notebook(path)).cells
     after = [
         f"import os; assert os.listdir({HOME}) == []  # no exercise was tried, no prediction made",
         moved_sliders(notebook),
@@ -141,7 +141,7 @@ def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
     number = path.stem.split("_")[0]
     solved_now = {name for name, entry in progress.load().items() if entry["right"]}
     assert solved_now == {name for name in all_exercises() if name.startswith(f"{number}.")}
-    marks = grades.judged(hand_in("Ada", tmp_path)).marks
+    marks = grades.grade_file(hand_in("Ada", tmp_path)).results
     assert {mark.exercise for mark in marks if mark.result in ("right", "to be read")} == solved_now, marks
 
 
@@ -155,7 +155,7 @@ def test_all_lessons_together_take_less_than_half_of_the_five_minutes() -> None:
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_stored_lesson_is_small_has_short_cells_and_holds_no_picture(path: Path) -> None:
     assert path.stat().st_size < 1_000_000
-    notebook = read(path)
+    notebook = read_notebook(path)
     assert "widgets" not in notebook.metadata
     for cell in notebook.cells:
         if cell.cell_type == "code":
@@ -167,7 +167,7 @@ def test_a_stored_lesson_is_small_has_short_cells_and_holds_no_picture(path: Pat
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
     known = all_exercises()
-    cells = {c.metadata["exercise"]: c.source for c in read(path).cells if "exercise" in c.metadata}
+    cells = {c.metadata["exercise"]: c.source for c in read_notebook(path).cells if "exercise" in c.metadata}
     number = path.stem.split("_")[0]
     assert set(cells) == {name for name in known if name.startswith(f"{number}.")}
     for name, source in cells.items():
@@ -187,8 +187,8 @@ def test_a_run_stores_what_a_lesson_prints_and_counts_no_try_of_a_learner(tmp_pa
     nbformat.write(new_notebook(cells=[new_code_cell(source) for source in (spoken, tried, shown)]), lesson)
     check("00.1", 2.0)
     before = progress.load()
-    run(lesson)
-    said, _, counted = (cell.outputs for cell in read(lesson).cells)
+    run_and_store(lesson)
+    said, _, counted = (cell.outputs for cell in read_notebook(lesson).cells)
     assert [output["text"] for output in said] == ["of the lesson\n"]
     assert counted[0].text.startswith("{'00.1': {'tries': 1, 'right': 0}}")
     assert str(progress.path()) not in counted[0].text

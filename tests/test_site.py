@@ -17,8 +17,8 @@ import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from floatbase.lessons.publish import FOLDER, equations, read
-from floatbase.lessons.publish.site import docstrings, linked, mathml, prepared, run_all
+from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
+from floatbase.lessons.publish.site import add_links, docstrings, mathml, prepare_lesson, run_lessons
 
 pytestmark = [pytest.mark.front_end, pytest.mark.timeout(600)]
 SHOWN = ["00_start_here.ipynb", "06_friction_cones.ipynb"]
@@ -31,7 +31,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A site of two lessons, as stored; the picture of its first page is run. Faults of Sphinx end it with an error."""
     folder = tmp_path_factory.mktemp("built") / "site"
     command = [sys.executable, "-m", "floatbase.lessons.publish", "site", "--stored", "--to", str(folder)]
-    done = subprocess.run([*command, *(str(FOLDER / name) for name in SHOWN)], capture_output=True, text=True)
+    done = subprocess.run([*command, *(str(NOTEBOOKS / name) for name in SHOWN)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
     return folder
@@ -178,7 +178,7 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
         new_code_cell('check("07.1", x)', metadata={"tags": ["check"]}, outputs=outputs),
         new_code_cell('review("07")', outputs=outputs),
     ]
-    made = prepared(new_notebook(cells=cells), NoPictures(), {"06": "06_cones.ipynb"})
+    made = prepare_lesson(new_notebook(cells=cells), NoPictures(), {"06": "06_cones.ipynb"})
     text, draw, asked, claims, stub, check, said = made.cells
     assert "what [(7)](#eq-7) is, as [lesson 06](06_cones.ipynb) and lesson 08 do" in text.source
     printed, scene, image = draw.outputs
@@ -196,7 +196,7 @@ def test_a_lesson_is_run_again_when_it_has_changed(tmp_path: Path) -> None:
     for printed in ("once", "once", "twice"):
         nbformat.write(new_notebook(cells=[new_code_cell(f"print({printed!r})", id="a")]), lesson)
         before = set(kept.glob("*"))
-        ran = run_all([lesson], kept)[lesson]
+        ran = run_lessons([lesson], kept)[lesson]
         assert ran.cells[0].outputs[0].text == f"{printed}\n" and len(ran.cells) == 1
         assert (set(kept.glob("*")) == before) == (printed == "once" and bool(before))
     assert len(list(kept.iterdir())) == 1
@@ -204,15 +204,15 @@ def test_a_lesson_is_run_again_when_it_has_changed(tmp_path: Path) -> None:
 
 def test_links_leave_code_formulas_and_links_as_they_are() -> None:
     for text in ("`f(7)`", "$h (7)$", "$$x (7)\n(8)$$", "[as (7)](x.md)", "```\n(7)\n```", "## On (7)", "f(7)", "(99)"):
-        assert linked(text, {}) == text
-    assert linked("(26)(27), §4.1, App. A, note 12", {}) == (
+        assert add_links(text, {}) == text
+    assert add_links("(26)(27), §4.1, App. A, note 12", {}) == (
         "[(26)](#eq-26)[(27)](#eq-27), [§4.1](#sec-4-1), [App. A](#app-a), [note 12](#notes-of-the-document)"
     )
 
 
 def test_a_docstring_becomes_text_lists_and_links() -> None:
     text = "(9) ζ of A * b_i by `Contacts`. mu: of friction. a, b: two\n    lines.\n\nx: no parameter.\n\n    code = 1\n"
-    made = docstrings.restructured(text, ["mu", "a", "b"])
+    made = docstrings.to_restructured_text(text, ["mu", "a", "b"])
     assert ":ref:`(9) <eq-9>`" in made
     assert r"A \* b\_i" in made and ":py:obj:`Contacts <floatbase.dynamics.Contacts>`" in made
     assert "* ``mu``: of friction.\n* ``a``, ``b``: two lines." in made
@@ -220,7 +220,7 @@ def test_a_docstring_becomes_text_lists_and_links() -> None:
 
 
 def test_every_formula_of_the_course_becomes_mathml() -> None:
-    texts = [cell.source for path in FOLDER.glob("*.ipynb") for cell in read(path).cells if cell.cell_type == "markdown"]
+    texts = [cell.source for path in NOTEBOOKS.glob("*.ipynb") for cell in read_notebook(path).cells if cell.cell_type == "markdown"]
     plain = "\n\n".join(re.sub(r"`[^`\n]*`", "", text) for text in [*texts, equations.table()])
     found = re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", plain, re.DOTALL)
     assert len(found) > 300

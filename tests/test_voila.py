@@ -19,7 +19,7 @@ from browsers import browser_of_a_file, needs_chromium
 from labs import HEIGHT, LONG, WINDOW, answers, free_ports, only, picture_in, push_panel_of, push_until_it_falls, screenshot
 from waiting import until
 
-from floatbase.lessons.publish import FOLDER, read
+from floatbase.lessons.publish import NOTEBOOKS, read_notebook
 
 SINKS = 0.02  # m: by 49 mm, where the robot carries half its mass more than its controller knows
 PLAYGROUND = 'from floatbase.playground import playground\nplayground("go2")'
@@ -38,7 +38,7 @@ pytestmark = [
 def voila(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a Voilà that serves lesson 00 with a playground at its end."""
     home = tmp_path_factory.mktemp("voila")
-    lesson = read(FOLDER / "00_start_here.ipynb")
+    lesson = read_notebook(NOTEBOOKS / "00_start_here.ipynb")
     lesson.cells.append(nbformat.v4.new_code_cell(PLAYGROUND))
     nbformat.write(lesson, home / "lesson.ipynb")
     environment = {**os.environ, "JUPYTER_CONFIG_DIR": str(home), "JUPYTER_DATA_DIR": str(home), "HOME": str(home)}

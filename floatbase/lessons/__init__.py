@@ -5,24 +5,39 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from floatbase.lessons import progress
-from floatbase.lessons.controllers import ConstantTorques, Torques, joint_servo
-from floatbase.lessons.exercises import Exercise, Numeric, Shaped, Verdict, all_exercises, check, numbers, reveal, show_progress
+from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
+from floatbase.lessons.exercises import (
+    Exercise,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    all_exercises,
+    array_or_verdict,
+    check,
+    reveal,
+    show_progress,
+)
 from floatbase.lessons.predictions import compare, predict, review
-from floatbase.lessons.rounding import about
+from floatbase.lessons.rounding import rounded
 
 if TYPE_CHECKING:
-    from floatbase.lessons import props, qp_plots, static_export, stops
+    from floatbase.lessons import props, qp_plots, slider_samples, static_export
     from floatbase.lessons.figures import FIGURES
-    from floatbase.lessons.handing_in import hand_in
-    from floatbase.lessons.panels import SliderPanel, live, push_panel, slider_panel
-    from floatbase.lessons.roses import draw_roses, measured_rose, plot_roses, rose_controller
+    from floatbase.lessons.panels import SliderPanel, live_run, push_panel, slider_panel
+    from floatbase.lessons.push_recovery import (
+        controller_factory,
+        draw_push_recovery,
+        measured_push_recovery,
+        plot_push_recovery,
+    )
+    from floatbase.lessons.submission import hand_in
 
 # imported at first use: they load physics and pictures
 _LAZY = {
-    "hand_in": "handing_in",
-    **dict.fromkeys(("SliderPanel", "live", "push_panel", "slider_panel"), "panels"),
-    **dict.fromkeys(("draw_roses", "measured_rose", "plot_roses", "rose_controller"), "roses"),
-    "stops": "stops",
+    "hand_in": "submission",
+    **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
+    **dict.fromkeys(("draw_push_recovery", "measured_push_recovery", "plot_push_recovery", "controller_factory"), "push_recovery"),
+    "slider_samples": "slider_samples",
     "FIGURES": "figures",
     **{name: name for name in ("props", "qp_plots", "static_export")},
 }
@@ -31,22 +46,22 @@ __all__ = [
     "FIGURES",
     "ConstantTorques",
     "Exercise",
-    "Numeric",
-    "Shaped",
+    "NumericJudge",
+    "ShapeJudge",
     "SliderPanel",
-    "Torques",
+    "TorqueCommand",
     "Verdict",
-    "about",
     "all_exercises",
+    "array_or_verdict",
     "check",
     "compare",
-    "draw_roses",
+    "controller_factory",
+    "draw_push_recovery",
     "hand_in",
     "joint_servo",
-    "live",
-    "measured_rose",
-    "numbers",
-    "plot_roses",
+    "live_run",
+    "measured_push_recovery",
+    "plot_push_recovery",
     "predict",
     "progress",
     "props",
@@ -54,11 +69,11 @@ __all__ = [
     "qp_plots",
     "reveal",
     "review",
-    "rose_controller",
+    "rounded",
     "show_progress",
     "slider_panel",
+    "slider_samples",
     "static_export",
-    "stops",
 ]  # fmt: skip
 
 

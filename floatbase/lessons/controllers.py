@@ -12,11 +12,11 @@ from floatbase._validation import Array, as_array, as_callable, as_instance, as_
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
 
-_STEP = 1e-4  # s to each side for the central difference of a path: smooth over a second, it is off by 1e-8 of its velocity
+_DIFFERENCE_STEP = 1e-4  # s to each side for the central difference of a path: smooth over a second, it is off by 1e-8 of its velocity
 
 
 @dataclass(frozen=True, eq=False)
-class Torques:
+class TorqueCommand:
     """What a rollout reads from a controller's answer.
 
     tau: shape (d,), N·m. forces: the contact forces that the controller predicts, shape (k,), N, world; None without a
@@ -46,9 +46,9 @@ class ConstantTorques:
         self.contacts = None if contacts is None else as_instance("contacts", contacts, Contacts)
         self._predict = None if predict is None else as_callable("predict", predict, "predict(q, v)")
 
-    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques, and the prediction for configuration q and velocity v."""
-        return Torques(self.tau, self._predict(q, v) if self._predict is not None else None)
+        return TorqueCommand(self.tau, self._predict(q, v) if self._predict is not None else None)
 
 
 def joint_servo(
@@ -57,7 +57,7 @@ def joint_servo(
     path: Callable[[float], Array] | None = None,
     stiffness: float = 100.0,
     damping: float = 10.0,
-) -> Callable[[Array, Array, float], Torques]:
+) -> Callable[[Array, Array, float], TorqueCommand]:
     """A controller that knows joints only: τ = tau - stiffness · (position error) - damping · (velocity error), per joint.
 
     state: its joints are the desired ones.
@@ -68,13 +68,13 @@ def joint_servo(
     """
     d = as_instance("state", state, State).robot.d
     joints = slice(state.robot.nv - d, None)
-    steady = np.zeros(d) if tau is None else as_array("tau", tau, (d,), "N·m")
+    holding_torques = np.zeros(d) if tau is None else as_array("tau", tau, (d,), "N·m")
     stiffness, damping = as_positive("stiffness", stiffness, allow_zero=True), as_positive("damping", damping, allow_zero=True)
     offset = as_callable("path", path, "path(t)") if path is not None else lambda t: np.zeros(d)
 
-    def controller(q: Array, v: Array, t: float) -> Torques:
-        rate = (offset(t + _STEP) - offset(t - _STEP)) / (2.0 * _STEP)
+    def controller(q: Array, v: Array, t: float) -> TorqueCommand:
+        rate = (offset(t + _DIFFERENCE_STEP) - offset(t - _DIFFERENCE_STEP)) / (2.0 * _DIFFERENCE_STEP)
         error = -state.difference(q)[joints] - offset(t)
-        return Torques(steady - stiffness * error - damping * (v[joints] - rate))
+        return TorqueCommand(holding_torques - stiffness * error - damping * (v[joints] - rate))
 
     return controller

@@ -21,10 +21,10 @@ from floatbase._validation import MAX_MAGNITUDE, Array
 from floatbase.affine import Quadratic
 from floatbase.errors import FloatbaseError, unknown_name
 from floatbase.lessons import progress
-from floatbase.lessons.rounding import about
+from floatbase.lessons.rounding import rounded
 
-TRIES = 2  # so many before `reveal` shows a solution
-NEAR = 0.02  # of the right value: as much as a number with two digits may spoil
+TRIES_BEFORE_REVEAL = 2  # so many before `reveal` shows a solution
+NEAR_MISS = 0.02  # of the right value: as much as a number with two digits may spoil
 Example: TypeAlias = tuple[Any, str]  # an answer, and the name of the hint that it must get; "" where it is right
 
 
@@ -46,7 +46,7 @@ class Verdict:
 NO_ANSWER = Verdict(False, "There is no answer yet: replace the placeholder by your expression.", "no_answer")
 
 
-def least_point(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
+def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
     """The least point, (n,), of a cost that a learner gives, or a `Verdict` that says what is wrong with the cost.
 
     answer: whatever a learner may give. n: how many numbers it is to be on. block: their name. hint: where they are others.
@@ -64,7 +64,7 @@ def least_point(answer: Any, n: int, block: str, hint: str = "") -> Array | Verd
         return Verdict(False, f"It has no least point: {error}", "no_least_point")
 
 
-def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
+def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
     """The answer as an array of finite numbers in one of `shapes`, or a `Verdict` that says what is wrong with it.
 
     answer: whatever a learner may give. shapes: those allowed; a message names the first.
@@ -79,13 +79,13 @@ def numbers(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
     if given is None:
         return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.", "not_numbers")
     if given.shape not in shapes:
-        return Verdict(False, _wrong_shape(given.shape, shapes[0]), "shape")
+        return Verdict(False, _shape_error(given.shape, shapes[0]), "shape")
     if not np.all(np.abs(given) <= MAX_MAGNITUDE):
         return Verdict(False, "The answer holds numbers that are not finite, or far too large.", "not_finite")
     return given
 
 
-def _wrong_shape(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
+def _shape_error(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
     if not expected:
         return f"The answer is one number; this has shape {given}."
     if not given:
@@ -95,9 +95,9 @@ def _wrong_shape(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
     return f"The answer has shape {given}; it should have shape {expected}.{column}"
 
 
-def vector_text(vector: npt.ArrayLike, digits: int = 0) -> str:
-    """A vector as text, such as "(1, 0, -2)", by `about`, but with so many decimals at most."""
-    return about(np.round(np.asarray(vector, dtype=np.float64), digits), digits=12, floor=0.0)
+def format_vector(vector: npt.ArrayLike, digits: int = 0) -> str:
+    """A vector as text, such as "(1, 0, -2)", by `rounded`, but with so many decimals at most."""
+    return rounded(np.round(np.asarray(vector, dtype=np.float64), digits), digits=12, floor=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class Exercise:
     judge: answer -> `Verdict`.
     examples: gives answers, and the names of the hints that they must get, beside those that the judge gives itself.
     explanation: why the solution is right, shown with it.
-    names: gives what the stub uses of the lesson, name -> value; numpy it has.
+    namespace: gives what the stub uses of the lesson, name -> value; numpy it has.
     """
 
     name: str
@@ -120,13 +120,13 @@ class Exercise:
     solution: str
     judge: Callable[[Any], Verdict]
     explanation: str = ""
-    names: Callable[[], Mapping[str, Any]] = dict
+    namespace: Callable[[], Mapping[str, Any]] = dict
     examples: Callable[[], Iterable[Example]] = tuple
 
     def placeholder(self) -> Any:
         """What stands there before anybody answers: the stub's variable, or a tuple of them."""
         made: dict[str, Any] = {}
-        exec(self.stub, {"np": np, **self.names()}, made)
+        exec(self.stub, {"np": np, **self.namespace()}, made)
         return tuple(made.values()) if len(made) > 1 else next(iter(made.values()))
 
 
@@ -140,7 +140,7 @@ _GENERAL = {
 
 
 @dataclass(frozen=True, eq=False)
-class Numeric:
+class NumericJudge:
     """A judge of numbers and arrays.
 
     right: computes the right value.
@@ -148,7 +148,7 @@ class Numeric:
     mistakes: name of a hint -> computes the value that this kind of mistake leads to.
     hints: the same names -> what is said then.
     tolerance: values whose difference is less than this part of the right value's largest number count as equal.
-    count: the answer is a number of things, without sign or unit.
+    is_count: the answer is a number of things, without sign or unit.
     """
 
     right: Callable[[], Any]
@@ -156,11 +156,11 @@ class Numeric:
     mistakes: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
     hints: Mapping[str, str] = field(default_factory=dict)
     tolerance: float = 1e-3
-    count: bool = False
+    is_count: bool = False
 
     def __call__(self, answer: Any) -> Verdict:
         right = np.asarray(self.right(), dtype=np.float64)
-        given = numbers(answer, right.shape)
+        given = array_or_verdict(answer, right.shape)
         if isinstance(given, Verdict):
             return given
         if self._equal(given, right):
@@ -178,9 +178,9 @@ class Numeric:
 
     def _of_any_answer(self, given: Array, right: Array) -> str:
         """The hint, one of `_GENERAL`, for a wrong answer that is none of the known mistakes."""
-        if self.count:
+        if self.is_count:
             return "unknown_count"
-        if self._equal(given, right, NEAR):
+        if self._equal(given, right, NEAR_MISS):
             return "nearly"
         if self._equal(given, -right):
             return "sign"
@@ -190,12 +190,12 @@ class Numeric:
 
     def _equal(self, a: Any, b: Any, tolerance: float = 0.0) -> bool:
         """Whether they differ by less than this part of b's largest number, or than `self.tolerance`, if that is more."""
-        b, part = np.asarray(b, dtype=np.float64), max(tolerance, self.tolerance)
-        return a.shape == b.shape and bool(np.max(np.abs(a - b)) <= part * (1e-9 + np.max(np.abs(b))))
+        b, relative = np.asarray(b, dtype=np.float64), max(tolerance, self.tolerance)
+        return a.shape == b.shape and bool(np.max(np.abs(a - b)) <= relative * (1e-9 + np.max(np.abs(b))))
 
 
 @dataclass(frozen=True, eq=False)
-class Shaped:
+class ShapeJudge:
     """A judge that knows what a wrong shape means, and leaves other shapes to `judge`.
 
     shapes: shape -> what is said of it. The hint's name is made of it, such as "shape_4x3", or "shape_" of one number.
@@ -238,18 +238,18 @@ def check(name: str, answer: Any) -> Verdict:
 
     Raises `UnknownNameError` for a name that does not exist.
     """
-    exercise = _exercise(name)
+    exercise = _find_exercise(name)
     verdict = exercise.judge(answer)
-    if answer is not None and answer is not Ellipsis and not _same(answer, exercise.placeholder()):
-        progress.record(name, verdict.right, answer)
+    if answer is not None and answer is not Ellipsis and not _is_placeholder(answer, exercise.placeholder()):
+        progress.record_try(name, verdict.right, answer)
     return verdict
 
 
 def reveal(name: str) -> None:
     """Print the solution of an exercise and why, once it has been tried twice or solved."""
-    exercise, tried = _exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
-    if tried["tries"] < TRIES and not tried["right"]:
-        remaining = TRIES - tried["tries"]
+    exercise, tried = _find_exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
+    if tried["tries"] < TRIES_BEFORE_REVEAL and not tried["right"]:
+        remaining = TRIES_BEFORE_REVEAL - tried["tries"]
         print(f'Try {"once" if remaining == 1 else "twice"} more first: run check("{name}", …) on an answer of your own.')
         return
     print(exercise.solution)
@@ -260,39 +260,39 @@ def reveal(name: str) -> None:
 def show_progress() -> None:
     """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried; and why tries cannot be kept, if so."""
     tried, known = progress.load(), all_exercises()
-    marks = {name: _mark(tried.get(name)) for name in known}
+    marks = {name: _progress_mark(tried.get(name)) for name in known}
     for lesson in sorted({name.split(".")[0] for name in known}):
         here = [name for name in known if name.startswith(f"{lesson}.")]
         print(f"lesson {lesson}  " + "  ".join(f"{name} {marks[name]}" for name in here))
     print(f"solved: {sum(mark == '✓' for mark in marks.values())} of {len(known)}")
-    if obstacle := progress.obstacle():
-        print(obstacle)
+    if problem := progress.storage_problem():
+        print(problem)
 
 
-def _same(answer: Any, placeholder: Any) -> bool:
+def _is_placeholder(answer: Any, placeholder: Any) -> bool:
     """Whether an answer is the placeholder still, up to the rounding of another machine; a function by its code."""
     if isinstance(placeholder, FunctionType):
-        return _code(answer) == _code(placeholder)
+        return _bytecode(answer) == _bytecode(placeholder)
     if isinstance(placeholder, list) and all(isinstance(part, str) for part in placeholder):
         return isinstance(answer, list) and list(map(str, answer)) == placeholder
     if isinstance(placeholder, Quadratic):
         parts = ("H", "g", "c")
-        return isinstance(answer, Quadratic) and all(_same(getattr(answer, p), getattr(placeholder, p)) for p in parts)
-    given = numbers(answer, np.shape(placeholder))
+        return isinstance(answer, Quadratic) and all(_is_placeholder(getattr(answer, p), getattr(placeholder, p)) for p in parts)
+    given = array_or_verdict(answer, np.shape(placeholder))
     return not isinstance(given, Verdict) and np.allclose(given, placeholder, rtol=1e-6, atol=1e-6)
 
 
-def _code(function: Any) -> tuple[Any, ...] | None:
+def _bytecode(function: Any) -> tuple[Any, ...] | None:
     """What a function does, whatever it is called and wherever it stands; None for anything but a function in Python."""
     code = getattr(function, "__code__", None)
     return code and (code.co_code, code.co_consts, code.co_names, code.co_varnames)
 
 
-def _mark(tried: dict[str, int] | None) -> str:
+def _progress_mark(tried: dict[str, int] | None) -> str:
     return "·" if tried is None else "✓" if tried["right"] else "✗"
 
 
-def _exercise(name: str) -> Exercise:
+def _find_exercise(name: str) -> Exercise:
     known = all_exercises()
     if name not in known:
         raise unknown_name("exercise", name, known)

@@ -13,13 +13,13 @@ import numpy as np
 from floatbase._validation import MAX_MAGNITUDE, as_string, numeric_copy
 from floatbase.errors import InputError
 from floatbase.lessons import progress
-from floatbase.lessons.rounding import about
+from floatbase.lessons.rounding import rounded
 
-_SAID = 6  # digits of what the learner said: as it was typed
+_ANSWER_DIGITS = 6  # digits of what the learner said: as it was typed
 _RIGHT = "right"
 # of this process: units of what was asked, and what could not be kept
 _units: dict[str, str] = {}
-_unkept: dict[str, dict[str, Any]] = {}
+_unsaved: dict[str, dict[str, Any]] = {}
 
 
 def predict(name: str, *answer: Any, unit: str = "", choices: Sequence[str] = (), count: int = 1) -> None:
@@ -35,18 +35,18 @@ def predict(name: str, *answer: Any, unit: str = "", choices: Sequence[str] = ()
     stored = progress.predictions().get(name, {})
     given = answer[0] if len(answer) == 1 else list(answer) or ...
     if given is None or given is Ellipsis:
-        before = (stored | _unkept.get(name, {})).get("said")
-        told = f"you said {_quoted(before, unit)}, and that stands." if before is not None else "skipped. Running on is fine."
+        before = (stored | _unsaved.get(name, {})).get("said")
+        told = f"you said {_quoted_answer(before, unit)}, and that stands." if before is not None else "skipped. Running on is fine."
         print(f"{name}: {told}")
         return
     try:
-        said = _chosen(given, tuple(choices)) if choices else _numbers(given, unit, count)
+        said = _match_choice(given, tuple(choices)) if choices else _parse_numbers(given, unit, count)
     except InputError as error:
         print(f"{name}: {error} Or leave ... there and run on.")
         return
-    print(f"{name}: you say {_quoted(said, unit)}.")
-    if obstacle := _keep(name, {"said": said, "unit": unit}, stored):
-        print(obstacle)
+    print(f"{name}: you say {_quoted_answer(said, unit)}.")
+    if problem := _save(name, {"said": said, "unit": unit}, stored):
+        print(problem)
 
 
 def compare(name: str, value: Any) -> None:
@@ -56,19 +56,19 @@ def compare(name: str, value: Any) -> None:
     other with two significant digits. Raises `InputError` for anything else.
     """
     as_string("name of a prediction", name)
-    result: Any = value if isinstance(value, str) else _rounded(value)
+    result: Any = value if isinstance(value, str) else _stored_result(value)
     stored = progress.predictions().get(name, {})
-    known = stored | _unkept.get(name, {})
+    known = stored | _unsaved.get(name, {})
     unit = _units.get(name, known.get("unit", ""))
-    shown = value if isinstance(value, str) else _as_result(value, unit)
+    shown = value if isinstance(value, str) else _format_result(value, unit)
     if "said" not in known:
         print(f"{name}: {shown}")
         return
-    off = _how_far(known["said"], result, unit)
-    beside = f"; you said {_quoted(known['said'], unit)}{off and f', {off}'}"
+    off = _describe_error(known["said"], result, unit)
+    beside = f"; you said {_quoted_answer(known['said'], unit)}{off and f', {off}'}"
     print(f"{name}: {shown}{', as you said' if off == _RIGHT else beside}")
     if isinstance(value, str) or np.all(np.isfinite(result)):
-        _keep(name, {"is": result}, stored)
+        _save(name, {"is": result}, stored)
 
 
 def review(lesson: str = "") -> None:
@@ -80,13 +80,13 @@ def review(lesson: str = "") -> None:
     if len(lesson) == 1:  # 2 is lesson 02, and c is lesson C
         lesson = f"0{lesson}" if lesson.isdigit() else lesson.upper()
     stored = progress.predictions()
-    known = {name: stored.get(name, {}) | _unkept.get(name, {}) for name in sorted({*stored, *_unkept})}
+    known = {name: stored.get(name, {}) | _unsaved.get(name, {}) for name in sorted({*stored, *_unsaved})}
     rows = [("", "you said", "it is", "")]
     for name, entry in known.items():
         if "said" in entry and lesson in ("", name, name.split(".")[0]):
             said, result, unit = entry["said"], entry.get("is"), entry.get("unit", "")
-            shown, off = ("not seen yet", "") if result is None else (_as_result(result, unit), _how_far(said, result, unit))
-            rows.append((name, _as_said(said, unit), shown, off))
+            shown, off = ("not seen yet", "") if result is None else (_format_result(result, unit), _describe_error(said, result, unit))
+            rows.append((name, _format_answer(said, unit), shown, off))
     if len(rows) == 1:
         print(f"Nothing was predicted{f' in lesson {lesson}' if lesson else ''} yet.")
         return
@@ -95,41 +95,41 @@ def review(lesson: str = "") -> None:
         print("   ".join(f"{part:{width}}" for part, width in zip(row, widths, strict=True)).rstrip())
 
 
-def _how_far(said: Any, result: Any, unit: str) -> str:
+def _describe_error(said: Any, result: Any, unit: str) -> str:
     """How far what was said is from the result, in words; "" where that cannot be told."""
     if isinstance(said, str) or isinstance(result, str):
         return _RIGHT if str(said).casefold() == str(result).casefold() else ""
     if np.shape(said) != np.shape(result):
         return ""
     if isinstance(result, list):
-        right = [_how_far(a, b, unit) for a, b in zip(said, result, strict=True)].count(_RIGHT)
+        right = [_describe_error(a, b, unit) for a, b in zip(said, result, strict=True)].count(_RIGHT)
         return _RIGHT if right == len(result) else f"{right} of {len(result)} right"
     if isinstance(result, int) and not unit:  # a count
-        missed = about(abs(said - result), digits=_SAID)
+        missed = rounded(abs(said - result), digits=_ANSWER_DIGITS)
         return _RIGHT if said == result else f"{missed} too {'many' if said > result else 'few'}"
-    texts = (about(said), about(result))
+    texts = (rounded(said), rounded(result))
     if texts[0] == texts[1]:
         return _RIGHT
     if "0" in texts or not np.isfinite(result):
         return ""
-    part = about(said / result)
+    part = rounded(said / result)
     if said / result < 0:
         return "the other way"
     return "nearly" if part == "1" else f"{part} of it" if said / result < 1 else f"{part} times as much"
 
 
-def _keep(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
+def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
     """Keep what is new. Where it cannot be kept it lives as long as this process; what prevented it, or ""."""
-    entry = _unkept.pop(name, {}) | entry
+    entry = _unsaved.pop(name, {}) | entry
     if all(stored.get(key) == value for key, value in entry.items()):
         return ""
-    obstacle = progress.keep(name, entry)
-    if obstacle:
-        _unkept[name] = entry
-    return obstacle
+    problem = progress.append(name, entry)
+    if problem:
+        _unsaved[name] = entry
+    return problem
 
 
-def _chosen(answer: Any, choices: Sequence[str]) -> str:
+def _match_choice(answer: Any, choices: Sequence[str]) -> str:
     """The one of `choices` that an answer means."""
     listed = ", ".join(f'"{choice}"' for choice in choices)
     if not isinstance(answer, str) or not answer.strip():
@@ -143,7 +143,7 @@ def _chosen(answer: Any, choices: Sequence[str]) -> str:
     raise InputError(f'"{answer.strip()[:40]}" {fault} {listed}.')
 
 
-def _numbers(answer: Any, unit: str, count: int) -> Any:
+def _parse_numbers(answer: Any, unit: str, count: int) -> Any:
     """A learner's number, or list of numbers."""
     given = numeric_copy(answer)
     wanted = "one number" if count == 1 else f"a list of {count} numbers"
@@ -159,7 +159,7 @@ def _numbers(answer: Any, unit: str, count: int) -> Any:
     return said if count > 1 else said[0]
 
 
-def _rounded(value: Any) -> Any:
+def _stored_result(value: Any) -> Any:
     """A result as it is kept: whole numbers whole, others to six digits, which are the same on every processor; lists flat."""
     given = numeric_copy(value)
     if given is None:
@@ -169,15 +169,15 @@ def _rounded(value: Any) -> Any:
     return kept if np.ndim(given) else kept[0]
 
 
-def _as_result(value: Any, unit: str) -> str:
+def _format_result(value: Any, unit: str) -> str:
     if isinstance(value, str):
         return value
-    return about(value, unit, digits=12 if np.asarray(value).dtype.kind in "iu" else 2)
+    return rounded(value, unit, digits=12 if np.asarray(value).dtype.kind in "iu" else 2)
 
 
-def _as_said(said: Any, unit: str) -> str:
-    return said if isinstance(said, str) else about(said, unit, digits=_SAID, floor=0.0)
+def _format_answer(said: Any, unit: str) -> str:
+    return said if isinstance(said, str) else rounded(said, unit, digits=_ANSWER_DIGITS, floor=0.0)
 
 
-def _quoted(said: Any, unit: str) -> str:
-    return f'"{said}"' if isinstance(said, str) else _as_said(said, unit)
+def _quoted_answer(said: Any, unit: str) -> str:
+    return f'"{said}"' if isinstance(said, str) else _format_answer(said, unit)

@@ -17,9 +17,9 @@ from typing import Any
 from floatbase._validation import MAX_MAGNITUDE, numeric_copy
 from floatbase.affine import Quadratic
 
-_NAME = "progress.jsonl"
-_LONGEST = 100_000  # characters of an answer that is kept; the longest right one of the course takes less than 20 000
-_BEFORE = "progress.json"  # one object for all tries, written by floatbase up to 0.2.0: read, and left as it is
+_FILE_NAME = "progress.jsonl"
+_MAX_ANSWER_LENGTH = 100_000  # characters of an answer that is kept; the longest right one of the course takes less than 20 000
+_OLD_FILE_NAME = "progress.json"  # one object for all tries, written by floatbase up to 0.2.0: read, and left as it is
 
 
 def path() -> Path:
@@ -27,33 +27,33 @@ def path() -> Path:
 
     Raises `RuntimeError` where there is no home folder either.
     """
-    return Path(os.environ.get("FLOATBASE_HOME") or Path.home() / ".floatbase") / _NAME
+    return Path(os.environ.get("FLOATBASE_HOME") or Path.home() / ".floatbase") / _FILE_NAME
 
 
 def load() -> dict[str, dict[str, int]]:
     """For each exercise that was tried: {"tries": n, "right": m}. What is damaged is left out, the rest is counted."""
     tried: dict[str, dict[str, int]] = {}
-    for text in _texts():
-        for name, tries, right in _counts(text):
+    for text in _lines():
+        for name, tries, right in _try_counts(text):
             entry = tried.setdefault(name, {"tries": 0, "right": 0})
             entry["tries"] += tries
             entry["right"] += right
     return tried
 
 
-def record(name: str, right: bool, answer: Any = None) -> None:
+def record_try(name: str, right: bool, answer: Any = None) -> None:
     """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten, without an error.
 
     answer: what was answered; it is kept as the numbers or names that it is, or as the text of a function, and is never run.
     """
-    keep(name, {"tries": 1, "right": int(right), "answer": as_json(answer)})
+    append(name, {"tries": 1, "right": int(right), "answer": as_json(answer)})
 
 
 def answers() -> dict[str, Any]:
     """For each exercise that was tried: the last right answer `as_json`, or where none was right the last."""
     found: dict[str, Any] = {}
     solved = set()
-    for text in _texts():
+    for text in _lines():
         for name, entry in _entries(text):
             right = entry.get("right") == 1
             if "answer" in entry and (right or name not in solved):
@@ -63,9 +63,9 @@ def answers() -> dict[str, Any]:
 
 
 def predictions() -> dict[str, dict[str, Any]]:
-    """For each prediction: {"said": …, "unit": …, "is": …}, the latest of each, as far as there is one; see `keep`."""
+    """For each prediction: {"said": …, "unit": …, "is": …}, the latest of each, as far as there is one; see `append`."""
     found: dict[str, dict[str, Any]] = {}
-    for text in _texts():
+    for text in _lines():
         for name, entry in _entries(text):
             usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text}
             kept = {key: entry[key] for key, fits in usable.items() if key in entry and fits(entry[key])}
@@ -74,18 +74,18 @@ def predictions() -> dict[str, dict[str, Any]]:
     return found
 
 
-def keep(name: str, entry: dict[str, Any]) -> str:
+def append(name: str, entry: dict[str, Any]) -> str:
     """Add a line about the exercise or prediction `name`; what prevented it, and what to do, or "".
 
     entry: of a prediction "said" and "is" are a number, a list of numbers or a text; "unit" is a text.
     """
     # the line end comes first: a line that a full disk cut short before this one stays alone
-    return _append(("\n" + json.dumps({name: entry})).encode())
+    return _append_line(("\n" + json.dumps({name: entry})).encode())
 
 
-def obstacle() -> str:
+def storage_problem() -> str:
     """Why tries and predictions cannot be kept, and what to do; "" where they can. Makes no file."""
-    return _append(b"")
+    return _append_line(b"")
 
 
 def as_json(answer: Any) -> Any:
@@ -95,7 +95,7 @@ def as_json(answer: Any) -> Any:
     """
     try:
         kept = _as_json(answer)
-        fits = len(json.dumps(kept)) <= _LONGEST
+        fits = len(json.dumps(kept)) <= _MAX_ANSWER_LENGTH
     except RecursionError:  # a list that holds itself
         fits = False
     return kept if fits else {"too long": type(answer).__name__}
@@ -112,10 +112,10 @@ def _as_json(answer: Any) -> Any:
         return array.tolist()
     if isinstance(answer, list):
         return [_as_json(part) for part in answer]
-    return {"code": _code(answer)} if callable(answer) else {"other": type(answer).__name__}
+    return {"code": _source_of(answer)} if callable(answer) else {"other": type(answer).__name__}
 
 
-def _code(function: Any) -> str:
+def _source_of(function: Any) -> str:
     try:
         return inspect.getsource(function)
     except (OSError, TypeError):
@@ -133,7 +133,7 @@ def from_json(kept: Any) -> Any:
     return kept
 
 
-def _append(line: bytes) -> str:
+def _append_line(line: bytes) -> str:
     """Write a line at the end of the file; what prevented it, or "". Without a line only whether one could be written."""
     lost, advice = "Tries and predictions cannot be kept", "Set FLOATBASE_HOME to a folder that you may write to"
     try:
@@ -153,10 +153,10 @@ def _append(line: bytes) -> str:
     return ""
 
 
-def _texts() -> Iterator[bytes]:
+def _lines() -> Iterator[bytes]:
     """Each is an object of counts: all of the file from before, then line by line what came since."""
-    yield _read(_BEFORE)
-    yield from _read(_NAME).split(b"\n")
+    yield _read(_OLD_FILE_NAME)
+    yield from _read(_FILE_NAME).split(b"\n")
 
 
 def _read(name: str) -> bytes:
@@ -175,7 +175,7 @@ def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:
     yield from ((name, entry) for name, entry in found.items() if isinstance(entry, dict)) if isinstance(found, dict) else ()
 
 
-def _counts(text: bytes) -> Iterator[tuple[str, int, int]]:
+def _try_counts(text: bytes) -> Iterator[tuple[str, int, int]]:
     """Name, tries and right ones of each exercise in a text of any form."""
     for name, entry in _entries(text):
         tries, right = entry.get("tries"), entry.get("right")

@@ -10,12 +10,12 @@ import numpy as np
 from floatbase._validation import as_integer, as_positive, as_string, numeric_copy, short_repr
 from floatbase.errors import InputError
 
-_PLAIN = range(-4, 6)  # exponents of ten that are written out; larger and smaller numbers are written as 1.6e7
-_NOISE = 1e-6  # of an array's largest entry: a smaller one is what rounding has left of a zero
-_GUARD = 4  # digits more that are rounded to first: 12.5 and what another processor makes of it, 12.4999999, both give 13
+_PLAIN_EXPONENTS = range(-4, 6)  # exponents of ten that are written out; larger and smaller numbers are written as 1.6e7
+_RELATIVE_NOISE = 1e-6  # of an array's largest entry: a smaller one is what rounding has left of a zero
+_GUARD_DIGITS = 4  # digits more that are rounded to first: 12.5 and what another processor makes of it, 12.4999999, both give 13
 
 
-def about(x: Any, unit: str = "", digits: int = 2, floor: float = 1e-6) -> str:
+def rounded(x: Any, unit: str = "", digits: int = 2, floor: float = 1e-6) -> str:
     """Numbers as text, each with so many significant digits: "69 mm", "(0.1, 0, -2) N". There is no "-0".
 
     x: a number, or an array or list of numbers of any shape, which become "(…, …)", row by row.
@@ -35,32 +35,32 @@ def about(x: Any, unit: str = "", digits: int = 2, floor: float = 1e-6) -> str:
     floor = as_positive("floor", floor, allow_zero=True)
     finite = np.abs(numbers[np.isfinite(numbers)])
     if numbers.ndim == 0 and not finite.size:
-        return _one(float(numbers), digits, 0.0)
-    least = max(floor, min(floor, _NOISE) * finite.max(initial=0.0)) if numbers.ndim else floor
-    return _nested(numbers.tolist(), digits, least) + (unit if unit == "°" else f" {unit}" if unit else "")
+        return _format_scalar(float(numbers), digits, 0.0)
+    smallest = max(floor, min(floor, _RELATIVE_NOISE) * finite.max(initial=0.0)) if numbers.ndim else floor
+    return _format_nested(numbers.tolist(), digits, smallest) + (unit if unit == "°" else f" {unit}" if unit else "")
 
 
-def _nested(numbers: Any, digits: int, least: float) -> str:
+def _format_nested(numbers: Any, digits: int, smallest: float) -> str:
     if isinstance(numbers, list):
-        return f"({', '.join(_nested(part, digits, least) for part in numbers)})"
-    return _one(numbers, digits, least)
+        return f"({', '.join(_format_nested(part, digits, smallest) for part in numbers)})"
+    return _format_scalar(numbers, digits, smallest)
 
 
-def _one(x: float, digits: int, least: float) -> str:
+def _format_scalar(x: float, digits: int, smallest: float) -> str:
     if np.isnan(x):
         return "not a number"
     if np.isinf(x):
         return "infinite" if x > 0 else "minus infinite"
-    if x == 0.0 or abs(x) < least:
+    if x == 0.0 or abs(x) < smallest:
         return "0"
-    first = Decimal(f"{x:.{digits + _GUARD - 1}e}")
-    rounded = first.quantize(Decimal((0, (1,), first.adjusted() - digits + 1)), ROUND_HALF_UP)
-    exponent = rounded.adjusted()
-    if exponent in _PLAIN:
-        return _without_zeros(f"{rounded:f}")
-    return f"{_without_zeros(f'{rounded.scaleb(-exponent):f}')}e{exponent}"
+    first = Decimal(f"{x:.{digits + _GUARD_DIGITS - 1}e}")
+    quantized = first.quantize(Decimal((0, (1,), first.adjusted() - digits + 1)), ROUND_HALF_UP)
+    exponent = quantized.adjusted()
+    if exponent in _PLAIN_EXPONENTS:
+        return _strip_trailing_zeros(f"{quantized:f}")
+    return f"{_strip_trailing_zeros(f'{quantized.scaleb(-exponent):f}')}e{exponent}"
 
 
-def _without_zeros(text: str) -> str:
+def _strip_trailing_zeros(text: str) -> str:
     """Without the zeros at the end of a fraction."""
     return text.rstrip("0").rstrip(".") if "." in text else text

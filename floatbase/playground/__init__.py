@@ -1,29 +1,29 @@
 """The playground: a live robot with all that a controller may know or mistake, in a notebook and on a page of its own."""
 
-from floatbase.playground.cards import CARDS, Card, Judge
+from floatbase.playground.challenges import CHALLENGES, Challenge, Judge
 from floatbase.playground.equation import EQUATION, SYMBOLS, Term
-from floatbase.playground.pace import Pace
-from floatbase.playground.page import Playground, gap, playground
-from floatbase.playground.session import PERIOD, BaseMotors, Session, nodding
+from floatbase.playground.page import Playground, mean_force_error, playground
+from floatbase.playground.real_time_factor import RealTimeFactor
+from floatbase.playground.session import PERIOD, BaseMotors, Session, nodding_rotation
 from floatbase.playground.settings import GAITS, Settings
-from floatbase.playground.terms import arrows
+from floatbase.playground.term_arrows import term_arrows
 
 __all__ = [
-    "CARDS",
+    "CHALLENGES",
     "EQUATION",
     "GAITS",
     "PERIOD",
     "SYMBOLS",
     "BaseMotors",
-    "Card",
+    "Challenge",
     "Judge",
-    "Pace",
     "Playground",
+    "RealTimeFactor",
     "Session",
     "Settings",
     "Term",
-    "arrows",
-    "gap",
-    "nodding",
+    "mean_force_error",
+    "nodding_rotation",
     "playground",
+    "term_arrows",
 ]

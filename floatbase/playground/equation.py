@@ -8,17 +8,17 @@ from typing import NamedTuple
 class Term(NamedTuple):
     """A term of (7).
 
-    name: in `Settings.believed_off` and `Settings.true_off`. symbol: as it is written over the picture.
-    believed, true: the names of its switches on the page; "" for none.
-    belief, world: the options of `ModelMismatch` and of `Perturbation` that switch it; "" where that takes more than a flag.
+    name: in `Settings.assumed_off` and `Settings.actual_off`. symbol: as it is written over the picture.
+    assumed_switch, actual_switch: the names of its switches on the page; "" for none.
+    mismatch_option, perturbation_option: the options of `ModelMismatch` and of `Perturbation` that switch it; "" where that takes more than a flag.
     """
 
     name: str
     symbol: str
-    believed: str = ""
-    true: str = ""
-    belief: str = ""
-    world: str = ""
+    assumed_switch: str = ""
+    actual_switch: str = ""
+    mismatch_option: str = ""
+    perturbation_option: str = ""
 
 
 EQUATION = (

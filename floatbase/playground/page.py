@@ -13,21 +13,21 @@ import numpy as np
 import floatbase as fb
 from floatbase.errors import ViewerError
 from floatbase.lessons import static_export
-from floatbase.playground.cards import Card, Judge
+from floatbase.playground.challenges import Challenge, Judge
 from floatbase.playground.equation import SYMBOLS
-from floatbase.playground.pace import Pace
 from floatbase.playground.panel import Panel
+from floatbase.playground.real_time_factor import RealTimeFactor
 from floatbase.playground.session import PERIOD, Session
 from floatbase.playground.settings import Settings
-from floatbase.playground.terms import arrows
+from floatbase.playground.term_arrows import term_arrows
 from floatbase.robots import Robot
 from floatbase.simulation import ACTIVE_STATUSES, PUSH_DISPLAY_TIME, LiveSimulation, status_message
 from floatbase.viewer import Picture
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.export.recording import push_at
 
-_STILL = "The playground needs the live lesson: here its robot stands still."
-_SHOWN = ("forces", "cones")  # terms that are drawn at first
+_SITE_NOTE = "The playground needs the live lesson: here its robot stands still."
+_SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn at first
 
 
 class Playground:
@@ -55,28 +55,28 @@ class Playground:
         facets = 4 if robot.feet else None
         self.view = fb.Viewer(robot, background=background, port=port, facets=facets, follow=True, height=height)
         self.session = Session(robot, settings)
-        self._first = self.session.settings
-        self.force, self.towards = self._gentle, 0.0  # N, and degrees: 0 forwards, 90 to the left
-        self.pushed = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
+        self._initial_settings = self.session.settings
+        self.force, self.towards = self._default_push, 0.0  # N, and degrees: 0 forwards, 90 to the left
+        self.pushed_frame = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
         self.outcome = ""
-        self.card: Card | None = None
+        self.challenge: Challenge | None = None
         self.judge: Judge | None = None
         self._last_push: fb.Push | None = None
-        self.shown = {term: term in _SHOWN for term in SYMBOLS}
-        self._waits = False  # for the reader to press run, after the next slice
+        self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
+        self._pause_after_slice = False  # for the reader to press run, after the next slice
         self._requested: dict[str, Any] = {}
         self._lock = threading.Lock()  # over what is requested
-        self._drawing = threading.Lock()  # the run draws, and so does who pauses it
+        self._drawing_lock = threading.Lock()  # the run draws, and so does who pauses it
         session = self.session
         self.run = LiveSimulation(
-            session.sim, session.controller, self._show, control_period=PERIOD, actuators=session.actuators,
-            after_reset=self._restart,
+            session.sim, session.controller, self._on_slice, control_period=PERIOD, actuators=session.actuators,
+            after_reset=self._after_reset,
         )  # fmt: skip
-        self.run.on_status(self._tell)
-        self.pace = Pace()
+        self.run.on_status(self._on_status)
+        self.real_time_factor = RealTimeFactor()
         self.view.set_ground(session.sim.ground)
         self._panel = Panel(self)
-        self._write()
+        self._update_text()
 
     @property
     def url(self) -> str:
@@ -84,7 +84,7 @@ class Playground:
         return self.view.url
 
     @property
-    def _gentle(self) -> float:
+    def _default_push(self) -> float:
         """The push at first, N."""
         return 0.1 * self.robot.weight
 
@@ -108,9 +108,9 @@ class Playground:
         self.towards = self.towards if towards is None else towards
         angle = math.radians(self.towards)
         force_now = self.force * np.array([math.cos(angle), math.sin(angle), 0.0])
-        self._last_push = fb.Push(force_now, frame=self.pushed)
-        self.run.push(self._last_push.force, frame=self.pushed)
-        self._write()
+        self._last_push = fb.Push(force_now, frame=self.pushed_frame)
+        self.run.push(self._last_push.force, frame=self.pushed_frame)
+        self._update_text()
 
     def set(self, **changes: Any) -> None:
         """Change settings, fields of `Settings`; the run takes them over before its next slice.
@@ -123,150 +123,150 @@ class Playground:
             self._requested |= changes
         if not self.run.is_simulating:
             self.run.close()  # its last slice may still go on
-            self._take_over()
+            self._apply_requested()
         elif not waiting:
-            self.run.call_soon(self._take_over)
+            self.run.call_soon(self._apply_requested)
 
-    def nod(self, size: float) -> None:
+    def set_nodding(self, size: float) -> None:
         """Let the base describe an ellipse in pitch and yaw; one under way keeps its phase. size: rad, half its width."""
-        wanted = self.wanted
-        self.set(nod=size, begin=wanted.begin if wanted.nod else self.session.sim.time)
+        pending = self.pending_settings
+        self.set(nod=size, start_time=pending.start_time if pending.nod else self.session.sim.time)
 
-    def choose(self, card: Card | None) -> None:
+    def start_challenge(self, challenge: Challenge | None) -> None:
         """Begin a challenge, or play freely."""
-        self.card, self.judge = card, None if card is None else card.judge()
-        self._restart_with(self._first if card is None else card.start)
-        self._write()
+        self.challenge, self.judge = challenge, None if challenge is None else challenge.judge()
+        self._restart_with(self._initial_settings if challenge is None else challenge.start)
+        self._update_text()
 
-    def undo(self) -> None:
+    def reset_all(self) -> None:
         """Set everything as it was at first, the push, the speed and what is shown too, and put the robot back on its feet."""
-        self.force, self.towards, self._last_push = self._gentle, 0.0, None
-        self.shown |= {term: term in _SHOWN for term in SYMBOLS}
+        self.force, self.towards, self._last_push = self._default_push, 0.0, None
+        self.shown_terms |= {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self.run.set_time_scale(1.0)
-        self._panel.follow_looks(1.0)
-        self._restart_with(self._first if self.card is None else self.card.start)
+        self._panel.show_view_settings(1.0)
+        self._restart_with(self._initial_settings if self.challenge is None else self.challenge.start)
 
     def _restart_with(self, settings: Settings) -> None:
         """Put the robot back on its feet under these settings."""
         with self._lock:
             self._requested = {}
-        self.run.call_soon(lambda: self._begin(settings))
+        self.run.call_soon(lambda: self._start_with(settings))
         self.run.reset()
 
-    def _begin(self, settings: Settings) -> None:
+    def _start_with(self, settings: Settings) -> None:
         self.session.change(**asdict(settings))
-        self._panel.follow(self.session.settings)
-        self._hand_over()
-        self._write()
+        self._panel.show_settings(self.session.settings)
+        self._update_run()
+        self._update_text()
 
-    def _take_over(self) -> None:
+    def _apply_requested(self) -> None:
         """Change what was requested, and hand it to the run."""
         with self._lock:
             changes, self._requested = self._requested, {}
         if not changes:
             return
         restarted = self.session.change(**changes)
-        self._hand_over()
-        self._write()
+        self._update_run()
+        self._update_text()
         if restarted:
             self.run.reset()
 
-    def _hand_over(self) -> None:
+    def _update_run(self) -> None:
         session = self.session
         self.run.set_controller(session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD)
         self.view.set_ground(session.sim.ground)  # the true one, whatever the controller believes
         if self.view.painter.facets not in (None, session.settings.facets):
             self.view.painter = self.view.painter.replace(facets=session.settings.facets)
 
-    def _restart(self) -> None:
+    def _after_reset(self) -> None:
         """After a reset of the simulation, in the run's thread."""
-        self.session.restart()
-        self._waits = self.card is not None and self.card.paused
-        card = self.card
-        if card is not None:
-            self.judge = card.judge()
-        self._hand_over()
+        self.session.after_reset()
+        self._pause_after_slice = self.challenge is not None and self.challenge.paused
+        challenge = self.challenge
+        if challenge is not None:
+            self.judge = challenge.judge()
+        self._update_run()
 
     @property
-    def wanted(self) -> Settings:
+    def pending_settings(self) -> Settings:
         """The settings with what is still requested."""
         with self._lock:
             return replace(self.session.settings, **self._requested)
 
     def show_term(self, term: str, shown: bool) -> None:
-        self.shown[term] = shown
+        self.shown_terms[term] = shown
         if self.run.status != "running":
-            self._draw_again()
+            self._redraw()
 
-    def _write(self) -> None:
+    def _update_text(self) -> None:
         """The texts of the panel: the challenge, and the program."""
         judge = self.judge  # a challenge may be chosen meanwhile
         with suppress(ViewerError):
             if judge is not None:
-                self.view.add_text("card", f"{judge.card.text}\n{judge.says}")
+                self.view.add_text("challenge", f"{judge.challenge.text}\n{judge.message}")
             elif self.robot.is_floating:
-                self.view.add_text("card", "")
+                self.view.add_text("challenge", "")
             code = self.session.settings.code(self.robot, PERIOD, self._last_push)
             self.view.add_text("code", code, "as Python", code=True)
 
-    def _tell(self, status: str) -> None:
+    def _on_status(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
         self.outcome = "" if status == "running" else status_message(status)
         judge = self.judge
         if judge is not None and status not in ACTIVE_STATUSES:
-            judge.ended(status, self.session)
-            self._write()
-        self._draw_again()
+            judge.run_ended(status, self.session)
+            self._update_text()
+        self._redraw()
 
-    def _draw_again(self) -> None:
+    def _redraw(self) -> None:
         with suppress(ViewerError):  # the window may be closed already
             if self.session.last is not None:
                 self._draw(self.session.last)
 
-    def _show(self, record: fb.Rollout) -> None:
+    def _on_slice(self, record: fb.Rollout) -> None:
         """What the run hands over: draw it, and judge it."""
-        self.session.see(record)
+        self.session.observe(record)
         judge = self.judge  # a challenge may be chosen or left meanwhile
         if judge is not None and self.run.status == "running":  # who has fallen is only drawn
-            before = judge.says
-            judge.see(record, self.session)
-            if judge.says != before:
-                self._write()
+            before = judge.message
+            judge.observe(record, self.session)
+            if judge.message != before:
+                self._update_text()
         self._draw(record)
-        if self._waits:
-            self._waits = False
+        if self._pause_after_slice:
+            self._pause_after_slice = False
             self.run.pause()
         if self.robot.is_floating:
-            self.view.add_plot_point("planned and measured forces differ by", float(record.time[-1]), gap(record), "N")
+            self.view.add_plot_point("planned and measured forces differ by", float(record.time[-1]), mean_force_error(record), "N")
 
     def _draw(self, record: fb.Rollout) -> None:
         """The last row of a slice, under the time, the part of real time that this machine reaches, and messages."""
         now, session = float(record.time[-1]), self.session
-        with self._drawing:
-            speed = self.pace.update(now)
-            pace = "" if speed is None else f", {speed:.0%} of real time"
+        with self._drawing_lock:
+            factor = self.real_time_factor.update(now)
+            rate = "" if factor is None else f", {factor:.0%} of real time"
             gait = f", {session.settings.gait}" if session.settings.gait else ""
-            headline = f"{self.robot.name}{gait}, {now:.1f} s{pace}, control every {1e3 * PERIOD:g} ms"
+            headline = f"{self.robot.name}{gait}, {now:.1f} s{rate}, control every {1e3 * PERIOD:g} ms"
             self.view.show(
-                record.final, record.contacts, record.measured[-1], _planned(record), push=push_at(record, -1, PUSH_DISPLAY_TIME),
-                cones=self.shown["cones"], arrows=self.shown["forces"], support=True, extra=self._extra(record),
-                title="\n".join(filter(None, [headline, self.outcome, session.note])),
+                record.final, record.contacts, record.measured[-1], _last_planned_forces(record), push=push_at(record, -1, PUSH_DISPLAY_TIME),
+                cones=self.shown_terms["cones"], arrows=self.shown_terms["forces"], support=True, extra=self._term_arrows(record),
+                title="\n".join(filter(None, [headline, self.outcome, session.refusal])),
             )  # fmt: skip
 
-    def _extra(self, record: fb.Rollout) -> Picture:
+    def _term_arrows(self, record: fb.Rollout) -> Picture:
         """Arrows of the terms, and marks of a walk."""
         picture: Picture = {}
         settings = self.session.settings
-        for term, shown in self.shown.items():
+        for term, shown in self.shown_terms.items():
             if shown:
-                picture |= arrows(term, record, self.view.scale, self.view.painter.size, settings.true_off, settings.mass[1])
+                picture |= term_arrows(term, record, self.view.scale, self.view.painter.size, settings.actual_off, settings.mass[1])
         walk = self.session.walk
         return picture if walk is None else picture | dict(self.view.walk_overlay(walk, record.final))
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         if display_mode() == "site":
             self.view.show(self.session.sim.state, self.session.sim.feet)
-            return static_export.StaticExport([self.view], words=_STILL).bundle()
+            return static_export.StaticExport([self.view], words=_SITE_NOTE).bundle()
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
@@ -279,7 +279,7 @@ def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> 
     return Playground(fb.load(robot) if isinstance(robot, str) else robot, settings)
 
 
-def gap(record: fb.Rollout) -> float:
+def mean_force_error(record: fb.Rollout) -> float:
     """Planned less measured forces: the length of the difference, N, added over the contacts, on average over a record."""
     if not len(record) or not record.planned.size:
         return 0.0
@@ -287,6 +287,6 @@ def gap(record: fb.Rollout) -> float:
     return float(np.nanmean(off)) if np.isfinite(off).any() else 0.0
 
 
-def _planned(record: fb.Rollout) -> Any:
+def _last_planned_forces(record: fb.Rollout) -> Any:
     """The planned forces at the last row, None where there are none."""
     return record.planned[-1] if np.isfinite(record.planned[-1]).all() else None

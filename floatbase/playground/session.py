@@ -22,9 +22,9 @@ from floatbase.robots import Robot, State
 from floatbase.simulation import Actuators, Controller, Perturbation, PerturbedSimulation
 
 PERIOD = 4e-3  # s between ticks: go2's reference QP takes 1.5 ms, so that half of the time is left for physics and pictures
-_NOD_RATE = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
+_NODDING_FREQUENCY = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
 _YAW_OVER_PITCH = 1.15  # the ellipse is a little wider in yaw
-_GROWING = 1.5  # s in which the ellipse grows from nothing
+_RAMP_TIME = 1.5  # s in which the ellipse grows from nothing
 
 
 class BaseMotors:
@@ -54,7 +54,7 @@ class BaseMotors:
         return command
 
 
-def nodding(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callable[[float], tuple[Array, Array, Array]]:
+def nodding_rotation(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callable[[float], tuple[Array, Array, Array]]:
     """Orientations that describe an ellipse in pitch and yaw around `rotation`, as `OrientationTask` takes them.
 
     rotation: (3, 3), world.
@@ -65,8 +65,8 @@ def nodding(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callabl
     home = np.asarray(rotation, dtype=float)
 
     def angles(t: float) -> Array:
-        s = min(max((t - begin) / _GROWING, 0.0), 1.0)
-        phase = 2.0 * math.pi * _NOD_RATE * (t - begin)
+        s = min(max((t - begin) / _RAMP_TIME, 0.0), 1.0)
+        phase = 2.0 * math.pi * _NODDING_FREQUENCY * (t - begin)
         return size * s**3 * (10.0 - 15.0 * s + 6.0 * s**2) * np.array([math.sin(phase), _YAW_OVER_PITCH * math.cos(phase)])
 
     turning = pitch_and_yaw(angles)
@@ -78,9 +78,9 @@ def nodding(rotation: npt.ArrayLike, size: float, begin: float = 0.0) -> Callabl
     return path
 
 
-_NAMES: dict[str, Any] = {
+_NAMESPACE: dict[str, Any] = {
     "fb": fb, "PerturbedSimulation": PerturbedSimulation, "Perturbation": Perturbation, "ModelMismatch": ModelMismatch, "FirstOrderLag": FirstOrderLag,
-    "Gait": Gait, "Stand": Stand, "Walk": Walk, "BaseMotors": BaseMotors, "nodding": nodding,
+    "Gait": Gait, "Stand": Stand, "Walk": Walk, "BaseMotors": BaseMotors, "nodding_rotation": nodding_rotation,
 }  # fmt: skip
 
 
@@ -89,37 +89,37 @@ class Session:
 
     robot: as from `fb.load`. settings: those at first.
     `sim`, `controller` and `actuators` are what `rollout` takes, made by the very lines that `settings.code` shows, with a tick
-    every `PERIOD`: the same on every machine, so that a run can be had again. `last` is the newest record, which `see` is told
-    of. `note` says why a change was refused, and then `settings` stay as they were.
+    every `PERIOD`: the same on every machine, so that a run can be had again. `last` is the newest record, which `observe` is told
+    of. `refusal` says why a change was refused, and then `settings` stay as they were.
     """
 
     def __init__(self, robot: Robot, settings: Settings | None = None):
         self.robot = robot
         self.settings = Settings() if settings is None else settings
         self.last: fb.Rollout | None = None
-        self.note = ""
-        self._make_world()
-        self.controller: Controller = self._controller(self.settings, self.home)
+        self.refusal = ""
+        self._make_simulation()
+        self.controller: Controller = self._make_controller(self.settings, self.home)
 
-    def _make_world(self) -> None:
+    def _make_simulation(self) -> None:
         """A world on the true ground, with the robot standing in it."""
-        names = _NAMES | {"robot": self.robot}
-        world = eval(self.settings.world(self.robot), names)
-        self.sim: PerturbedSimulation = PerturbedSimulation(self.robot, eval(self.settings.ground(), names), perturbation=world)
+        names = _NAMESPACE | {"robot": self.robot}
+        perturbation = eval(self.settings.perturbation(self.robot), names)
+        self.sim: PerturbedSimulation = PerturbedSimulation(self.robot, eval(self.settings.ground(), names), perturbation=perturbation)
         self._ground = self.settings.slope[1]
         self.home = self.sim.state
         self._make_actuators()
 
     def _make_actuators(self) -> None:
-        names = _NAMES | {"robot": self.robot, "state": self.home}
-        exec("\n".join(self.settings.actuators_lines()), names)
+        names = _NAMESPACE | {"robot": self.robot, "state": self.home}
+        exec("\n".join(self.settings.actuator_lines()), names)
         self.actuators: Actuators | None = names["actuators"]
         if self.last is not None and isinstance(self.actuators, FirstOrderLag):
             self.actuators.reset(self.last.tau[-1])
 
-    def _controller(self, settings: Settings, state: State) -> Controller:
+    def _make_controller(self, settings: Settings, state: State) -> Controller:
         """The controller that settings ask for, of a robot that is to stand as in `state`. Raises `FloatbaseError`."""
-        names = _NAMES | {"robot": self.robot, "sim": self.sim, "state": state}
+        names = _NAMESPACE | {"robot": self.robot, "sim": self.sim, "state": state}
         exec("\n".join(settings.controller_lines(self.robot)), names)
         made: Controller = names["controller"]
         return made
@@ -130,7 +130,7 @@ class Session:
         inner = self.controller.controller if isinstance(self.controller, BaseMotors) else self.controller
         return inner if isinstance(inner, Walk) else None
 
-    def see(self, record: fb.Rollout) -> None:
+    def observe(self, record: fb.Rollout) -> None:
         """Take note of the newest slice."""
         self.last = record
 
@@ -139,50 +139,50 @@ class Session:
         before, self.settings = self.settings, replace(self.settings, **changes)
         refused, new_ground = self.settings, self.settings.slope[1] != self._ground
         try:
-            self._change_world(before)
-            self._renew_controller(before)
-            self.note = ""
+            self._update_simulation(before)
+            self._update_controller(before)
+            self.refusal = ""
         except fb.FloatbaseError as error:
-            self.note, self.settings = str(error), before
-            self._change_world(refused)
+            self.refusal, self.settings = str(error), before
+            self._update_simulation(refused)
         return new_ground
 
-    def _change_world(self, before: Settings) -> None:
+    def _update_simulation(self, before: Settings) -> None:
         """World and actuators of the settings: a new world where the slope is another one, else the same, changed."""
         now = self.settings
         if now.slope[1] != self._ground:
             self.last = None
-            self._make_world()
+            self._make_simulation()
             return
-        world: Perturbation = eval(now.world(self.robot), _NAMES | {"robot": self.robot})
-        self.sim.perturbation = replace(world, friction=now.friction[1])
+        perturbation: Perturbation = eval(now.perturbation(self.robot), _NAMESPACE | {"robot": self.robot})
+        self.sim.perturbation = replace(perturbation, friction=now.friction[1])
         if now.bandwidth[1] != before.bandwidth[1]:
             self._make_actuators()
 
-    def _renew_controller(self, before: Settings) -> None:
+    def _update_controller(self, before: Settings) -> None:
         """The controller of the settings; a walk whose velocity or gait alone changes goes on."""
         now, walk = self.settings, self.walk
-        if walk is not None and before.gait and replace(now, gait=None, velocity=(0, 0, 0), begin=0.0) == replace(
-            before, gait=None, velocity=(0, 0, 0), begin=0.0
+        if walk is not None and before.gait and replace(now, gait=None, velocity=(0, 0, 0), start_time=0.0) == replace(
+            before, gait=None, velocity=(0, 0, 0), start_time=0.0
         ):  # fmt: skip
             walk.velocity, walk.yaw_rate = list(now.velocity[:2]), now.velocity[2]
             if now.gait is None:
                 walk.gait = replace(walk.gait, stop=self.sim.time)
             elif now.gait != before.gait:
-                walk.gait = self._controller(now, self.home).gait  # type: ignore[attr-defined]
+                walk.gait = self._make_controller(now, self.home).gait  # type: ignore[attr-defined]
             return
-        self.controller = self._controller(now, self._standing_here())
+        self.controller = self._make_controller(now, self._standing_state_here())
         if self.robot.is_floating:
             self.sim.base_wrench = np.zeros(6)  # of motors that may be there no more
 
-    def restart(self) -> None:
+    def after_reset(self) -> None:
         """After a reset of the simulation: schedules count from the clock's new beginning, and actuators hold the robot."""
         self.last = None
-        self.settings = replace(self.settings, begin=0.0)
+        self.settings = replace(self.settings, start_time=0.0)
         self._make_actuators()
-        self.controller = self._controller(self.settings, self.home)
+        self.controller = self._make_controller(self.settings, self.home)
 
-    def _standing_here(self) -> State:
+    def _standing_state_here(self) -> State:
         """The standing posture where the feet are now: on the same place, turned as the robot is."""
         contacts = Contacts.feet(self.robot)
         if self.last is None or not self.robot.is_floating or not len(contacts):

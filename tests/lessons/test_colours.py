@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 import floatbase as fb
 from floatbase.lessons import ConstantTorques, lesson02, lesson03, lesson04
-from floatbase.lessons.publish import FOLDER, read
+from floatbase.lessons.publish import NOTEBOOKS, read_notebook
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene.colours import ALARM, CALM, COM, CONE, GREYS, MEASURED, PLANNED, WARNING, hex_code
 
@@ -29,8 +29,8 @@ def sources() -> Iterator[tuple[str, str]]:
     """Name and text of all code of the lessons, modules and cells."""
     for path in sorted(LESSONS.rglob("*.py")):
         yield path.name, path.read_text(encoding="utf-8")
-    for path in sorted(FOLDER.glob("*.ipynb")):
-        yield from ((path.name, cell.source) for cell in read(path).cells if cell.cell_type == "code")
+    for path in sorted(NOTEBOOKS.glob("*.ipynb")):
+        yield from ((path.name, cell.source) for cell in read_notebook(path).cells if cell.cell_type == "code")
 
 
 def test_lessons_take_their_colours_from_the_viewer_and_leave_those_of_cones_to_it() -> None:
@@ -57,10 +57,10 @@ def lines(figure: Figure) -> set[str]:
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: lesson02.draw_equation(lesson03.standing_go2()),
-        lambda: lesson02.plot_strayed({"one": np.ones(9), "other": np.ones(9), "third": np.ones(9)}, 1.0).figure,
+        lambda: lesson02.draw_equation(lesson03.standing_go2_eom()),
+        lambda: lesson02.plot_foot_displacement({"one": np.ones(9), "other": np.ones(9), "third": np.ones(9)}, 1.0).figure,
         lambda: lesson03.matrix_picture(np.eye(4), {"rows": 4}, {"q̈": 1, "λ": 3}),
-        lambda: lesson04.slices(bowl=(BOWL, "x", "y", 2.0)),
+        lambda: lesson04.cost_slices(bowl=(BOWL, "x", "y", 2.0)),
         lambda: lesson04.effort_picture({name: ([0, 1], [0, 1]) for name in "abc"}),
     ],
     ids=["equation", "strayed", "matrix", "slices", "effort"],
@@ -71,7 +71,7 @@ def test_a_figure_of_anything_but_forces_has_no_colour_of_a_force_or_a_cone(draw
 
 
 def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_a_colour_of_forces_or_cones() -> None:
-    base, qdd, tau, forces = lesson03.bars(np.ones(18), np.ones(12), np.ones(12)).split("<svg")[1:]
+    base, qdd, tau, forces = lesson03.motion_bars(np.ones(18), np.ones(12), np.ones(12)).split("<svg")[1:]
     assert set(re.findall(CODE, forces)) == {hex_code(PLANNED)}
     assert set(re.findall(CODE, base)) == set(re.findall(CODE, qdd))
     assert len(set(re.findall(CODE, qdd))) == len(set(re.findall(CODE, tau))) == 1
@@ -79,7 +79,7 @@ def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_a_col
 
 
 def test_words_and_dots_of_svg_have_the_colour_of_the_page_so_that_a_dark_one_can_be_read() -> None:
-    for drawn in (lesson03.bars(np.ones(18), np.ones(12), np.ones(12)), lesson04.level_curves(BOWL, [1, 1], 2.0, "x", "y")):
+    for drawn in (lesson03.motion_bars(np.ones(18), np.ones(12), np.ones(12)), lesson04.level_curves(BOWL, [1, 1], 2.0, "x", "y")):
         assert 'fill="currentColor"' in drawn
         assert re.findall(r"<(?:text|circle)[^>]*\sfill=", drawn) == []
     assert not set(re.findall(CODE, drawn)) & TAKEN
@@ -92,7 +92,7 @@ def test_a_place_in_a_picture_has_the_colour_of_text_and_a_way_is_grey(backgroun
     limp = fb.rollout(fb.Simulation(arm), ConstantTorques(np.zeros(6)), 0.1)
     view = Viewer(arm, background=background)
     try:
-        lesson02.play_tools(view, limp, still)
+        lesson02.play_tool_comparison(view, limp, still)
         made = {path: c for (path, kind, _), c in view.window.scene.commands().items() if kind == "set_object"}
     finally:
         view.close()

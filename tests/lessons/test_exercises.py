@@ -132,22 +132,22 @@ def test_damage_is_left_out_and_left_as_it_is(tmp_path: Path, name: str, text: s
 
 
 def test_a_full_disk_costs_one_try(tmp_path: Path) -> None:
-    progress.record("00.1", True)
+    progress.record_try("00.1", True)
     stored = tmp_path / "progress.jsonl"
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (stored.stat().st_size + 12, before[1]))
     try:
-        progress.record("00.1", True)  # a part of the line fits
-        progress.record("00.1", True)
+        progress.record_try("00.1", True)  # a part of the line fits
+        progress.record_try("00.1", True)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    progress.record("00.1", False)
+    progress.record_try("00.1", False)
     assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
 
 
 def record_often(name: str) -> None:
     for _ in range(TIMES):
-        progress.record(name, True)
+        progress.record_try(name, True)
 
 
 @pytest.mark.parametrize("worker", [threading.Thread, multiprocessing.get_context("fork").Process])

@@ -13,7 +13,7 @@ import pytest
 from hints import ODD
 
 import floatbase
-from floatbase.lessons import Numeric, all_exercises
+from floatbase.lessons import NumericJudge, all_exercises
 
 EXERCISES = all_exercises()
 LESSONS = sorted({name.split(".")[0] for name in EXERCISES})
@@ -78,7 +78,7 @@ def test_nothing_that_a_learner_may_give_makes_a_check_fail(name: str) -> None:
     ],
 )  # fmt: skip
 def test_answers_are_told_in_any_exercise_what_is_wrong_with_any_answer(answer: Any, hint: str) -> None:
-    assert Numeric(right=lambda: [[1.0, 2.0], [3.0, 4.0]], praise="")(answer).hint == hint
+    assert NumericJudge(right=lambda: [[1.0, 2.0], [3.0, 4.0]], praise="")(answer).hint == hint
 
 
 @pytest.mark.parametrize(("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))])

@@ -17,7 +17,7 @@ WIDE_ENOUGH = 0.6596  # m: by hand, 2 (120 N · 0.6340 m / 205.95 N - 0.0396 m)
 
 @pytest.fixture(scope="module")
 def arm() -> Robot:
-    return fb.load("ur5", posture=lesson01.PRESSING)
+    return fb.load("ur5", posture=lesson01.PRESSING_POSTURE)
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +27,10 @@ def go2() -> Robot:
 
 def test_a_servo_follows_its_path_at_its_ends(arm: Robot) -> None:
     state = with_floating_base(arm).standing()
-    path = lesson01.turn(joint=2, angle=0.7, duration=1.5)
+    path = lesson01.joint_turn(joint=2, angle=0.7, duration=1.5)
     assert np.allclose(path(0.0), 0.0)
     assert np.allclose(path(9.0), 0.7 * np.eye(6)[2])
-    circle = lesson01.wave(0, 1, 1.0, 2.0)
+    circle = lesson01.joint_circle(0, 1, 1.0, 2.0)
     assert np.allclose(circle(2.0), 0.0)
     assert not np.allclose(circle(1.0), 0.0)
     servo = joint_servo(state, np.arange(6.0), path, stiffness=10.0, damping=0.0)
@@ -77,7 +77,7 @@ def outcome(pressing: Robot, width: float, press: float) -> str:
 def test_the_centre_of_mass_leaves_every_point_of_the_base(go2: Robot) -> None:
     view = fb.Viewer(go2)
     try:
-        panel = lesson01.centre_panel(view, go2.standing())
+        panel = lesson01.com_panel(view, go2.standing())
         slider = panel.sliders["swing_forwards"]
         seen = []
         for swung in (slider.min, slider.max):

@@ -9,15 +9,15 @@ import pytest
 
 import floatbase as fb
 from floatbase.lessons import ConstantTorques
-from floatbase.lessons.lesson03 import space_of, standing_still
+from floatbase.lessons.lesson03 import standing_space, standing_still_beta
 from floatbase.lessons.lesson04 import (
-    DESIRED,
-    LeastCost,
+    DESIRED_ACCELERATION,
+    MinimumCostController,
+    cost_slices,
     effort_picture,
     level_curves,
     measured_acceleration,
     show_torques,
-    slices,
 )
 from floatbase.linear_algebra import null_space, rank
 
@@ -25,7 +25,7 @@ GO2 = fb.load("go2")
 EFFORT = fb.Quadratic.from_residual(np.eye(12), np.zeros(12))
 
 
-def com_cost(eom: Any, desired: Any = DESIRED) -> fb.Quadratic:
+def com_cost(eom: Any, desired: Any = DESIRED_ACCELERATION) -> fb.Quadratic:
     return fb.Quadratic.from_residual(eom.state.com_jacobian, np.asarray(desired) - eom.state.com_drift)
 
 
@@ -35,7 +35,7 @@ def turn_cost(eom: Any) -> fb.Quadratic:
 
 @pytest.mark.parametrize("feet", [("FL_foot", "FR_foot", "RL_foot"), ("FL_foot", "FR_foot", "RL_foot", "RR_foot")])
 def test_04_2_counts_the_flat_directions_that_accelerate_the_free_foot(feet: tuple[str, ...]) -> None:
-    space = space_of(GO2, *feet)
+    space = standing_space(GO2, *feet)
     eom = space.eom
     flat = null_space((com_cost(eom) + turn_cost(eom)).pullback(space.qdd).H)
     moving = rank(eom.state.frame_jacobian("RR_foot")[:3] @ space.qdd.A @ flat, absolute=True)
@@ -49,7 +49,7 @@ def test_the_engine_measures_what_is_desired(desired: list[float]) -> None:
     def cost(eom: Any) -> fb.Quadratic:
         return (com_cost(eom, desired) + turn_cost(eom)).pullback(fb.accelerations_from_torques(eom)) + 1e-4 * EFFORT
 
-    record = fb.rollout(fb.Simulation(GO2), LeastCost(GO2, contacts, cost), 0.1, control_period=0.005)
+    record = fb.rollout(fb.Simulation(GO2), MinimumCostController(GO2, contacts, cost), 0.1, control_period=0.005)
     np.testing.assert_allclose(measured_acceleration(record), desired, atol=0.01)
 
 
@@ -65,16 +65,16 @@ def test_a_falling_robot_is_measured_to_fall() -> None:
 def test_the_pictures_are_drawn() -> None:
     bowl = fb.Quadratic.from_residual([[2.0, 0.0], [0.0, 1.0]], [2.0, 1.0])
     valley = fb.Quadratic.from_residual([[1.0, 1.0]], [1.0])
-    assert len(slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes) == 2
-    dots = [len(axis.lines) for axis in slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes]
+    assert len(cost_slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes) == 2
+    dots = [len(axis.lines) for axis in cost_slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes]
     assert dots == [1, 0]  # a valley has no least point
     drawn = level_curves(bowl, [1.0, 1.0], 2.0, "x", "y")
     assert "translate(195.0 65.0)" in drawn and 'cx="195.0" cy="65.0"' in drawn  # both at (1, 1): right of and above the middle
     assert "nan" not in level_curves(valley, [0.0, 0.0], 2.0, "x", "y")
     assert len(effort_picture({"a": ([0, 1], [0, 1])}).axes) == 1
-    space = space_of(GO2)
+    space = standing_space(GO2)
     view = fb.Viewer(GO2)
     try:
-        np.testing.assert_allclose(show_torques(view, space.eom, space(standing_still(space))[1]), 0.0, atol=1e-9)
+        np.testing.assert_allclose(show_torques(view, space.eom, space(standing_still_beta(space))[1]), 0.0, atol=1e-9)
     finally:
         view.close()

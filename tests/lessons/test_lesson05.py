@@ -9,14 +9,14 @@ import pytest
 from hints import right
 
 import floatbase as fb
-from floatbase.lessons.lesson03 import standing_go2
+from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson05 import (
-    GivenForces,
+    ConstantForceController,
     com_in_base,
-    leans,
-    reaching,
+    friction_ratios,
     show_forces,
     show_moved_com,
+    stretched_arm_state,
 )
 from floatbase.objectives import (
     normal_bias,
@@ -25,7 +25,7 @@ from floatbase.objectives import (
 )
 
 GO2 = fb.load("go2")
-EOM = standing_go2()
+EOM = standing_go2_eom()
 FORCE = np.array([60.0, 0.0, GO2.weight])  # N, world: of exercise 05.4
 COST = wrench_objective(EOM.state, EOM.contacts, FORCE, [0.0, 0.0, 0.0])
 ROUNDING = 1e-9  # of forces of 100 N and levers of 1 m
@@ -52,14 +52,14 @@ def test_a_lean_is_friction_over_normal_force(normal: list[float]) -> None:
     contacts = fb.Contacts.points(GO2, normals=normal)
     n, t = np.array(normal), np.array([0.0, 1.0, 0.0])
     forces = [10 * n + 5 * t, 10 * n, -10 * n + t, t]
-    np.testing.assert_allclose(leans(contacts, np.ravel(forces)), [0.5, 0.0, np.inf, np.inf], atol=ROUNDING)
+    np.testing.assert_allclose(friction_ratios(contacts, np.ravel(forces)), [0.5, 0.0, np.inf, np.inf], atol=ROUNDING)
 
 
 def test_the_arm_takes_the_centre_of_mass_along() -> None:
-    ahead, left, right_hand = (com_in_base(reaching(turn)) for turn in (0.0, np.pi / 2, -np.pi / 2))
+    ahead, left, right_hand = (com_in_base(stretched_arm_state(turn)) for turn in (0.0, np.pi / 2, -np.pi / 2))
     assert left[1] > 0.04 > 0.005 > abs(ahead[1]) and right_hand[1] < -0.04
     assert ahead[0] > left[0] + 0.04
-    state = reaching(1.0).replace(v=None)
+    state = stretched_arm_state(1.0).replace(v=None)
     turned = com_in_base(state)
     expected = state.frame_pose("base").inverse().act(state.com)
     np.testing.assert_allclose(turned, expected, atol=ROUNDING)
@@ -67,7 +67,7 @@ def test_the_arm_takes_the_centre_of_mass_along() -> None:
 
 def test_given_forces_are_measured_on_the_physics() -> None:
     forces = leaning().minimiser()
-    record = fb.rollout(fb.Simulation(GO2, 0.5), GivenForces(GO2, EOM.contacts, forces), 0.1)
+    record = fb.rollout(fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1)
     np.testing.assert_allclose(record.measured[-1], forces, atol=1.0)  # N: the robot has moved by 2 cm
     np.testing.assert_allclose(record.planned[-1], forces, atol=ROUNDING)
     assert record.final.com_velocity[0] == pytest.approx(0.1 * 60.0 / GO2.mass, rel=0.03)
@@ -83,9 +83,9 @@ def test_the_pictures_are_drawn() -> None:
         assert "(60" in show_forces(view, EOM.state, EOM.contacts, forces) and "wish" not in view.renderer.picture
     finally:
         view.close()
-    arm_view = fb.Viewer(reaching(0.0).robot)
+    arm_view = fb.Viewer(stretched_arm_state(0.0).robot)
     try:
-        drawn = show_moved_com(arm_view, reaching(1.0), reaching(0.0), "before").renderer.picture
-        np.testing.assert_allclose(drawn["earlier/spot"].matrix[:2, 3], reaching(0.0).com[:2], atol=ROUNDING)
+        drawn = show_moved_com(arm_view, stretched_arm_state(1.0), stretched_arm_state(0.0), "before").renderer.picture
+        np.testing.assert_allclose(drawn["earlier/spot"].matrix[:2, 3], stretched_arm_state(0.0).com[:2], atol=ROUNDING)
     finally:
         arm_view.close()

@@ -14,16 +14,16 @@ from floatbase.friction import FrictionCone, FrictionPolyhedron, wrench_set
 from floatbase.lessons.lesson06 import (
     ConeController,
     compass_row,
-    lean,
-    least_inside,
+    constrained_minimiser,
+    friction_ratios,
+    make_controller,
     region_picture,
-    rose_controller,
     show_force,
     show_polyhedron,
     show_region,
     show_slope,
-    uphill,
-    with_feet,
+    slope_normal,
+    state_with_feet_at,
 )
 from floatbase.objectives import com_wrench_map
 from floatbase.viewer import Picture, shapes
@@ -37,13 +37,13 @@ SOLVED = 1e-5  # N: what the QP solver leaves in rows of forces up to 200 N
 def test_the_smallest_cost_within_rows_is_found() -> None:
     cost = fb.Quadratic.from_residual(np.eye(3), [3.0, 0.0, 1.0])
     rows = FrictionPolyhedron(UP, 0.5, 4).face_matrix
-    found = least_inside(cost, rows)
+    found = constrained_minimiser(cost, rows)
     assert np.allclose(found, FrictionPolyhedron(UP, 0.5, 4).project([3.0, 0.0, 1.0]), atol=SOLVED)
-    assert np.allclose(least_inside(cost, FrictionPolyhedron(UP, 5.0, 4).face_matrix), [3.0, 0.0, 1.0], atol=SOLVED)
+    assert np.allclose(constrained_minimiser(cost, FrictionPolyhedron(UP, 5.0, 4).face_matrix), [3.0, 0.0, 1.0], atol=SOLVED)
 
 
 def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed() -> None:
-    controller = rose_controller()
+    controller = make_controller()
     assert isinstance(controller, ConeController)
     still = fb.rollout(fb.Simulation(controller.robot), controller, 0.1)
     assert still.outcome == "completed" and np.allclose(still.planned[-1], still.measured[-1], atol=1.0)
@@ -57,20 +57,20 @@ def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed
 
 
 def test_dearer_moments_are_missed_by_less() -> None:
-    state = rose_controller().state
+    state = make_controller().state
     aside = state.replace(v=np.eye(18)[1] * 1.5)  # 1.5 m/s to the left: more than the cones can stop at once
     gaps = []
     for weight in (1.0, 100.0):
-        controller = ConeController(state.robot, rose_controller().contacts, state, moment_weight=weight)
+        controller = ConeController(state.robot, make_controller().contacts, state, moment_weight=weight)
         forces = controller(aside.q, aside.v).forces
         assert forces is not None
-        gaps.append(abs(com_wrench_map(aside, controller.contacts).A @ forces - np.concatenate(controller.wish(aside))))
+        gaps.append(abs(com_wrench_map(aside, controller.contacts).A @ forces - np.concatenate(controller.wrench_goal(aside))))
     (force, moment), (force_then, moment_then) = ((each[:3].max(), each[3:].max()) for each in gaps)
     assert moment_then < 0.5 * moment and force_then > force > 1.0
 
 
 def test_torques_of_the_controller_bring_about_the_forces_that_it_plans() -> None:
-    controller = rose_controller()
+    controller = make_controller()
     state = controller.robot.random_state(3, spread=0.05)
     q = controller.robot.standing().q.copy()
     q[7:] = state.q[7:] * 0.02 + q[7:] * 0.98
@@ -85,17 +85,17 @@ def test_legs_reach_given_places_or_say_that_they_do_not() -> None:
     robot = judges.load("go2")
     home = robot.standing()
     places = {foot.frame: np.array(home.frame_pose(foot.frame).translation) + [0.02, 0.01, 0.03] for foot in robot.feet}
-    reached = with_feet(robot, home.q[:3], places)
+    reached = state_with_feet_at(robot, home.q[:3], places)
     for name, place in places.items():
         assert np.allclose(reached.frame_pose(name).translation, place, atol=LENGTHS)
     with pytest.raises(InputError, match="cannot put its feet"):
-        with_feet(robot, home.q[:3] + [0.0, 0.0, 1.0], places)
+        state_with_feet_at(robot, home.q[:3] + [0.0, 0.0, 1.0], places)
 
 
 def test_lean_is_the_tangent_of_the_angle_to_the_normal() -> None:
-    assert np.allclose(uphill(20), [-np.sin(np.deg2rad(20)), 0.0, np.cos(np.deg2rad(20))])
-    assert np.allclose(lean([0, 0, 50.0, 30.0, 0, 40.0], UP), [0.0, 0.75])
-    assert np.allclose(lean([0, 0, 50.0], uphill(20)), np.tan(np.deg2rad(20)))
+    assert np.allclose(slope_normal(20), [-np.sin(np.deg2rad(20)), 0.0, np.cos(np.deg2rad(20))])
+    assert np.allclose(friction_ratios([0, 0, 50.0, 30.0, 0, 40.0], UP), [0.0, 0.75])
+    assert np.allclose(friction_ratios([0, 0, 50.0], slope_normal(20)), np.tan(np.deg2rad(20)))
 
 
 @pytest.mark.parametrize(("force", "status"), [((20, 0, 40), "inside"), ((28, 0, 40), "active"), ((0, 30, 40), "outside")])

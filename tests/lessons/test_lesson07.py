@@ -11,39 +11,39 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.lesson03 import standing_go2
+from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson07 import (
-    leaning,
-    milliseconds,
-    named,
+    leaning_controller,
+    make_controller,
+    median_time_ms,
+    multiplier_text,
+    plot_com_distance,
     plot_rounds,
-    plot_ways,
-    pushed,
-    rose_controller,
-    tuned,
+    run_with_push,
+    tuned_controller,
 )
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
-STATE = standing_go2().state
+STATE = standing_go2_eom().state
 GO2 = STATE.robot
 
 
 def test_standing_gains_are_those_of_the_standing_tasks() -> None:
-    qp, same = tuned(100, 20, 10, 1e-3).qp(STATE), rose_controller().qp(STATE)
+    qp, same = tuned_controller(100, 20, 10, 1e-3).qp(STATE), make_controller().qp(STATE)
     assert np.array_equal(qp.H, same.H) and np.array_equal(qp.g, same.g)
 
 
 def test_a_push_goes_to_the_left_for_a_tenth_of_a_second() -> None:
-    record = pushed(rose_controller(), 30.0, 0.4)
+    record = run_with_push(make_controller(), 30.0, 0.4)
     (push,) = record.pushes
     assert np.array_equal(push.force, [0, 30, 0]) and (push.start, push.duration) == (0.05, 0.1)
     assert record.com[150, 1] - record.com[40, 1] > 1e-3 and record.outcome == "completed"
 
 
 def test_a_note_names_the_dearest_rows_first() -> None:
-    assert named(rose_controller()(STATE.q, STATE.v).solution) == "no row has a price"
-    solution = fb.solve(leaning(0.5).qp(STATE))
-    note = named(solution)
+    assert multiplier_text(make_controller()(STATE.q, STATE.v).solution) == "no row has a price"
+    solution = fb.solve(leaning_controller(0.5).qp(STATE))
+    note = multiplier_text(solution)
     prices = [float(text) for text in re.findall(r"facet \d ([\d.]+)", note)]
     assert prices == sorted(prices, reverse=True) and len(prices) == len(solution.active) == 4
 
@@ -51,8 +51,8 @@ def test_a_note_names_the_dearest_rows_first() -> None:
 def test_pictures_show_what_they_are_given() -> None:
     figure: Any = plot_rounds([0, 1, 2], {"cold": [3, 4, 5], "warm": [1, 1, 1]})
     assert [line.get_ydata().tolist() for line in figure.axes[0].lines] == [[3, 4, 5], [1, 1, 1]]
-    record = pushed(rose_controller(), 60.0, 0.3)
-    ways: Any = plot_ways({"one": record})
+    record = run_with_push(make_controller(), 60.0, 0.3)
+    ways: Any = plot_com_distance({"one": record})
     com, feet = ways.axes
     assert com.lines[0].get_ydata().max() == pytest.approx(
         1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1).max()
@@ -64,4 +64,4 @@ def test_pictures_show_what_they_are_given() -> None:
 
 
 def test_milliseconds_are_milliseconds() -> None:
-    assert 2.0 <= milliseconds(lambda: time.sleep(0.002), 3) < 50.0
+    assert 2.0 <= median_time_ms(lambda: time.sleep(0.002), 3) < 50.0

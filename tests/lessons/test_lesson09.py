@@ -18,28 +18,28 @@ from floatbase.dynamics import LinearConstraint
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench, wrench_set
 from floatbase.lessons import all_exercises
 from floatbase.lessons.lesson09 import (
+    centre_of_pressure_path,
     corner_forces,
-    held,
-    how_it_ended,
-    kinds_of,
-    leaned,
-    leaning,
-    on_one_sole,
+    leaning_controller,
+    limit_kinds,
+    load_talos,
+    make_controller,
+    make_standing_controller,
+    outcome_text,
     play_resultants,
     plot_lean,
     plot_walk,
-    pressure,
-    rose_controller,
+    run_lean,
+    run_standing,
     show_sole,
     show_soles,
-    soles_from_above,
-    standing_rose_controller,
-    talos,
+    single_support_rows,
+    soles_picture,
 )
 from floatbase.simulation import Rollout
 from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 
-TALOS = talos()
+TALOS = load_talos()
 STATE = TALOS.standing()
 SOLES = fb.Contacts.flat_feet(TALOS, mu=0.7)
 LEFT = SOLES.only("left_sole_link")
@@ -54,7 +54,7 @@ def limits() -> WrenchSet:
 
 @cache
 def stood() -> Rollout:
-    return held(SOLES, 0.4)
+    return run_standing(SOLES, 0.4)
 
 
 @pytest.fixture
@@ -70,9 +70,9 @@ def view() -> Iterator[fb.Viewer]:
 def test_09_4_takes_no_lean_that_lets_arms_and_trunk_go(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = all_exercises()["09.4"].judge
     assert judge([1.5, 0.0]).hint in ("falls", "in_the_air")
-    record = leaned(1.5, 0.01)
+    record = run_lean(1.5, 0.01)
     jump = replace(record, measured=0.0 * record.measured)
-    monkeypatch.setattr("floatbase.lessons.lesson09.exercises.leaned", lambda seconds, posture: jump)
+    monkeypatch.setattr("floatbase.lessons.lesson09.exercises.run_lean", lambda seconds, posture: jump)
     assert judge([1.5, 0.01]).hint == "in_the_air"
 
 
@@ -83,18 +83,18 @@ def test_talos_stands_and_the_pressure_of_a_record_is_the_centre_of_pressure() -
     record = stood()
     assert record.outcome == "completed"
     expected = centre_of_pressure(record.final, SOLES, record.measured[-1])
-    assert np.allclose(pressure(record)[-1], expected[:2], atol=1e-5)
-    assert np.isnan(pressure(replace(record, measured=0.0 * record.measured))).all()
+    assert np.allclose(centre_of_pressure_path(record)[-1], expected[:2], atol=1e-5)
+    assert np.isnan(centre_of_pressure_path(replace(record, measured=0.0 * record.measured))).all()
 
 
 def test_how_a_record_ended_in_words() -> None:
     record = stood()
-    assert how_it_ended(record) == "stands"
+    assert outcome_text(record) == "stands"
     ways = {"falls forwards": [0.2, 0.1, 0], "falls backwards": [-0.2, 0.1, 0], "falls aside": [0.1, -0.2, 0]}
     for words, way in ways.items():
         q = np.array(record.q)
         q[-1, :3] += way
-        assert how_it_ended(replace(record, outcome="fell", q=q)) == words
+        assert outcome_text(replace(record, outcome="fell", q=q)) == words
 
 
 def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_where_they_do_not() -> None:
@@ -109,20 +109,20 @@ def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_w
 
 def test_rows_of_a_sole_have_names() -> None:
     rows = [[1, 0, -0.5, 0, 0, 0], [0, 0, -0.1, 0, 1, 0], [0.1, 0, -0.1, 0, 0, -1]]
-    assert kinds_of(rows) == ["sliding", "tipping", "twisting"]
+    assert limit_kinds(rows) == ["sliding", "tipping", "twisting"]
 
 
 def test_a_lean_goes_where_it_should_at_its_time() -> None:
-    path = next(task for task in leaning(6.0, 1.0, 0.01).tasks if isinstance(task, fb.CoMTask)).position
+    path = next(task for task in leaning_controller(6.0, 1.0, 0.01).tasks if isinstance(task, fb.CoMTask)).position
     assert isinstance(path, Swing)
     assert np.allclose(path(0.1)[0], STATE.com) and np.allclose(path(1.3)[0], STATE.com + [0.06, 0.0, 0.0])
-    record = leaned(1.5, 0.01)
+    record = run_lean(1.5, 0.01)
     assert np.isclose(record.final.com[0] - STATE.com[0], 0.06, atol=2e-3)
 
 
 def test_the_roses_are_of_talos_with_and_without_steps() -> None:
-    assert rose_controller().stepping_gait is not None and standing_rose_controller().stepping_gait is None
-    assert rose_controller().robot is standing_rose_controller().robot is TALOS
+    assert make_controller().stepping_gait is not None and make_standing_controller().stepping_gait is None
+    assert make_controller().robot is make_standing_controller().robot is TALOS
 
 
 # pictures -------------------------------------------------------------------------------------------------------------------
@@ -134,7 +134,7 @@ def test_soles_are_drawn_with_their_forces_and_crosses(view: fb.Viewer) -> None:
     assert drawn.count("<polygon") == 2 and drawn.count("<circle") == 8 + 1 and drawn.count("<path") == 3
     assert sum(path.startswith("planned/") for path in view.renderer.picture) == 8
     right_foot_up = np.concatenate([forces[:12], np.zeros(12)])
-    assert soles_from_above(STATE, SOLES, right_foot_up).count("<path") == 2
+    assert soles_picture(STATE, SOLES, right_foot_up).count("<path") == 2
     assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hex_code(colour) for colour in (*GREYS, PLANNED)}
 
 
@@ -162,7 +162,7 @@ def test_the_slice_is_as_wide_as_the_sole_and_as_high_as_the_twist(view: fb.View
 
 def test_a_plan_without_corners_is_played_with_its_resultants(view: fb.Viewer) -> None:
     bolts = fb.Contacts([LinearConstraint(sole.name, 6, sole.constraint) for sole in SOLES])
-    record = held(bolts, 0.1)
+    record = run_standing(bolts, 0.1)
     assert play_resultants(view, record, 0.5, "bolted") is view
     assert [path for path in view.renderer.picture if path.startswith("planned/")] == [
         f"planned/{name}" for name in bolts.names
@@ -172,12 +172,12 @@ def test_a_plan_without_corners_is_played_with_its_resultants(view: fb.Viewer) -
 def test_a_walk_and_a_lean_are_plotted_in_greys() -> None:
     walk = Walk(TALOS, SOLES, Gait.walk(TALOS, start=0.2), velocity=(0.2, 0.0))
     record = fb.rollout(fb.Simulation(TALOS), walk, 0.4, control_period=4e-3)
-    alone = on_one_sole(record)
-    assert alone and on_one_sole(stood()) == {}
+    alone = single_support_rows(record)
+    assert alone and single_support_rows(stood()) == {}
     for i, corners in alone.items():
         (foot,) = record.contacts_at(i).names
         assert np.allclose(corners.mean(axis=0), record.state(i).point(foot)[:2], atol=1e-6)
-    for axis, patches in ((plot_walk(record, walk.history), 1), (plot_lean(leaned(1.5, 0.01)), 0)):
+    for axis, patches in ((plot_walk(record, walk.history), 1), (plot_lean(run_lean(1.5, 0.01)), 0)):
         colours = {to_hex(line.get_color()).upper() for line in axis.get_lines()}
         assert colours == {hex_code(GREYS[0]), hex_code(GREYS[1])} and hex_code(MEASURED) not in colours
         assert sum(isinstance(patch, Polygon) for patch in axis.patches) >= patches

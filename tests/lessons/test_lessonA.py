@@ -11,7 +11,15 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.lessonA import circling, figure_of_eight, play_travel, plot_errors, show_ride, show_tumble, tool_error
+from floatbase.lessons.lessonA import (
+    elliptic_rotation,
+    figure_of_eight,
+    play_travelling_feet,
+    plot_errors,
+    show_tumble,
+    show_turntable,
+    tool_error,
+)
 from floatbase.simulation import Rollout
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
@@ -42,7 +50,7 @@ def test_the_tools_error_is_its_distance_from_the_path() -> None:
 
 @pytest.mark.parametrize("phase", [90.0, -90.0, 0.0])
 def test_a_circling_base_begins_and_ends_at_rest_and_its_rates_are_its_derivatives(phase: float) -> None:
-    path, d = circling(0.3, 0.35, 0.6, 6, phase), 1e-4
+    path, d = elliptic_rotation(0.3, 0.35, 0.6, 6, phase), 1e-4
     for t in (0.0, 10.0, 12.0):
         R, omega, alpha = path(t)
         assert np.allclose(R, np.eye(3), atol=1e-9)
@@ -62,7 +70,7 @@ def circled(yaw: float, phase: float) -> tuple[Rollout, np.ndarray]:
     robot = fb.load("go2")
     state, contacts = robot.standing(), fb.Contacts.points(robot)
     com, _, _ = fb.standing_tasks(state)
-    tasks = [com, fb.OrientationTask("base", circling(0.3, yaw, 0.6, 6, phase)), fb.PostureTask(state.q, weight=1e-3)]
+    tasks = [com, fb.OrientationTask("base", elliptic_rotation(0.3, yaw, 0.6, 6, phase)), fb.PostureTask(state.q, weight=1e-3)]
     controller = fb.WholeBodyController(robot, contacts, tasks)
     record = fb.rollout(fb.Simulation(robot), controller, 10.2, control_period=0.002)
     return record, 1000 * np.array([record.final.point(f) - state.point(f) for f in contacts.names])
@@ -76,9 +84,9 @@ def test_feet_travel_about_in_proportion_to_the_area_of_the_ellipse() -> None:
 def test_the_rider_sees_what_the_particle_does_and_the_table_has_turned() -> None:
     view = fb.Viewer(judges.load("go2"))
     try:
-        drawn = show_ride(view, 2.0, 0.0, 0.5)
+        drawn = show_turntable(view, 2.0, 0.0, 0.5)
         picture = view.renderer.picture
-        rest = show_ride(view, 0.0, 0.5, 1.0)
+        rest = show_turntable(view, 0.0, 0.5, 1.0)
     finally:
         view.close()
     r = np.hypot(0.7, 0.3)
@@ -123,7 +131,7 @@ def test_the_travelling_feet_are_played_with_marks_where_they_began() -> None:
     controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
     view = fb.Viewer(robot)
     try:
-        play_travel(view, fb.rollout(fb.Simulation(robot), controller, 0.3))
+        play_travelling_feet(view, fb.rollout(fb.Simulation(robot), controller, 0.3))
         picture = view.renderer.picture
     finally:
         view.close()

@@ -15,15 +15,15 @@ import floatbase as fb
 from floatbase.actuators import VACUUM, Cylinders, HydraulicActuators, Hydraulics
 from floatbase.lessons.lessonB import (
     Bench,
-    comes_back,
-    held_then_turned,
+    hold_then_turn,
+    plot_com_sway,
     plot_lever,
-    plot_sway,
+    plot_power,
     plot_torques,
-    plot_watts,
-    run_loop,
+    push_response,
+    run_force_loop,
     show_crank,
-    show_step,
+    show_torque_step,
 )
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
@@ -60,34 +60,34 @@ def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
 ) -> None:
     """Turned fast, out of reach, boiling: 0.4 s of go2's knee."""
     hydraulics = Hydraulics(loop_bandwidth=bandwidth, supply_pressure=supply)
-    actuators, motion = knee(hydraulics), held_then_turned(speed)
-    rows = run_loop(Bench(motion, wanted, hydraulics), bandwidth, 0.4)
+    actuators, motion = knee(hydraulics), hold_then_turn(speed)
+    rows = run_force_loop(Bench(motion, wanted, hydraulics), bandwidth, 0.4)
     centre = actuators.cylinders.max_lever_angle
     for row, after in pairwise(rows):
         angle, velocity = motion(row.time)
         actuators.step(np.full(12, wanted), centre + angle, np.full(12, velocity), 1e-3)
         got = actuators.torques(centre + after.angle)[KNEE]
         assert after.torque == pytest.approx(got, abs=ROUNDING * 1e2)
-        assert np.allclose(actuators.state.pressures[:, KNEE], [after.a, after.b], rtol=ROUNDING)
+        assert np.allclose(actuators.state.pressures[:, KNEE], [after.pressure_a, after.pressure_b], rtol=ROUNDING)
 
 
 def test_the_benchs_spring_rate_and_reach_are_the_cylinders() -> None:
     actuators = HydraulicActuators(ROBOT)
     cylinders, angle = actuators.cylinders, 0.4
     bench, geometry = Bench(lambda t: (angle, 0.0)), cylinders.geometry(cylinders.max_lever_angle + angle)
-    assert bench.spring == pytest.approx(geometry.lever[KNEE] ** 2 * geometry.stiffness[KNEE], rel=1e-12)
+    assert bench.stiffness == pytest.approx(geometry.lever[KNEE] ** 2 * geometry.stiffness[KNEE], rel=1e-12)
     assert bench.volumes == pytest.approx(tuple(geometry.volumes[:, KNEE]), rel=1e-12)
-    assert bench.reach() == pytest.approx(tuple((geometry.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12)
-    pressures = np.array([[bench.a], [bench.b]]) * np.ones(12)
+    assert bench.torque_range() == pytest.approx(tuple((geometry.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12)
+    pressures = np.array([[bench.pressure_a], [bench.pressure_b]]) * np.ones(12)
     for side in (1.0, -1.0):
         rates = cylinders.pressure_rates(np.full(12, side), pressures, geometry, np.zeros(12))
         leaking = cylinders.pressure_rates(np.zeros(12), pressures, geometry, np.zeros(12))
         change = geometry.lever * cylinders.force(rates - leaking)
-        assert bench.rate(side) == pytest.approx(side * change[KNEE], rel=1e-9)
+        assert bench.torque_rate(side) == pytest.approx(side * change[KNEE], rel=1e-9)
 
 
 def test_the_joint_is_held_then_turned_then_held() -> None:
-    motion = held_then_turned(2.0, start=0.1, end=0.6)
+    motion = hold_then_turn(2.0, start=0.1, end=0.6)
     assert motion(0.05) == (0.0, 0.0) and motion(0.3) == pytest.approx((0.4, 2.0)) and motion(0.9) == (0.6, 0.0)
 
 
@@ -95,7 +95,7 @@ def test_a_valve_told_to_open_more_than_it_can_is_all_open() -> None:
     wide, full = Bench(), Bench()
     wide.step(7.0)
     full.step(1.0)
-    assert wide.rows == full.rows and wide.rows[-1].u == 1.0 and wide.rows[-1].time == pytest.approx(1e-3)
+    assert wide.samples == full.samples and wide.samples[-1].u == 1.0 and wide.samples[-1].time == pytest.approx(1e-3)
 
 
 # pictures
@@ -115,16 +115,16 @@ def test_the_crank_is_drawn_with_its_lever_and_what_is_out_of_reach_is_said(view
     assert "more than the supply gives" not in best and "more than the supply gives" in show_crank(view, -80.0, 12.0)
     a, b = (int(bar) for bar in re.findall(r"(\d+) bar", best))
     bench = Bench()
-    assert bench.lever * 1e5 * (a * bench.area - b * bench.ring) == pytest.approx(12.0, abs=0.4)  # N·m: bars are rounded
+    assert bench.lever * 1e5 * (a * bench.piston_area - b * bench.ring_area) == pytest.approx(12.0, abs=0.4)  # N·m: bars are rounded
 
 
 def test_the_step_response_tells_when_the_torque_comes_and_when_oil_boils() -> None:
-    quick, slow, torn = show_step(50.0, 160.0, 0.0), show_step(5.0, 160.0, 0.0), show_step(50.0, 60.0, 20.0)
+    quick, slow, torn = show_torque_step(50.0, 160.0, 0.0), show_torque_step(5.0, 160.0, 0.0), show_torque_step(50.0, 60.0, 20.0)
     comes = [int(re.findall(r"after <b>(\d+) ms", text)[0]) for text in (quick, slow)]
     assert comes[0] < 15 < comes[1] < 120
     assert "no oil boils" in quick and "no oil boils" in slow and "the oil boils for" in torn
-    bench = Bench(held_then_turned(20.0), hydraulics=replace(Hydraulics(), supply_pressure=60e5))
-    boiled = sum(min(row.a, row.b) <= VACUUM for row in run_loop(bench, 50.0, 0.4))
+    bench = Bench(hold_then_turn(20.0), hydraulics=replace(Hydraulics(), supply_pressure=60e5))
+    boiled = sum(min(row.pressure_a, row.pressure_b) <= VACUUM for row in run_force_loop(bench, 50.0, 0.4))
     assert f"boils for {boiled} ms" in torn
     assert set(re.findall(r"#[0-9A-F]{6}", torn)) <= {hex_code(grey) for grey in GREYS}
     assert re.findall(r"<text[^>]*\sfill=", torn) == []
@@ -133,12 +133,12 @@ def test_the_step_response_tells_when_the_torque_comes_and_when_oil_boils() -> N
 def test_plots_show_what_they_are_given() -> None:
     bench = Bench()
     bench.step(0.1)
-    runs = {"one": bench.rows, "two": bench.rows}
+    runs = {"one": bench.samples, "two": bench.samples}
     record = fb.rollout(fb.Simulation(ROBOT), judges.controller_of("go2"), 0.02)
     gone = 1000 * (record.com - record.com[0])[:, 1]
-    torques, sways = plot_torques(runs), plot_sway({"perfect": record}, side=-1)
-    levers, watts = plot_lever([0, 1], [36, 0]), plot_watts(np.arange(6.0).reshape(3, 2), ("pump", "joint"))
-    assert np.allclose(torques.lines[1].get_ydata(), [row.torque for row in bench.rows])
+    torques, sways = plot_torques(runs), plot_com_sway({"perfect": record}, side=-1)
+    levers, watts = plot_lever([0, 1], [36, 0]), plot_power(np.arange(6.0).reshape(3, 2), ("pump", "joint"))
+    assert np.allclose(torques.lines[1].get_ydata(), [row.torque for row in bench.samples])
     assert np.allclose(sways.lines[0].get_ydata(), -gone) and "right" in sways.get_ylabel()
     assert np.allclose(levers.lines[0].get_ydata(), [36, 0])
     assert np.allclose(watts.lines[1].get_ydata(), [1, 3, 5])
@@ -151,7 +151,7 @@ def test_plots_show_what_they_are_given() -> None:
 
 
 def test_go2_stays_aside_by_what_leaks_and_less_on_a_stiffer_spring() -> None:
-    soft, stiff = comes_back(100.0, 20.0), comes_back(250.0, 20.0)
+    soft, stiff = push_response(100.0, 20.0), push_response(250.0, 20.0)
     assert soft.outcome == stiff.outcome == "completed"
-    assert 2.0 < soft.off / stiff.off < 4.0
-    assert soft.off > 3.0 and max(soft.swing, stiff.swing) < 1.0
+    assert 2.0 < soft.offset / stiff.offset < 4.0
+    assert soft.offset > 3.0 and max(soft.oscillation, stiff.oscillation) < 1.0

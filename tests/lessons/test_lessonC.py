@@ -9,25 +9,25 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.lessons import about, all_exercises, check, progress
+from floatbase.lessons import all_exercises, check, progress, rounded
 from floatbase.lessons.lessonC import (
-    EveryTick,
-    Game,
-    Stopped,
-    beale,
-    between_walls,
-    braking,
+    ActiveSetGame,
+    LimitedActiveSet,
+    SolverController,
+    answer_or_default,
+    beale_problem,
+    braking_qp,
+    central_path,
     corner_table,
+    hexagon_table,
     longest_step,
     plot_problem,
     plot_rounds,
-    pushed,
-    right_or,
     row_to_drop,
+    run_with_push,
+    show_solver_path,
     show_table,
-    show_way,
-    six_edges,
-    standing,
+    standing_controller,
 )
 from floatbase.qp import active_set, solve
 
@@ -49,9 +49,9 @@ def test_functions_and_names_that_stand_in_a_stub_count_no_try(monkeypatch: pyte
 def test_the_lesson_goes_on_with_an_answer_only_if_it_is_right(capsys: pytest.CaptureFixture[str]) -> None:
     examples = all_exercises()["C.2"].examples()
     mine, wrong = (next(answer for answer, hint in examples if hint == name) for name in ("", "nearest"))
-    assert right_or("C.2", mine, longest_step) is mine
+    assert answer_or_default("C.2", mine, longest_step) is mine
     assert "with yours" in capsys.readouterr().out
-    assert right_or("C.2", wrong, longest_step) is longest_step
+    assert answer_or_default("C.2", wrong, longest_step) is longest_step
     assert "not yet right" in capsys.readouterr().out
 
 
@@ -59,7 +59,7 @@ def test_the_lesson_goes_on_with_an_answer_only_if_it_is_right(capsys: pytest.Ca
 
 
 def test_every_bowl_of_the_game_can_be_solved_by_its_rows_and_by_no_others() -> None:
-    game = Game()
+    game = ActiveSetGame()
     seen = []
     for _ in range(5):
         solved_by, names = [], list(game.rows)
@@ -78,31 +78,31 @@ def test_every_bowl_of_the_game_can_be_solved_by_its_rows_and_by_no_others() -> 
 
 
 def test_the_game_tells_what_is_broken_what_pulls_and_what_has_no_point() -> None:
-    game = Game([(0.5, -1.0)])
-    assert "table is broken by 1;" in game.told and "0 clicks" in game.told and not game.solved
+    game = ActiveSetGame([(0.5, -1.0)])
+    assert "table is broken by 1;" in game.message and "0 clicks" in game.message and not game.solved
     game.rows["table"].click()
-    assert "solved" in game.told and "1 click:" in game.told and game.solved
+    assert "solved" in game.message and "1 click:" in game.message and game.solved
     game.rows["ramp"].click()
-    assert "ramp pulls: its price is -1.5" in game.told and not game.solved
+    assert "ramp pulls: its price is -1.5" in game.message and not game.solved
     game.rows["roof"].click()
-    assert "no point" in game.told and not game.solved
-    assert "✓" not in game.told and game.rows["roof"].icon == "check" and game.rows["wall"].icon == ""
+    assert "no point" in game.message and not game.solved
+    assert "✓" not in game.message and game.rows["roof"].icon == "check" and game.rows["wall"].icon == ""
 
 
 def test_the_rows_of_a_qp_are_those_that_the_lesson_describes() -> None:
     along, up = 0.7, 0.1
     assert np.allclose(corner_table().G @ [along, up], [-up, along - 3 * up, 2 * along + 3 * up, -along])
-    edges = six_edges()
+    edges = hexagon_table()
     assert np.allclose(np.linalg.norm(edges.G, axis=1), 1.0) and np.all(edges.h == 2.0)
     assert np.allclose(np.linalg.solve(edges.H, -edges.g), [1.0, 3.9])
     assert np.allclose(np.linalg.eigvalsh(edges.H), [1.0, 8.0])
-    assert np.sum(beale().h == 0.0) == 6
+    assert np.sum(beale_problem().h == 0.0) == 6
 
 
 def test_the_soft_walls_lead_through_the_middle_to_the_optimum() -> None:
-    for qp, start in ((six_edges(), (1.5, 0.0)), (corner_table((2.5, 2.0)), (-1.0, 0.5))):
+    for qp, start in ((hexagon_table(), (1.5, 0.0)), (corner_table((2.5, 2.0)), (-1.0, 0.5))):
         softness = 100.0 * 0.5 ** np.arange(30)
-        points = between_walls(qp, start, softness)
+        points = central_path(qp, start, softness)
         for t, x in zip(softness, points, strict=True):
             slack = qp.h - qp.G @ x
             assert np.all(slack > 0)
@@ -115,21 +115,21 @@ def test_the_soft_walls_lead_through_the_middle_to_the_optimum() -> None:
 
 
 def test_any_solver_may_drive_the_robot_and_the_same_answer_gives_the_same_torques() -> None:
-    controller = standing()
+    controller = standing_controller()
     state = controller.robot.standing().replace(v=0.5 * np.eye(18)[1])
     for solver in (lambda qp: solve(qp).x, lambda qp: active_set(qp).solution.x):
-        found = EveryTick(controller, solver)(state.q, state.v, 0.0)
+        found = SolverController(controller, solver)(state.q, state.v, 0.0)
         expected = controller(state.q, state.v)
         assert np.allclose(found.tau, expected.tau, atol=1e-6)
         assert found.forces is not None and np.allclose(np.ravel(found.forces), np.ravel(expected.forces), atol=1e-6)
     with pytest.raises(fb.FloatbaseError, match="x has shape"):
-        EveryTick(controller, lambda qp: np.zeros(3))(state.q, state.v, 0.0)
+        SolverController(controller, lambda qp: np.zeros(3))(state.q, state.v, 0.0)
 
 
 def test_a_stopped_solver_keeps_its_rows_for_the_next_tick_only_when_it_is_warm() -> None:
-    qp = braking()
+    qp = braking_qp()
     for warm in (True, False):
-        solver = Stopped(most=1, warm=warm)
+        solver = LimitedActiveSet(max_rounds=1, warm=warm)
         for _ in range(40):
             solver(qp)
         assert {run.solution.iterations for run in solver.runs} == {1}
@@ -160,7 +160,7 @@ def walked(qp: fb.QP, x: Any, most: int) -> tuple[Any, int]:
 
 def test_the_solver_of_the_lesson_ends_at_every_tick_of_a_large_push() -> None:
     """At 150 N four facets of one foot are met at once: a speed that is rounding once let it go round for ever."""
-    controller = standing()
+    controller = standing_controller()
     quarter = np.tile([0.0, 0.0, controller.robot.weight / 4], 4)
 
     def solver(qp: fb.QP) -> Any:
@@ -170,11 +170,11 @@ def test_the_solver_of_the_lesson_ends_at_every_tick_of_a_large_push() -> None:
         assert np.allclose(space(beta), solve(qp).x, atol=1e-6)
         return space(beta)
 
-    assert pushed(EveryTick(controller, solver), 150.0, 0.3).outcome == "completed"
+    assert run_with_push(SolverController(controller, solver), 150.0, 0.3).outcome == "completed"
 
 
 def test_a_push_goes_where_it_is_sent() -> None:
-    (push,) = pushed(standing(), 30.0, 0.06, towards=45.0).pushes
+    (push,) = run_with_push(standing_controller(), 30.0, 0.06, towards=45.0).pushes
     assert np.allclose(push.force, 30.0 * np.array([0.5**0.5, 0.5**0.5, 0.0]))
     assert (push.start, push.duration) == (0.05, 0.1)
 
@@ -184,12 +184,12 @@ def test_a_push_goes_where_it_is_sent() -> None:
 
 def test_pictures_show_what_they_are_given() -> None:
     assert "does not touch" in show_table(1.0) and "price of the row: <b>3</b>" in show_table(-1.5)
-    edges = six_edges()
+    edges = hexagon_table()
     ways = [(np.zeros(2), []), (np.array([1.0, 0.0]), [0])]
-    assert "on: no row" in show_way(edges, ways, 0) and "on: edge 0" in show_way(edges, ways, 1)
-    between = show_way(edges, ways, 0.5)
-    assert "on: no row" in between and between != show_way(edges, ways, 0)
-    assert about(edges.objective(np.array([0.5, 0.0])), digits=3) in between
+    assert "on: no row" in show_solver_path(edges, ways, 0) and "on: edge 0" in show_solver_path(edges, ways, 1)
+    between = show_solver_path(edges, ways, 0.5)
+    assert "on: no row" in between and between != show_solver_path(edges, ways, 0)
+    assert rounded(edges.objective(np.array([0.5, 0.0])), digits=3) in between
     problem: Any = plot_problem(edges, (1.5, 0.0))
     assert problem.lines[-1].get_xydata().tolist() == [[1.5, 0.0]]
     rounds: Any = plot_rounds({"yours": [3.0, 2.0, 1.0]}, "objective")

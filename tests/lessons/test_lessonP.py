@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.lessonP import BAG, on_two_feet, plot_gains, plot_outcomes, sinks
-from floatbase.playground import CARDS, Session, Settings
+from floatbase.lessons.lessonP import BAG_MASS, com_sag, plot_gains, plot_outcomes, time_on_two_feet
+from floatbase.playground import CHALLENGES, Session, Settings
 
 GO2 = judges.load("go2")
 FORMULA = 0.07  # of what a spring says: legs have masses of their own
@@ -18,8 +18,8 @@ FORMULA = 0.07  # of what a spring says: legs have masses of their own
 
 @pytest.mark.parametrize("kp", [100.0, 400.0, 1000.0])
 def test_an_unknown_bag_stretches_the_spring(kp: float) -> None:
-    assert sinks(kp) == pytest.approx(BAG / GO2.mass * 9.81 / kp, rel=FORMULA)
-    assert sinks(kp, 0.0) == pytest.approx(0.0, abs=1e-5)
+    assert com_sag(kp) == pytest.approx(BAG_MASS / GO2.mass * 9.81 / kp, rel=FORMULA)
+    assert com_sag(kp, 0.0) == pytest.approx(0.0, abs=1e-5)
 
 
 def _shift() -> np.ndarray:
@@ -32,28 +32,28 @@ def _shift() -> np.ndarray:
 
 def test_it_stays_up_on_two_feet_for_longest_where_p_2_puts_it() -> None:
     shift = _shift()
-    best = on_two_feet(shift)
-    assert best > 1.0 > 0.2 + on_two_feet(-shift) and best > 1.3 * on_two_feet(np.zeros(3))
-    assert best > 1.2 * on_two_feet(2 * shift)
+    best = time_on_two_feet(shift)
+    assert best > 1.0 > 0.2 + time_on_two_feet(-shift) and best > 1.3 * time_on_two_feet(np.zeros(3))
+    assert best > 1.2 * time_on_two_feet(2 * shift)
 
 
 def test_p_2_solves_the_first_challenge() -> None:
     x, y, _ = _shift()
-    card = CARDS[0]
-    session, judge = Session(GO2, replace(card.start, shift=(x, y, 0.0))), card.judge()
-    for seconds, changes in ((1.0, {}), (2.4, {"lifted": ("FR_foot", "RL_foot")})):
+    challenge = CHALLENGES[0]
+    session, judge = Session(GO2, replace(challenge.start, com_shift=(x, y, 0.0))), challenge.judge()
+    for seconds, changes in ((1.0, {}), (2.4, {"lifted_feet": ("FR_foot", "RL_foot")})):
         session.change(**changes)
         for _ in range(round(seconds / 0.032)):
             record = fb.rollout(session.sim, session.controller, 0.032, control_period=4e-3)
-            session.see(record)
-            judge.see(record, session)
-    assert judge.won, judge.says
+            session.observe(record)
+            judge.observe(record, session)
+    assert judge.won, judge.message
 
 
 def test_outcomes_are_plotted_where_they_belong() -> None:
     stands, falls = (
         fb.rollout(session.sim, session.controller, 0.4, control_period=4e-3)
-        for session in (Session(GO2), Session(GO2, Settings(believed_off=("zeros",))))
+        for session in (Session(GO2), Session(GO2, Settings(assumed_off=("zeros",))))
     )
     assert (stands.outcome, falls.outcome) == ("completed", "fell")
     axis = plot_outcomes({(0.1, 0.2): stands, (0.3, 0.2): falls}, "friction")

@@ -11,8 +11,8 @@ import pytest
 from waiting import until
 
 import floatbase as fb
-from floatbase.lessons import SliderPanel, live, push_panel, slider_panel
-from floatbase.lessons.stops import of_panel
+from floatbase.lessons import SliderPanel, live_run, push_panel, slider_panel
+from floatbase.lessons.slider_samples import panel_samples
 from floatbase.simulation import LiveSimulation
 
 RANGES = [
@@ -101,7 +101,7 @@ def test_a_slider_of_whole_numbers_has_only_those_also_without_a_kernel() -> Non
     panel = slider_panel(None, lambda rounds: f"{rounds:g}", rounds=range(31))
     slider = panel.sliders["rounds"]
     assert (slider.min, slider.value, slider.max, slider.step, slider.readout_format) == (0, 0, 30, 1, ".0f")
-    assert {value % 1 for value in of_panel(panel)["rounds"]} == {0.0}
+    assert {value % 1 for value in panel_samples(panel)["rounds"]} == {0.0}
 
 
 def test_a_panel_without_a_view_shows_what_its_function_returns() -> None:
@@ -119,8 +119,8 @@ class Pushed:
         controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
         self.view = fb.Viewer(robot)
         self.sim = fb.Simulation(robot)
-        self.run: LiveSimulation = live(self.sim, controller, self.view)
-        _, self.force, row, self.speed, buttons = push_panel(self.run, self.view, most=600.0).children
+        self.run: LiveSimulation = live_run(self.sim, controller, self.view)
+        _, self.force, row, self.speed, buttons = push_panel(self.run, self.view, max_force=600.0).children
         self.towards, self.push = row.children
         self.line = buttons.children[-1]
         self.buttons: dict[str, widgets.Button] = {b.description: b for b in buttons.children[:-1]}

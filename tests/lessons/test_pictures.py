@@ -16,9 +16,9 @@ import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium, served
 
 import floatbase as fb
-from floatbase.lessons import ConstantTorques, live, push_panel, slider_panel, static_export
+from floatbase.lessons import ConstantTorques, live_run, push_panel, slider_panel, static_export
 from floatbase.lessons.publish import pictures
-from floatbase.lessons.stops import MOST, places, stops
+from floatbase.lessons.slider_samples import MAX_COMBINATIONS, combinations, sample_values
 from floatbase.viewer.scene import protocol
 
 Pictures = pictures.Pictures
@@ -82,7 +82,7 @@ def scene_at(data: dict[str, Any], stop: str | None = None, view: int = 0) -> di
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
 def test_stops_are_some_ten_and_go_through_what_the_slider_can_be(low: float, first: float, high: float, step: float) -> None:
-    found = stops(low, first, high, step)
+    found = sample_values(low, first, high, step)
     assert {low, first, high} <= set(found) and list(found) == sorted(set(found))
     assert 6 <= len(found) <= 16
     assert np.allclose([(x - low) / step for x in found], [round((x - low) / step) for x in found], atol=1e-6)
@@ -90,22 +90,22 @@ def test_stops_are_some_ten_and_go_through_what_the_slider_can_be(low: float, fi
 
 
 def test_a_slider_without_a_range_has_one_stop() -> None:
-    assert stops(2.0, 2.0, 2.0, 1.0) == (2.0,)
+    assert sample_values(2.0, 2.0, 2.0, 1.0) == (2.0,)
 
 
 def test_few_combinations_are_all_computed_and_of_many_one_slider_at_a_time() -> None:
-    assert places([3, 2], [1, 0]) == ([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)], True)
-    alone, together = places([5, 5, 5], [1, 2, 4])
+    assert combinations([3, 2], [1, 0]) == ([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)], True)
+    alone, together = combinations([5, 5, 5], [1, 2, 4])
     assert not together and len(alone) == 13 and len(set(alone)) == 13  # 5 + 5 + 5, the first place once
     assert all(sum(a != b for a, b in zip(place, (1, 2, 4), strict=True)) <= 1 for place in alone)
-    assert places([MOST], [0])[1] and not places([MOST + 1], [0])[1]
+    assert combinations([MAX_COMBINATIONS], [0])[1] and not combinations([MAX_COMBINATIONS + 1], [0])[1]
 
 
 # panels -----------------------------------------------------------------------------------------------------------------
 
 
 def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more(view: fb.Viewer) -> None:
-    panel = squat(view, stops={"down": (0, 0.05, 0.1), "force": (0, 30, 60)}, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
+    panel = squat(view, samples={"down": (0, 0.05, 0.1), "force": (0, 30, 60)}, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
     data = data_of(panel)
     assert data["together"] and set(data["stops"]) == {f"{i},{k}" for i in range(3) for k in range(3)}
     assert data["stops"]["1,1"][1] == []  # where all began
@@ -147,7 +147,7 @@ def test_many_sliders_move_one_at_a_time_and_the_page_says_so(view: fb.Viewer) -
 
 
 def test_a_panel_without_a_view_keeps_its_notes() -> None:
-    data = data_of(slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", stops={"x": (0, 1, 2)}, x=(0, 1, 2)))
+    data = data_of(slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", samples={"x": (0, 1, 2)}, x=(0, 1, 2)))
     assert data["notes"] == [f"<img alt='{i}'>" for i in range(3)] and data["first"] == []
     assert data["stops"] == {"0": [0], "1": [1], "2": [2]}
 
@@ -167,9 +167,9 @@ def test_a_push_panel_becomes_recorded_runs(view: fb.Viewer) -> None:
     sim = fb.Simulation(view.robot)
     controller = fb.WholeBodyController(view.robot, sim.feet, fb.standing_tasks(sim.state))
     view.show(sim.state, sim.feet)
-    run = live(sim, controller, view)
+    run = live_run(sim, controller, view)
     fb.rollout(sim, controller, 0.6, [fb.Push([0.0, 480.0, 0.0], start=0.0)])  # the robot of the panel has fallen
-    data = data_of(push_panel(run, view, most=480.0))
+    data = data_of(push_panel(run, view, max_force=480.0))
     assert [len(control["values"]) for control in data["controls"]] == [5, 4]
     for unpushed in (scene_at(data), scene_at(data, "0,1")):
         assert not any(key[1] == ANIMATION for key in unpushed)
@@ -245,9 +245,9 @@ def test_the_playground_stands_still_and_says_why(go2: fb.Robot) -> None:
 
 
 def test_the_game_of_rows_has_every_set_of_rows() -> None:
-    from floatbase.lessons.lessonC import Game
+    from floatbase.lessons.lessonC import ActiveSetGame
 
-    game = Game()
+    game = ActiveSetGame()
     data = data_of(game)
     bowls = data["controls"][0]["values"]
     assert len(data["stops"]) == len(bowls) * 2 ** len(game.rows)
@@ -269,11 +269,11 @@ def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FLOATBASE_VIEWER", "site")
         given = {"down": (0, 0.05, 0.1), "force": (0, 30, 60)}
-        panel = squat(views[0], stops=given, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
+        panel = squat(views[0], samples=given, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
         push = fb.Push(np.array([0.0, 40.0, 0.0]), 0.1, 0.05)
         record = fb.rollout(fb.Simulation(go2), ConstantTorques(np.zeros(12)), 0.2, [push])
         moving = views[1].play(record, title="falls")
-        note = slider_panel(None, lambda x: f"x is {x:.0f}", stops={"x": (0, 1, 2)}, x=(0, 1, 2))
+        note = slider_panel(None, lambda x: f"x is {x:.0f}", samples={"x": (0, 1, 2)}, x=(0, 1, 2))
         shown = [made.place(one._repr_mimebundle_()) for one in (panel, note, moving)]
     for one in views:
         one.close()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from floatbase.errors import InputError
-from floatbase.lessons import about, check, compare, predict, progress, review
+from floatbase.lessons import check, compare, predict, progress, review, rounded
 
 CHOICES = ["in the push", "at rest", "in the first millisecond"]
 
@@ -51,7 +51,7 @@ def test_a_prediction_is_shown_beside_the_result_and_how_far_off_it_was(
     predict("02.c", given, unit="mm", count=np.size(given))
     compare("02.c", np.array(result))
     before, after = said()
-    assert before.startswith("02.c: ") and f"{about(given, 'mm', digits=6)}" in before
+    assert before.startswith("02.c: ") and f"{rounded(given, 'mm', digits=6)}" in before
     found = re.findall(r"\([^)]*\) mm|-?\d+(?:\.\d+)?(?: mm)?", after.removeprefix("02.c: "))
     assert found == shown
 
@@ -198,7 +198,7 @@ def test_damage_is_left_out_and_left_as_it_is(home: Path, said: Any, text: str) 
 
 @pytest.mark.parametrize("before", ["a text", [1, 2]])
 def test_what_was_said_to_another_question_of_that_name_does_no_harm(said: Any, before: Any) -> None:
-    progress.keep("02.c", {"said": before, "unit": "mm"})
+    progress.append("02.c", {"said": before, "unit": "mm"})
     compare("02.c", 69.2)
     review()
     assert said()[0].startswith("02.c: 69 mm")

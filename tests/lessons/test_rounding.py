@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from floatbase.errors import InputError
-from floatbase.lessons import about
+from floatbase.lessons import rounded
 
 LAST_BITS = 1e-7  # relative: far more than what processors differ by in a lesson's numbers
 HALF_A_STEP = 0.05  # relative: the second of two digits is off by a half at most, and the first is 1 at least
@@ -27,13 +27,13 @@ SECOND_ROUNDING = 1e-5  # relative: what the first rounding, to six digits, adds
     ],
 )  # fmt: skip
 def test_a_number_has_two_digits_and_no_minus_zero(number: Any, text: str) -> None:
-    assert about(number) == text
+    assert rounded(number) == text
 
 
 def test_a_unit_stands_behind_and_digits_and_floor_can_be_chosen() -> None:
-    assert (about(69.2, "mm"), about(30.0, "°"), about(np.nan, "mm")) == ("69 mm", "30°", "not a number")
-    assert (about(157.76, "N", digits=4), about(157.76, "N", digits=1)) == ("157.8 N", "200 N")
-    assert (about(3e-14, floor=0.0), about(0.04, "N", floor=0.05)) == ("3e-14", "0 N")
+    assert (rounded(69.2, "mm"), rounded(30.0, "°"), rounded(np.nan, "mm")) == ("69 mm", "30°", "not a number")
+    assert (rounded(157.76, "N", digits=4), rounded(157.76, "N", digits=1)) == ("157.8 N", "200 N")
+    assert (rounded(3e-14, floor=0.0), rounded(0.04, "N", floor=0.05)) == ("3e-14", "0 N")
 
 
 @pytest.mark.parametrize(
@@ -44,26 +44,26 @@ def test_a_unit_stands_behind_and_digits_and_floor_can_be_chosen() -> None:
     ],
 )  # fmt: skip
 def test_an_array_is_written_entry_by_entry_and_what_rounding_left_in_it_is_zero(numbers: Any, text: str) -> None:
-    assert about(numbers) == text
+    assert rounded(numbers) == text
 
 
 def test_with_no_floor_an_array_keeps_its_smallest_entries() -> None:
-    assert about([1.0, 3e-14], floor=0.0) == "(1, 3e-14)"
+    assert rounded([1.0, 3e-14], floor=0.0) == "(1, 3e-14)"
 
 
 @pytest.mark.parametrize("half", [12.5, 2.45, 0.125, 1.05, 99.5, 0.355, 1.55, -0.0655])
 def test_halves_are_rounded_away_from_zero_whatever_the_last_bits_are(half: float) -> None:
-    assert about(half * (1 - LAST_BITS)) == about(half) == about(half * (1 + LAST_BITS))
-    assert abs(float(about(half))) > abs(half)
+    assert rounded(half * (1 - LAST_BITS)) == rounded(half) == rounded(half * (1 + LAST_BITS))
+    assert abs(float(rounded(half))) > abs(half)
 
 
 @given(st.floats(1e-3, 1e9) | st.floats(-1e9, -1e-3))
 def test_what_is_printed_is_near_the_number(x: float) -> None:
-    assert float(about(x)) == pytest.approx(x, rel=HALF_A_STEP + SECOND_ROUNDING)
-    assert float(about(x, digits=12)) == pytest.approx(x, rel=1e-11)  # half of the twelfth digit
+    assert float(rounded(x)) == pytest.approx(x, rel=HALF_A_STEP + SECOND_ROUNDING)
+    assert float(rounded(x, digits=12)) == pytest.approx(x, rel=1e-11)  # half of the twelfth digit
 
 
 @pytest.mark.parametrize("nothing", [True, [True, False], "69", None, 1j, {}, [1.0, "x"]])
 def test_what_holds_no_numbers_is_refused(nothing: Any) -> None:
     with pytest.raises(InputError, match="must be a number or an array of numbers"):
-        about(nothing)
+        rounded(nothing)

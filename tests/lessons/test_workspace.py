@@ -20,7 +20,7 @@ from nbformat.v4 import new_code_cell, new_notebook, new_output
 
 from floatbase.errors import InputError
 from floatbase.lessons import progress
-from floatbase.lessons.publish import MINE, prepare
+from floatbase.lessons.publish import MY_FOLDER, prepare_workspace
 
 KILLS = 20
 LESSON, NEW, NEW2 = "00_a.ipynb", "00_a.new.ipynb", "00_a.new2.ipynb"
@@ -52,8 +52,8 @@ def mine(course: Path) -> Path:
     """The learner's folder, prepared."""
     (course / "page.md").write_text("a page, 1")
     write(course / "01_b.ipynb", "first = 1")
-    prepare(course)
-    return course / MINE
+    prepare_workspace(course)
+    return course / MY_FOLDER
 
 
 def update(course: Path, n: int = 2) -> None:
@@ -64,8 +64,8 @@ def update(course: Path, n: int = 2) -> None:
 
 def test_a_copy_does_not_answer_what_it_asks_the_learner_to_predict(course: Path) -> None:
     write(course / LESSON, "first = 1", output="1\n")
-    prepare(course)
-    assert nbformat.read(course / MINE / LESSON, as_version=4).cells[0].outputs == []
+    prepare_workspace(course)
+    assert nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells[0].outputs == []
 
 
 def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> None:
@@ -73,48 +73,48 @@ def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> No
     claims = new_code_cell("assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}})
     question.outputs = [new_output("stream", text="00.a: skipped. Running on is fine.")]
     nbformat.write(new_notebook(cells=[question, claims]), course / LESSON)
-    prepare(course)
-    copied = nbformat.read(course / MINE / LESSON, as_version=4).cells
+    prepare_workspace(course)
+    copied = nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells
     assert [(cell.source, cell.metadata) for cell in copied] == [(cell.source, cell.metadata) for cell in (question, claims)]
     assert copied[0].outputs == []
 
     copied[0].source = 'predict("00.a", 40, unit="mm")'
-    nbformat.write(new_notebook(cells=copied), course / MINE / LESSON)
+    nbformat.write(new_notebook(cells=copied), course / MY_FOLDER / LESSON)
     update(course)
-    prepare(course)
-    assert source(course / MINE / LESSON) == copied[0].source  # what was predicted is the learner's writing
+    prepare_workspace(course)
+    assert source(course / MY_FOLDER / LESSON) == copied[0].source  # what was predicted is the learner's writing
 
 
 def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
-    assert prepare(course) == [f"{LESSON}: new"]
-    write(course / MINE / LESSON, "first = 'my answer'")
-    assert prepare(course) == []
-    assert source(course / MINE / LESSON) == "first = 'my answer'"
+    assert prepare_workspace(course) == [f"{LESSON}: new"]
+    write(course / MY_FOLDER / LESSON, "first = 'my answer'")
+    assert prepare_workspace(course) == []
+    assert source(course / MY_FOLDER / LESSON) == "first = 'my answer'"
 
 
 def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(course: Path, tmp_path: Path) -> None:
     folders = [tmp_path / "homes" / name for name in ("ada", "bob")]
     (tmp_path / "homes").mkdir()
     for folder in folders:
-        assert prepare(course, folder) == [f"{LESSON}: new"]
+        assert prepare_workspace(course, folder) == [f"{LESSON}: new"]
     write(folders[0] / LESSON, "first = 'my answer'")
     write(course / LESSON, "first = 2")
-    assert prepare(course, folders[0]) == [f"{LESSON}: yours is kept; the course's new text is in {NEW}"]
-    assert prepare(course, folders[1]) == [f"{LESSON}: updated"]
-    assert not (course / MINE).exists()
+    assert prepare_workspace(course, folders[0]) == [f"{LESSON}: yours is kept; the course's new text is in {NEW}"]
+    assert prepare_workspace(course, folders[1]) == [f"{LESSON}: updated"]
+    assert not (course / MY_FOLDER).exists()
 
 
 def test_a_package_without_the_course_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"there are no lessons in .*notebooks\. Install floatbase from its repository"):
-        prepare(tmp_path / "notebooks", tmp_path)
+        prepare_workspace(tmp_path / "notebooks", tmp_path)
 
 
 def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
-    prepare(course)
-    write(course / MINE / LESSON, "first = 1", output="1\n")
+    prepare_workspace(course)
+    write(course / MY_FOLDER / LESSON, "first = 1", output="1\n")
     write(course / LESSON, "first = 2")
-    assert prepare(course) == [f"{LESSON}: updated"]
-    assert source(course / MINE / LESSON) == "first = 2"
+    assert prepare_workspace(course) == [f"{LESSON}: updated"]
+    assert source(course / MY_FOLDER / LESSON) == "first = 2"
 
 
 @pytest.mark.parametrize("forget", [False, True])
@@ -125,12 +125,12 @@ def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forge
         update(mine.parent, n)
         if forget:
             (mine / ".from.json").unlink()
-        assert f"{LESSON}: yours is kept; the course's new text is in {name}" in prepare(mine.parent)
+        assert f"{LESSON}: yours is kept; the course's new text is in {name}" in prepare_workspace(mine.parent)
         assert source(mine / name) == f"first = {n}"
         write(mine / name, f"first = 'an hour of work in {name}'")
         (mine / "page.md").write_text("my notes")
     update(mine.parent, 3)
-    assert prepare(mine.parent) == []
+    assert prepare_workspace(mine.parent) == []
     assert [source(mine / name)[9:-1] for name in (LESSON, NEW, NEW2)] == [
         "my answer", f"an hour of work in {NEW}", f"an hour of work in {NEW2}",
     ]  # fmt: skip
@@ -141,11 +141,11 @@ def test_a_text_beside_that_nobody_wrote_in_follows_the_course_and_stays_away_on
     write(mine / LESSON, "first = 'my answer'")
     for n in (2, 3):
         update(mine.parent, n)
-        prepare(mine.parent)
+        prepare_workspace(mine.parent)
         assert source(mine / NEW) == f"first = {n}"
     assert files(mine) == {LESSON, NEW, "01_b.ipynb", "page.md"}
     (mine / NEW).unlink()
-    assert prepare(mine.parent) == []
+    assert prepare_workspace(mine.parent) == []
     assert not (mine / NEW).exists()
 
 
@@ -170,14 +170,14 @@ CHANGES: dict[str, tuple[bool, Callable[[Any], object]]] = {
 @pytest.mark.parametrize("change", CHANGES)
 def test_what_counts_as_writing(course: Path, change: str) -> None:
     counts, make = CHANGES[change]
-    prepare(course)
-    copy = course / MINE / LESSON
+    prepare_workspace(course)
+    copy = course / MY_FOLDER / LESSON
     book = nbformat.read(copy, as_version=4)
     make(book)
     nbformat.write(book, copy)
     before = copy.read_bytes()
     write(course / LESSON, "first = 2")
-    prepare(course)
+    prepare_workspace(course)
     assert (copy.read_bytes() == before, (copy.parent / NEW).exists()) == (counts, counts)
 
 
@@ -199,13 +199,13 @@ def test_a_damaged_memory_costs_nothing_that_was_written(mine: Path, text: str) 
     (mine / LESSON).write_text("half a noteb")
     (mine / ".from.json").write_text(text)
     update(mine.parent)
-    prepare(mine.parent)
+    prepare_workspace(mine.parent)
     assert (mine / LESSON).read_text() == "half a noteb"
     assert source(mine / NEW) == source(mine / "01_b.new.ipynb") == "first = 2"
     again = f"{LESSON}: yours is empty or damaged; to get the course's again, move it away and start again"
-    assert prepare(mine.parent) == [again]
+    assert prepare_workspace(mine.parent) == [again]
     (mine / LESSON).rename(mine / "away")
-    assert prepare(mine.parent) == [f"{LESSON}: new"]
+    assert prepare_workspace(mine.parent) == [f"{LESSON}: new"]
 
 
 def linked(path: Path, to: Path) -> None:
@@ -234,7 +234,7 @@ def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_u
     OBSTACLES[obstacle](mine)
     before = files(mine)
     for _ in range(2):
-        (told,) = [line for line in prepare(mine.parent) if "not brought" in line or "cannot be stored" in line]
+        (told,) = [line for line in prepare_workspace(mine.parent) if "not brought" in line or "cannot be stored" in line]
         assert told.startswith((f"{LESSON}: ", ".from.json: "))
     assert files(mine) - before <= {NEW, "01_b.new.ipynb", "page.new.md"}
     texts = {path.read_text() for path in mine.glob("page*.md")}
@@ -250,7 +250,7 @@ def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> N
         linked(mine / name, kept)
     before = {path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()}
     update(mine.parent)
-    prepare(mine.parent)
+    prepare_workspace(mine.parent)
     assert {path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()} == before
     assert all((mine / name).is_symlink() for name in before)
     assert source(mine / NEW2) == "first = 2"
@@ -258,9 +258,9 @@ def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> N
 
 @pytest.mark.parametrize("make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")])
 def test_a_folder_that_cannot_be_is_told_in_words(course: Path, make: Callable[[Path], object]) -> None:
-    make(course / MINE)
+    make(course / MY_FOLDER)
     with pytest.raises(InputError, match="it must be a folder"):
-        prepare(course)
+        prepare_workspace(course)
 
 
 @contextmanager
@@ -278,11 +278,11 @@ def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) ->
     long = "x" * 10_000
     write(mine.parent / LESSON, long)
     with full_disk(5_000):  # room for the memory, none for the lesson
-        assert "not brought up to date: File too large" in prepare(mine.parent)[0]
+        assert "not brought up to date: File too large" in prepare_workspace(mine.parent)[0]
     assert source(mine / LESSON) == "first = 1"
     assert files(mine) == {LESSON, "01_b.ipynb", "page.md"}
     write(mine / LESSON, "first = 'my answer'")
-    prepare(mine.parent)
+    prepare_workspace(mine.parent)
     assert (source(mine / LESSON), source(mine / NEW)) == ("first = 'my answer'", long)
 
 
@@ -292,8 +292,8 @@ def work(course: Path, first: int, acknowledged: int) -> None:
         for name in ("00_a", "01_b"):
             write(course / "part", f"first = {n}")
             (course / "part").replace(course / f"{name}.ipynb")
-        prepare(course)
-        progress.record("00.1", True)
+        prepare_workspace(course)
+        progress.record_try("00.1", True)
         os.write(acknowledged, b".")
 
 
@@ -310,7 +310,7 @@ def test_a_kill_at_any_moment_loses_nothing(mine: Path, tmp_path: Path, monkeypa
         process.join()
         source(mine / "01_b.ipynb")  # is whole
         update(mine.parent, 1_000 * i + 999)
-        prepare(mine.parent)
+        prepare_workspace(mine.parent)
         assert (mine / LESSON).read_bytes() == written
         assert source(mine / "01_b.ipynb") == source(mine.parent / "01_b.ipynb")
         assert files(mine) <= {LESSON, NEW, "01_b.ipynb", "page.md"}
@@ -326,7 +326,7 @@ def test_two_at_once_are_both_right(mine: Path) -> None:
     write(mine / LESSON, "first = 'my answer'")
     for n in range(2, 12):
         update(mine.parent, n)
-        both = [multiprocessing.get_context("fork").Process(target=prepare, args=(mine.parent,)) for _ in range(2)]
+        both = [multiprocessing.get_context("fork").Process(target=prepare_workspace, args=(mine.parent,)) for _ in range(2)]
         for process in both:
             process.start()
         for process in both:
@@ -338,8 +338,8 @@ def test_two_at_once_are_both_right(mine: Path) -> None:
 
 def test_a_copy_is_the_notebook_as_jupyter_writes_it(course: Path, tmp_path: Path) -> None:
     """So that saving without a change changes nothing."""
-    prepare(course)
-    copy, again = course / MINE / LESSON, tmp_path / "again"
+    prepare_workspace(course)
+    copy, again = course / MY_FOLDER / LESSON, tmp_path / "again"
     nbformat.write(nbformat.read(copy, as_version=4), again)
     assert copy.read_text(encoding="utf-8") == again.read_text(encoding="utf-8")
 

@@ -199,13 +199,13 @@ def test_a_kernel_is_interrupted_and_restarted_under_a_viewer() -> None:
 
 
 IN_A_NOTEBOOK = """import floatbase as fb
-from floatbase.lessons import live, push_panel
+from floatbase.lessons import live_run, push_panel
 from floatbase.playground import playground
 robot = fb.load("go2")
 sim = fb.Simulation(robot)
 view = fb.Viewer(robot)
 view.show(sim.state)
-display(view, push_panel(live(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), view), view))
+display(view, push_panel(live_run(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), view), view))
 field = playground("go2")
 display(field)
 print(repr(view), repr(field), type(view.widget()).__name__)"""

@@ -16,8 +16,8 @@ import pytest
 from messages import missing
 from waiting import PATIENCE, until
 
-from floatbase.__main__ import main, start_when_seen
-from floatbase.playground import Pace, Playground
+from floatbase.__main__ import main, start_when_connected
+from floatbase.playground import Playground, RealTimeFactor
 from floatbase.robots import Robot, catalogue, load
 
 from .looks import picture
@@ -68,7 +68,7 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
 def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
     with closing(Playground(go2)) as playground, ThreadPoolExecutor(1) as other:
         ended = Event()
-        begun = other.submit(start_when_seen, playground, ended)
+        begun = other.submit(start_when_connected, playground, ended)
         try:
             with pytest.raises(TimeoutError):
                 begun.result(0.3)
@@ -84,7 +84,7 @@ def test_the_end_of_the_program_ends_the_wait_for_a_page(go2: Robot) -> None:
     ended = Event()
     ended.set()
     with closing(Playground(go2)) as playground:
-        start_when_seen(playground, ended)
+        start_when_connected(playground, ended)
         assert playground.run.status == "paused"
 
 
@@ -194,7 +194,7 @@ def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> Non
 
 def test_the_pace_is_simulated_time_over_time() -> None:
     now = [0.0]
-    pace = Pace(lambda: now[0])
+    pace = RealTimeFactor(lambda: now[0])
     for i in range(101):
         now[0] = 0.03 * i
         found = pace.update(0.5 * now[0])

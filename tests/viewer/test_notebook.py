@@ -386,7 +386,7 @@ def test_an_output_has_the_widget_and_an_image_or_when_asked_the_scene(
 
 SAVED = (
     """import floatbase as fb
-from floatbase.lessons import slider_panel, live, push_panel
+from floatbase.lessons import slider_panel, live_run, push_panel
 robot = fb.load("go2")
 view = fb.Viewer(robot, height=300)
 view.show(robot.standing())""",
@@ -395,7 +395,7 @@ slider_panel(other, lambda z: other.show(robot.standing(), com=z > 0.5) and None
     """sim = fb.Simulation(robot)
 third = fb.Viewer(robot, height=300)
 third.show(sim.state)
-push_panel(live(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), third), third)""",
+push_panel(live_run(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), third), third)""",
 )
 
 

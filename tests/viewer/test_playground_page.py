@@ -9,7 +9,7 @@ from messages import raises
 from waiting import until
 
 import floatbase as fb
-from floatbase.playground import CARDS, Playground, gap, playground
+from floatbase.playground import CHALLENGES, Playground, mean_force_error, playground
 from floatbase.robots import Robot
 
 from .looks import picture
@@ -52,14 +52,14 @@ def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Play
     page.evaluate("viewer.gui_controllers['challenge'].setValue(0)")
     page.evaluate("viewer.gui_controllers['all as at first'].fire()")
     until(lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0, lambda: page.wait_for_timeout(20))
-    assert field.session.settings.friction == (0.7, 0.7) and field.session.note == ""
+    assert field.session.settings.friction == (0.7, 0.7) and field.session.refusal == ""
     said = page.evaluate("[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)")
     assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["perfect", "perfect"]
     page.wait_for_function("viewer.gui_controllers['friction believed'].getValue() == 0.7")
 
 
 def test_a_challenge_is_begun_and_solved_and_tells_so(page, field: Playground) -> None:
-    number = next(i for i, card in enumerate(CARDS) if card.title == "How many facets?")
+    number = next(i for i, challenge in enumerate(CHALLENGES) if challenge.title == "How many facets?")
     opened(page, field)
     page.evaluate(f"viewer.gui_controllers['challenge'].setValue({number + 1})")
     page.wait_for_function("document.getElementById('panel').textContent.includes('4 facets: the weakest')")
@@ -85,7 +85,7 @@ def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, fi
     page.evaluate("viewer.gui_controllers['mass [×] believed'].setValue(1.5)")
     until(lambda: abs(sunk()) < 0.01, work)
     page.wait_for_function("document.querySelector('#panel p.plot').textContent.includes('differ by')")
-    assert gap(field.session.last) < 0.5 * field.robot.weight
+    assert mean_force_error(field.session.last) < 0.5 * field.robot.weight
 
 
 def test_in_a_notebook_it_shows_itself_and_runs() -> None:
@@ -100,27 +100,27 @@ def test_in_a_notebook_it_shows_itself_and_runs() -> None:
 
 def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None:
     """The push puts the robot back on its feet, and a judge begins with it."""
-    field.choose(next(card for card in CARDS if card.title == "The weakest side"))
+    field.start_challenge(next(challenge for challenge in CHALLENGES if challenge.title == "The weakest side"))
     until(lambda: field.session.last is not None and field.session.last.time[-1] < 1.0)
     for size in (240.0, 220.0):
         field.push(size, 90.0)
-        until(lambda seen=size: field.judge.hardest == seen and field.run.status == "fell")
-        until(lambda seen=size: f"{0.1 * seen:.1f} N·s topple it" in field.judge.says)
+        until(lambda seen=size: field.judge.largest_push == seen and field.run.status == "fell")
+        until(lambda seen=size: f"{0.1 * seen:.1f} N·s topple it" in field.judge.message)
 
 
 def test_a_challenge_is_chosen_and_left_while_it_runs(field: Playground) -> None:
-    for card in (CARDS[0], None, *CARDS[6:9], None):
-        field.choose(card)
+    for challenge in (CHALLENGES[0], None, *CHALLENGES[6:9], None):
+        field.start_challenge(challenge)
         before = field.session.sim.time
         until(lambda start=before: field.run.status == "running" and field.session.sim.time != start)
     assert field.run.error is None
 
 
 def test_a_challenge_that_asks_for_it_begins_paused_and_goes_on_by_run(field: Playground) -> None:
-    number, card = next((i, card) for i, card in enumerate(CARDS) if card.paused)
-    assert card.title == "Down an icy slope" and "Press run" in card.text and number == 2
-    field.choose(card)
-    until(lambda: field.run.status == "paused" and field.session.settings.slope == card.start.slope)
+    number, challenge = next((i, challenge) for i, challenge in enumerate(CHALLENGES) if challenge.paused)
+    assert challenge.title == "Down an icy slope" and "Press run" in challenge.text and number == 2
+    field.start_challenge(challenge)
+    until(lambda: field.run.status == "paused" and field.session.settings.slope == challenge.start.slope)
     assert field.session.sim.time < 0.1
     field.run.start()
     until(lambda: field.session.sim.time > 0.2)
@@ -158,7 +158,7 @@ def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(fie
 def test_an_arm_is_set_back_as_it_was_at_first() -> None:
     arm = Playground(fb.load("ur5"))
     try:
-        arm.start().undo()
+        arm.start().reset_all()
         until(lambda: arm.session.last is not None and arm.run.status == "running")
         assert arm.run.error is None
     finally:

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import Exercise, Numeric
+from floatbase.lessons.exercises import Exercise, NumericJudge
 from floatbase.robots import Robot
 
 UP = 2.0  # m/s², the acceleration asked for
@@ -38,7 +38,7 @@ EXERCISES = (
         "the ground exerts on its feet, in N?",
         stub="total = 100.0  # N: replace this number by an expression",
         solution="total = robot.mass * (robot.gravity + 2.0)",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_sum_of_forces,
             tolerance=2e-3,  # g may be 9.8
             praise="The ground carries the weight and accelerates the mass: m (g + 2 m/s²).",

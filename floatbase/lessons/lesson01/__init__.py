@@ -1,10 +1,10 @@
 """Lesson 01, What is a floating base?"""
 
 from floatbase.lessons.lesson01.exercises import EXERCISES
-from floatbase.lessons.lesson01.helpers import LIFT, base_turn, turn, wave, weightless
+from floatbase.lessons.lesson01.helpers import LIFT_URDF, base_rotation, joint_circle, joint_turn, weightless_simulation
 from floatbase.lessons.lesson01.pictures import (
-    PRESSING,
-    centre_panel,
+    PRESSING_POSTURE,
+    com_panel,
     play_floating,
     play_pressing,
     pressing_panel,
@@ -14,7 +14,18 @@ from floatbase.lessons.lesson01.pictures import (
 )
 
 __all__ = [
-    "EXERCISES", "LIFT", "PRESSING", "base_turn", "centre_panel", "play_floating",
-    "play_pressing", "pressing_panel", "show_arm", "stance_panel", "thruster_panel", "turn", "wave",
-    "weightless",
+    "EXERCISES",
+    "LIFT_URDF",
+    "PRESSING_POSTURE",
+    "base_rotation",
+    "com_panel",
+    "joint_circle",
+    "joint_turn",
+    "play_floating",
+    "play_pressing",
+    "pressing_panel",
+    "show_arm",
+    "stance_panel",
+    "thruster_panel",
+    "weightless_simulation",
 ]  # fmt: skip

@@ -10,22 +10,22 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import fixed_frame
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers, vector_text
-from floatbase.lessons.lesson01.pictures import PRESSING
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict, format_vector
+from floatbase.lessons.lesson01.pictures import PRESSING_POSTURE
 from floatbase.objectives import centroidal_momentum_rate
 from floatbase.robots import PLATE_SIZE, with_floating_base
 
 
 @cache
-def _pressed() -> tuple[fb.State, Array, Array]:
+def _pressing_arm() -> tuple[fb.State, Array, Array]:
     """The pressing arm without bolts, the tool's position seen from the base, and f_r."""
-    state = with_floating_base(fb.load("ur5", posture=PRESSING)).standing()
+    state = with_floating_base(fb.load("ur5", posture=PRESSING_POSTURE)).standing()
     return state, state.point("tool0") - state.point("base_link"), np.array([-60.0, 0.0, 0.0])
 
 
 def _bolts_moment() -> Array:
     """From the constraint forces of (7): what the welded base's wrench becomes with the wall, less what it is without."""
-    state, _, force = _pressed()
+    state, _, force = _pressing_arm()
     J = state.frame_jacobian("tool0")[:3]
     eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base_link")]))
     wrench = np.linalg.lstsq(eom.J.T, -J.T @ force + eom.S @ (J.T @ force)[6:], rcond=None)[0]
@@ -33,12 +33,12 @@ def _bolts_moment() -> Array:
 
 
 def _about_the_centre_of_mass() -> Array:
-    state, _, force = _pressed()
+    state, _, force = _pressing_arm()
     return -np.cross(state.point("tool0") - state.com, force)
 
 
 def _with_the_weight() -> Array:
-    state, tool, force = _pressed()
+    state, tool, force = _pressing_arm()
     lever = state.com - state.point("base_link")
     return -np.cross(tool, force) + np.cross(lever, [0.0, 0.0, state.robot.weight])
 
@@ -70,7 +70,7 @@ def _held_width() -> float:
 
 @cache
 def _on_the_plate() -> fb.State:
-    return with_floating_base(fb.load("ur5", posture=PRESSING), plate=True).standing()
+    return with_floating_base(fb.load("ur5", posture=PRESSING_POSTURE), plate=True).standing()
 
 
 def _by_levers(press: float = 120.0, *, weight: float | None = None, below: float = 0.0, ahead: float | None = None) -> float:
@@ -93,7 +93,7 @@ def _in_proportion() -> float:
 
 def _judge_thrust(answer: Any) -> Verdict:
     """Thrusts at the four feet of a standing go2: 200 N straight up in all, and no moment about the centre of mass."""
-    f = numbers(answer, (4, 3), (12,))
+    f = array_or_verdict(answer, (4, 3), (12,))
     if isinstance(f, Verdict):
         return f
     f = f.reshape(4, 3)
@@ -104,7 +104,7 @@ def _judge_thrust(answer: Any) -> Verdict:
     if abs(rate[2] + 200.0) < 0.2:
         return Verdict(False, "The size is right, the sign is not: these thrusters push the robot down.", "sign")
     if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
-        return Verdict(False, f"The forces add up to {vector_text(rate[:3])} N; they should be (0, 0, 200) N.", "force")
+        return Verdict(False, f"The forces add up to {format_vector(rate[:3])} N; they should be (0, 0, 200) N.", "force")
     if abs(rate[3:]).max() > 0.02:
         where = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
         return Verdict(
@@ -130,7 +130,7 @@ EXERCISES = (
         "seen from the base. The weight, which the bolts carry anyway, does not count.",
         stub="bolts_moment = np.zeros(3)  # N·m: replace this, using tool and f_r",
         solution="bolts_moment = -np.cross(tool, f_r)",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_bolts_moment,
             praise="The bolts undo what the wall does: force and moment, each with the opposite sign.",
             mistakes={
@@ -138,10 +138,10 @@ EXERCISES = (
                 "about_com": _about_the_centre_of_mass,
                 "weight_too": _with_the_weight,
                 "zero": lambda: np.zeros(3),
-                "height_alone": lambda: np.array([0.0, 60.0 * _pressed()[1][2], 0.0]),
-                "elementwise": lambda: _pressed()[1] * _pressed()[2],
-                "minus_force": lambda: -_pressed()[2],
-                "force_itself": lambda: _pressed()[2],
+                "height_alone": lambda: np.array([0.0, 60.0 * _pressing_arm()[1][2], 0.0]),
+                "elementwise": lambda: _pressing_arm()[1] * _pressing_arm()[2],
+                "minus_force": lambda: -_pressing_arm()[2],
+                "force_itself": lambda: _pressing_arm()[2],
             },
             hints={
                 "walls_moment": "This is the wall's own moment about the base. The bolts answer it: look at the sign, or at "
@@ -164,7 +164,7 @@ EXERCISES = (
         statement="solo8 has two joints in each of its four legs. Write its actuation matrix S of (3).",
         stub="S_solo8 = np.eye(8)  # replace this: stack what is missing",
         solution="S_solo8 = np.vstack([np.zeros((6, 8)), np.eye(8)])",
-        judge=Shaped(
+        judge=ShapeJudge(
             shapes={
                 (8, 8): "S maps 8 torques into all rows of the equations of motion. How many rows does a base add, and where?",
                 (8, 14): "This is the transpose of the answer: S takes 8 torques to 14 rows.",
@@ -172,7 +172,7 @@ EXERCISES = (
                 (18, 12): "That is the S of go2, with three joints in each leg; solo8 has two.",
                 (15, 8): "15 counts the quaternion's four numbers. Rows of (4) go with velocities, and a rotation has three.",
             },
-            judge=Numeric(
+            judge=NumericJudge(
                 right=_actuation_of_solo8,
                 praise="Six rows that no motor reaches, then one row for each motor.",
                 mistakes={
@@ -195,7 +195,7 @@ EXERCISES = (
         "horizontal force, in N, that the floor can answer while the robot stays at rest?",
         stub="most = 1000.0  # N: replace this number by an expression",
         solution="most = 0.7 * go2.mass * 9.81",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_carried_by_friction,
             tolerance=2e-3,  # g may be 9.8
             praise="The bolts' answer had no bound. This one is friction times weight, as long as no jump adds to it.",
@@ -232,7 +232,7 @@ EXERCISES = (
         solution="moments = [np.cross(np.eye(3), -lever).T for lever in levers]\n"
         "G = np.vstack([np.tile(np.eye(3), 4), np.hstack(moments)])\n"
         "thrust = np.linalg.lstsq(G, [0, 0, 200, 0, 0, 0], rcond=None)[0].reshape(4, 3)",
-        judge=Shaped(_judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}),
+        judge=ShapeJudge(_judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}),
         examples=_thrusts,
         explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; least squares gives the "
         "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, (20) and (21).",
@@ -243,7 +243,7 @@ EXERCISES = (
         'has .com and .point("tool0"), `standing.weight` is the weight. The plate has no weight; all else stays as it was.',
         stub="width = 0.4  # m: replace this number by an expression",
         solution='lever = at_rest.point("tool0")[2]\nwidth = 2 * (120 * lever / standing.weight - at_rest.com[0])',
-        judge=Numeric(
+        judge=NumericJudge(
             right=_held_width,
             praise="A harder push needs a wider plate. A robot that walks has no wider plate; it puts a foot there in time.",
             mistakes={

@@ -13,7 +13,7 @@ from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
 # the URDF of the smallest robot: a box of 5 kg that slides up and down a rail, 2 m high
-LIFT = """
+LIFT_URDF = """
 <robot name="lift">
   <link name="rail"/>
   <link name="box">
@@ -26,41 +26,41 @@ LIFT = """
 """
 
 
-def turn(joint: int, angle: float, duration: float) -> Callable[[float], Array]:
+def joint_turn(joint: int, angle: float, duration: float) -> Callable[[float], Array]:
     """A path t -> joint offsets, (6,) rad, for `joint_servo`: one joint of six turns by `angle`, rad, in `duration`, s.
 
     It starts and ends at rest.
     """
-    return lambda t: angle * _smooth(t / duration) * np.eye(6)[joint]
+    return lambda t: angle * _minimum_jerk(t / duration) * np.eye(6)[joint]
 
 
-def wave(first: int, second: int, size: float, duration: float) -> Callable[[float], Array]:
+def joint_circle(first: int, second: int, size: float, duration: float) -> Callable[[float], Array]:
     """A path t -> joint offsets, (6,) rad, for `joint_servo`: two joints of six go once around a circle, back to 0.
 
     first, second: numbers of the joints, from 0. size: radius, rad. duration: s. It starts and ends at rest.
     """
 
     def path(t: float) -> Array:
-        angle = 2.0 * np.pi * _smooth(t / duration)
+        angle = 2.0 * np.pi * _minimum_jerk(t / duration)
         return size * (np.sin(angle) * np.eye(6)[first] + (1.0 - np.cos(angle)) * np.eye(6)[second])
 
     return path
 
 
-def _smooth(s: float) -> float:
+def _minimum_jerk(s: float) -> float:
     """From 0 to 1 with no velocity or acceleration at the ends."""
     s = min(max(s, 0.0), 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
-def weightless(robot: Robot) -> fb.Simulation:
+def weightless_simulation(robot: Robot) -> fb.Simulation:
     """A `Simulation` of the robot without gravity."""
     sim = fb.Simulation(robot)
     sim.model.opt.gravity[:] = 0.0
     return sim
 
 
-def base_turn(record: Rollout) -> Array:
+def base_rotation(record: Rollout) -> Array:
     """How the base turned from the first row of a record to the last: axis times angle, shape (3,), degrees, world."""
     first, last = (record.state(i).frame_pose("base_link").rotation for i in (0, -1))
     return read_only(np.degrees(pin.log3(last @ first.T)))

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons import props
-from floatbase.lessons.exercises import vector_text
+from floatbase.lessons.exercises import format_vector
 from floatbase.lessons.panels import SliderPanel, slider_panel
-from floatbase.lessons.rounding import about
+from floatbase.lessons.rounding import rounded
 from floatbase.objectives import Task, centroidal_momentum_rate
 from floatbase.robots import PLATE_SIZE
 from floatbase.simulation import Rollout
@@ -20,7 +20,7 @@ from floatbase.viewer import Item, Picture, View, Viewer, markers, prefixed, sha
 from floatbase.viewer.export import recording
 from floatbase.viewer.scene.colours import MEASURED
 
-PRESSING = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
+PRESSING_POSTURE = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
 PRESSING_VIEW = View(100.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
 
 
@@ -70,7 +70,7 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
         tau, limits = abs(state.h - state.frame_jacobian("tool0")[:3].T @ force), state.robot.torque_limits
         busiest = int(np.argmax(tau / limits))
         return (
-            f"wall on tool <b>{about(-press, 'N', 3)}</b>, bolts on base <b>{about(press, 'N', 3)}</b> and "
+            f"wall on tool <b>{rounded(-press, 'N', 3)}</b>, bolts on base <b>{rounded(press, 'N', 3)}</b> and "
             f"<b>{np.linalg.norm(moment):.0f} N·m</b>; busiest motor: {state.robot.joint_names[busiest]}, "
             f"{tau[busiest]:.0f} of {limits[busiest]:.0f} N·m"
         )
@@ -84,7 +84,7 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
     view.add_legend_entry("f", MEASURED, "force of the wall")
 
     def picture(state: fb.State, i: int) -> Picture:
-        drawn = _free_arm(view, state) | scene | {"plate": _plate(state)}
+        drawn = _draw_arm(view, state) | scene | {"plate": _plate(state)}
         for push in record.pushes:
             if push.acts_at(float(record.time[i])):
                 vector = view.scale * push.force
@@ -93,20 +93,20 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
                 drawn["label/wall"] = shapes.label(tool + vector + [0.0, 0.0, 0.07], "f{r}", 0.06)
         return drawn
 
-    return _play(view, record, picture, View(100.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
+    return _play_record(view, record, picture, View(100.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
 
 
 def play_floating(view: Viewer, record: Rollout) -> Viewer:
     """The arm without bolts, gravity and ground, with axes on its base; a veil stays where it was first."""
 
     def picture(state: fb.State, i: int) -> Picture:
-        return _afloat(_free_arm(view, state, first=record.state(0)))
+        return _without_ground(_draw_arm(view, state, first=record.state(0)))
 
     centre = tuple(float(x) for x in record.state(0).com)
-    return _play(view, record, picture, View(40.0, 25.0, 1.0, around=(centre, 0.6)))  # type: ignore[arg-type]
+    return _play_record(view, record, picture, View(40.0, 25.0, 1.0, around=(centre, 0.6)))  # type: ignore[arg-type]
 
 
-def centre_panel(view: Viewer, state: fb.State) -> SliderPanel:
+def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
     """go2 in the air: a slider swings its legs. The base, with its axes, stays, and the centre of mass does not (note 3)."""
     first = state.robot.nv - state.robot.d
     swing = np.zeros(state.robot.nv)
@@ -116,8 +116,8 @@ def centre_panel(view: Viewer, state: fb.State) -> SliderPanel:
 
     def draw(swing_forwards: float) -> str:
         now = state.replace(q=state.integrate(swing_forwards * swing))
-        view.draw(_afloat(view.painter.picture(now, extra=axes)))
-        return f"x<sub>c</sub> seen from the base: {vector_text(1e3 * (pose.rotation.T @ (now.com - pose.translation)))} mm"
+        view.draw(_without_ground(view.painter.picture(now, extra=axes)))
+        return f"x<sub>c</sub> seen from the base: {format_vector(1e3 * (pose.rotation.T @ (now.com - pose.translation)))} mm"
 
     panel = slider_panel(view, draw, swing_forwards=(-1.0, 0.0, 1.0, "rad"))
     view.camera(View(78.0, 8.0, 1.0, around=((0.0, 0.0, 0.24), 0.36)))
@@ -139,8 +139,8 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slider
         view.show(state, contacts, planned=f, wrench=np.concatenate([f.sum(axis=0), moment]))
         newton = state.robot.mass * (state.com_jacobian @ command.qdd - [0, 0, -9.81])
         return (
-            f"f<sub>c</sub> = {vector_text(f.sum(axis=0))} N, m (ẍ<sub>c</sub> - g) = {vector_text(newton)} N, "
-            f"τ<sub>c</sub> = {vector_text(moment)} N·m"
+            f"f<sub>c</sub> = {format_vector(f.sum(axis=0))} N, m (ẍ<sub>c</sub> - g) = {format_vector(newton)} N, "
+            f"τ<sub>c</sub> = {format_vector(moment)} N·m"
         )
 
     forwards, up = (-6.0, 2.0, 6.0, "m/s²"), (-4.0, 0.0, 4.0, "m/s²")
@@ -163,14 +163,14 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
         qdd = eom.acceleration(np.zeros(eom.d), f)
         rate = centroidal_momentum_rate(state, qdd) + np.concatenate([state.robot.mass * gravity, np.zeros(3)])
         picture = view.painter.picture(state, wrench=rate)
-        drawn = _afloat(picture)
+        drawn = _without_ground(picture)
         for name, foot, force in zip(contacts.names, feet, f, strict=True):
             if force.any():
                 vector = view.scale * force
                 start = foot - vector if force[2] > 0 else foot  # below the foot either way, where no leg hides it
                 drawn[f"thrust/{name}"] = shapes.arrow(start, vector, MEASURED, 2 * view.painter.size)
         view.draw(drawn)
-        return f"f<sub>c</sub> = {vector_text(rate[:3])} N, τ<sub>c</sub> = {vector_text(rate[3:])} N·m"
+        return f"f<sub>c</sub> = {format_vector(rate[:3])} N, τ<sub>c</sub> = {format_vector(rate[3:])} N·m"
 
     view.add_legend_entry("thrust", MEASURED, "force of a thruster")
     each = (-40.0, 30.0, 40.0, "N")
@@ -179,7 +179,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
     return panel
 
 
-def _afloat(picture: Picture) -> Picture:
+def _without_ground(picture: Picture) -> Picture:
     """A picture without its ground, and without the shadow of the centre of mass on it."""
     return {path: item for path, item in picture.items() if not path.startswith(("ground", "com/line", "com/projection"))}
 
@@ -199,7 +199,7 @@ def _plate(state: fb.State) -> Item:
     return Item(slab.shape, shapes.transform(centre, pose.rotation, (width, width, thick)))
 
 
-def _free_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> Picture:
+def _draw_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> Picture:
     """The arm. first: a state to show as a veil; then axes on the base and the centre of mass are drawn too."""
     drawn = view.painter.picture(state, com=first is not None, ghost=first)
     if first is not None:
@@ -207,7 +207,7 @@ def _free_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> P
     return drawn
 
 
-def _play(view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Picture], look: View, speed: float = 1.0) -> Viewer:
+def _play_record(view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Picture], look: View, speed: float = 1.0) -> Viewer:
     """Play a record as pictures, 30 a second. picture: (state, row of the record) -> `Picture`."""
     rows = recording.sampled_rows(record.time, 30.0)
     pictures = [picture(record.state(int(i)), int(i)) for i in rows]

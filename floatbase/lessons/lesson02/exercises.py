@@ -10,11 +10,11 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.lessons.exercises import NO_ANSWER, Example, Exercise, Numeric, Shaped, Verdict, vector_text
+from floatbase.lessons.exercises import NO_ANSWER, Example, Exercise, NumericJudge, ShapeJudge, Verdict, format_vector
 
 
 @cache
-def _scene() -> tuple[fb.State, fb.Contacts]:
+def _moving_go2() -> tuple[fb.State, fb.Contacts]:
     """The moving go2 of the exercises, and its contacts."""
     robot = fb.load("go2")
     slow = robot.random_state(5)
@@ -28,26 +28,26 @@ def _velocity_of(state: fb.State, foot: str, step: float) -> Array:
 
 def _drift() -> Array:
     """-J̇ q̇, (3,), m/s², world, by central differences of the foot's velocity at constant q̇."""
-    state, _ = _scene()
+    state, _ = _moving_go2()
     h = 1e-5
     return -(_velocity_of(state, "FL_foot", h) - _velocity_of(state, "FL_foot", -h)) / (2 * h)
 
 
 def _drift_in_the_foots_frame() -> Array:
-    state, _ = _scene()
+    state, _ = _moving_go2()
     return np.asarray(state.frame_pose("FL_foot").rotation.T @ _drift())
 
 
 def _drift_of_a_spatial_acceleration() -> Array:
     """Without ω × v: what Pinocchio's spatial acceleration gives in world axes."""
-    state, _ = _scene()
+    state, _ = _moving_go2()
     moving = state.frame_velocity("FL_foot")
     return _drift() + np.cross(moving[3:], moving[:3])
 
 
 def _generalised() -> Array:
     """Jᵀ λ by virtual work: the power of λ for each unit velocity, by finite differences of the foot's place."""
-    state, _ = _scene()
+    state, _ = _moving_go2()
     force, h = np.array([10.0, -5.0, 40.0]), 1e-6
     ahead = [state.replace(q=state.integrate(h * e)).point("FL_foot") for e in np.eye(18)]
     back = [state.replace(q=state.integrate(-h * e)).point("FL_foot") for e in np.eye(18)]
@@ -56,7 +56,7 @@ def _generalised() -> Array:
 
 def _generalised_in_world_axes() -> Array:
     """The base's rows turned into the world: the usual confusion."""
-    state, _ = _scene()
+    state, _ = _moving_go2()
     R = state.frame_pose("base").rotation
     wrong = _generalised()
     wrong[:3], wrong[3:6] = R @ wrong[:3], R @ wrong[3:6]
@@ -99,10 +99,10 @@ def _judge_holding(answer: Any) -> Verdict:
     if abs(up[2] + 2 * state.robot.weight) < 0.1:
         return Verdict(False, "These forces push the robot down: λ is what the ground does to the robot.", "sign")
     if np.abs(up).max() > 0.1:
-        return Verdict(False, f"The base's force rows are not balanced: {vector_text(up, 1)} N are left over.", "force_rows")
+        return Verdict(False, f"The base's force rows are not balanced: {format_vector(up, 1)} N are left over.", "force_rows")
     if np.abs(moment).max() > 0.02:
         return Verdict(
-            False, f"The base's moment rows are not balanced: {vector_text(moment, 1)} N·m are left over.", "moment_rows"
+            False, f"The base's moment rows are not balanced: {format_vector(moment, 1)} N·m are left over.", "moment_rows"
         )
     if f[:, 2].min() < 0.0:
         return Verdict(False, "It balances, but one foot pulls at the ground, which no ground allows.", "pulls")
@@ -152,8 +152,8 @@ EXERCISES = (
         "J, as (rows, columns)?",
         stub="shape_of_J = (3, 8)  # replace this",
         solution="shape_of_J = (9, 14)",
-        judge=Numeric(
-            count=True,
+        judge=NumericJudge(
+            is_count=True,
             right=lambda: (
                 fb.equations_of_motion(
                     fb.load("solo8").standing(), fb.Contacts.points(fb.load("solo8"), frames=["FL_FOOT", "FR_FOOT", "HL_FOOT"])
@@ -197,13 +197,13 @@ EXERCISES = (
         "Which generalised force, shape (18,), enters (4)?",
         stub="generalised = np.zeros(18)  # replace this, using moving.frame_jacobian and push",
         solution='generalised = moving.frame_jacobian("FL_foot")[:3].T @ push',
-        judge=Shaped(
+        judge=ShapeJudge(
             shapes={
                 (3,): "(4) has a row for each direction of velocity: J takes 18 numbers to 3, its transpose goes back.",
                 (12,): "These are the joints alone. The force also pushes the base: its six rows are missing.",
                 (6,): "frame_jacobian has six rows, three linear and three angular; a force at a point takes the first three.",
             },
-            judge=Numeric(
+            judge=NumericJudge(
                 right=_generalised,
                 praise="The same matrix that turns velocities into the foot's velocity turns its force into all rows.",
                 mistakes={
@@ -212,15 +212,15 @@ EXERCISES = (
                     "base_zero": (_generalised_joints_only),
                     "standing": lambda: fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T @ [10.0, -5.0, 40.0],
                     "eom_standing": lambda: _standing_go2().J[:3].T @ [10.0, -5.0, 40.0],
-                    "contact_point": lambda: fb.equations_of_motion(*_scene()).J[:3].T @ [10.0, -5.0, 40.0],
+                    "contact_point": lambda: fb.equations_of_motion(*_moving_go2()).J[:3].T @ [10.0, -5.0, 40.0],
                     "turned": (
                         lambda: (
-                            _scene()[0].frame_jacobian("FL_foot")[:3].T
-                            @ _scene()[0].frame_pose("base").rotation.T
+                            _moving_go2()[0].frame_jacobian("FL_foot")[:3].T
+                            @ _moving_go2()[0].frame_pose("base").rotation.T
                             @ [10.0, -5.0, 40.0]
                         )
                     ),
-                    "angular_rows": lambda: _scene()[0].frame_jacobian("FL_foot")[3:].T @ [10.0, -5.0, 40.0],
+                    "angular_rows": lambda: _moving_go2()[0].frame_jacobian("FL_foot")[3:].T @ [10.0, -5.0, 40.0],
                     "zero": lambda: np.zeros(18),
                 },
                 hints={
@@ -245,17 +245,17 @@ EXERCISES = (
         statement="The same state. What must J q̈ be for the FL_foot's origin not to accelerate? (3,), m/s², world.",
         stub="b_foot = np.zeros(3)  # replace this",
         solution='b_foot = -moving.frame_drift("FL_foot")[:3]',
-        judge=Numeric(
+        judge=NumericJudge(
             right=_drift,
             praise="That much joint and base acceleration is needed only to keep the foot where it is.",
             mistakes={
                 "zero": lambda: np.zeros(3),
                 "sign": lambda: -_drift(),
-                "contact_point": lambda: fb.equations_of_motion(*_scene()).b[:3],
+                "contact_point": lambda: fb.equations_of_motion(*_moving_go2()).b[:3],
                 "foot_axes": _drift_in_the_foots_frame,
                 "spatial": (_drift_of_a_spatial_acceleration),
-                "velocity": lambda: _velocity_of(_scene()[0], "FL_foot", 0.0),
-                "angular_rows": lambda: -_scene()[0].frame_drift("FL_foot")[3:],
+                "velocity": lambda: _velocity_of(_moving_go2()[0], "FL_foot", 0.0),
+                "angular_rows": lambda: -_moving_go2()[0].frame_drift("FL_foot")[3:],
             },
             hints={
                 "zero": "This forgets the drift: the foot accelerates even at q̈ = 0, because J changes as the robot moves.",
@@ -278,7 +278,7 @@ EXERCISES = (
         solution="both = np.linalg.lstsq(np.hstack([eom.S, eom.J.T]), eom.h, rcond=None)[0]\n"
         "hold_tau, hold_forces = both[:12], both[12:]",
         judge=_judge_holding,
-        names=lambda: {"go2": fb.load("go2"), "eom": _standing_go2()},
+        namespace=lambda: {"go2": fb.load("go2"), "eom": _standing_go2()},
         examples=_holdings,
         explanation="Six more unknowns than equations: lstsq takes the smallest, by the sum of all squares. That adds N² and "
         "(N·m)², so another unit would give other forces. The answers differ by forces that squeeze the robot from within; "

@@ -16,11 +16,11 @@ from floatbase.lessons.controllers import ConstantTorques
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
-Motion = Callable[[EquationsOfMotion, Array, Array], tuple[Array, Array]]  # (eom, τ, b) -> (q̈, λ), by (7)
+MotionSolver = Callable[[EquationsOfMotion, Array, Array], tuple[Array, Array]]  # (eom, τ, b) -> (q̈, λ), by (7)
 DISC_RADIUS = 0.2  # m, of assets/models/disc.urdf
 
 
-def run_constant(robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike, motion: Motion, duration: float = 0.2) -> Rollout:
+def run_constant_torques(robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike, motion: MotionSolver, duration: float = 0.2) -> Rollout:
     """MuJoCo under constant torques; `planned` holds the λ of (7) at every millisecond, `measured` the engine's.
 
     contacts: the stance of (7).
@@ -37,29 +37,29 @@ def run_constant(robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike, motion
     return fb.rollout(fb.Simulation(robot), ConstantTorques(torques, contacts, by_equation), duration)
 
 
-def strayed(states: Sequence[fb.State], contacts: fb.Contacts) -> Array:
+def foot_displacement(states: Sequence[fb.State], contacts: fb.Contacts) -> Array:
     """Distance of the worst foot from its first position, m, for each state; shape (number of states,)."""
     places = np.array([contacts.positions(state) for state in states])
     return np.asarray(np.linalg.norm(places - places[0], axis=2).max(axis=1))
 
 
-def tool_path(record: Rollout) -> Array:
+def tool_displacement(record: Rollout) -> Array:
     """Distance of the arm's tool from its first position, mm, for every row of a record; shape (rows,)."""
     places = np.array([record.state(i).point("tool0") for i in range(len(record))])
     return 1e3 * np.asarray(np.linalg.norm(places - places[0], axis=1))
 
 
-def disc() -> Robot:
+def load_disc() -> Robot:
     """A robot without joints: a solid disc of 1 kg and 0.2 m radius, free to move; its axle is y."""
     return fb.load_urdf(assets_root() / "models" / "disc.urdf")
 
 
-def wheel() -> RollingWheel:
-    """The constraint (6) of `disc`: it rolls on the level ground."""
+def rolling_wheel() -> RollingWheel:
+    """The constraint (6) of `load_disc`: it rolls on the level ground."""
     return RollingWheel("disc", np.array([0.0, 1.0, 0.0]), DISC_RADIUS)
 
 
-def upright(
+def disc_state(
     robot: Robot, place: Sequence[float] = (0.0, 0.0), heading: float = 0.0, rolled: float = 0.0,
     speed: float = 0.0, turning: float = 0.0,
 ) -> fb.State:  # fmt: skip
@@ -78,15 +78,15 @@ def upright(
     return fb.State(robot, q, np.concatenate([R.T @ velocity, R.T @ omega]))
 
 
-def park(robot: Robot, way: float = 0.5, turn: float = 0.7, steps: int = 20) -> list[fb.State]:
+def parking_states(robot: Robot, distance: float = 0.5, angle: float = 0.7, steps: int = 20) -> list[fb.State]:
     """The disc parks: it rolls ahead, turns, rolls back, turns back, 1 s each; a list of states with their velocities.
 
-    way: how far it rolls, m. turn: how far it turns, rad. steps: states a second.
+    distance: how far it rolls, m. angle: how far it turns, rad. steps: states a second.
     """
     states, x, y, heading, rolled = [], 0.0, 0.0, 0.0, 0.0
-    for speed, turning in ((way, 0.0), (0.0, turn), (-way, 0.0), (0.0, -turn)):
+    for speed, turning in ((distance, 0.0), (0.0, angle), (-distance, 0.0), (0.0, -angle)):
         for _ in range(steps):
-            states.append(upright(robot, (x, y), heading, rolled, speed, turning))
+            states.append(disc_state(robot, (x, y), heading, rolled, speed, turning))
             x, y = x + speed * np.cos(heading) / steps, y + speed * np.sin(heading) / steps
             heading, rolled = heading + turning / steps, rolled + speed / DISC_RADIUS / steps
-    return [*states, upright(robot, (x, y), heading, rolled)]
+    return [*states, disc_state(robot, (x, y), heading, rolled)]

@@ -14,8 +14,8 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons import props
-from floatbase.lessons.exercises import vector_text
-from floatbase.lessons.lesson02.helpers import DISC_RADIUS, park, wheel
+from floatbase.lessons.exercises import format_vector
+from floatbase.lessons.lesson02.helpers import DISC_RADIUS, parking_states, rolling_wheel
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
@@ -23,7 +23,7 @@ from floatbase.viewer import Picture, View, Viewer, markers, shapes
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import COM, GREYS, MEASURED, PLANNED, hex_code
 
-MOMENT = 0.01  # m drawn for a newton metre
+MOMENT_SCALE = 0.01  # m drawn for a newton metre
 
 
 def draw_equation(eom: EquationsOfMotion) -> Figure:
@@ -63,7 +63,7 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         forces = np.zeros((len(contacts), 3))
         forces[where] = force
         size, scale = view.painter.size, view.scale
-        drawn = markers.wrench(base.translation, scale * f, MOMENT * moment, size)
+        drawn = markers.wrench(base.translation, scale * f, MOMENT_SCALE * moment, size)
         extra = {f"base{path}": item for path, item in drawn.items()} if np.linalg.norm(force) > 1e-6 else {}
         if extra:
             above = base.translation + np.maximum(scale * f, [-np.inf, -np.inf, 0.1]) + [0.0, 0.0, 0.04]  # and above the trunk
@@ -75,7 +75,7 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         torques = ", ".join(f"{x + 0.0:.1f}" for x in np.round(generalised[6:][leg], 1))
         rest = np.delete(generalised[6:], leg)
         return (
-            f"base rows: force {vector_text(generalised[:3])} N, moment {vector_text(generalised[3:6], 1)} N·m; "
+            f"base rows: force {format_vector(generalised[:3])} N, moment {format_vector(generalised[3:6], 1)} N·m; "
             f"joints of this leg {torques} N·m; all other joints {np.abs(rest).max():.0f}"
         )
 
@@ -86,7 +86,7 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
     return panel
 
 
-def plot_both(record: Rollout, title: str) -> Axes:
+def plot_vertical_forces(record: Rollout, title: str) -> Axes:
     """Vertical forces at a front and at a rear foot, by (7) and by the engine; left and right are alike."""
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
     names = list(record.contacts.names)
@@ -101,7 +101,7 @@ def plot_both(record: Rollout, title: str) -> Axes:
     return axis
 
 
-def plot_strayed(curves: dict[str, Array], duration: float) -> Axes:
+def plot_foot_displacement(curves: dict[str, Array], duration: float) -> Axes:
     """Curves of how far feet stray, name -> distances in mm over `duration` s, on a logarithmic scale."""
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
     for (name, curve), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
@@ -113,57 +113,57 @@ def plot_strayed(curves: dict[str, Array], duration: float) -> Axes:
     return axis
 
 
-def play_tools(view: Viewer, forgotten: Rollout, kept: Rollout) -> Viewer:
+def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> Viewer:
     """The arm without b, and as a veil the arm with b. A pin stands where the tool was, a thick line leads from there to it.
 
     forgotten, kept: records without and with b, equally long.
     """
-    home, colour = forgotten.state(0).point("tool0"), view.painter.text_colour
+    home, colour = without_b.state(0).point("tool0"), view.painter.text_colour
     pin = {"home/pin": shapes.rod(home, np.eye(3), 0.24, 0.005, colour)}
     pin["home/name"] = shapes.label(home + [0.0, 0.0, 0.27], "home", 0.035, colour)
-    rows = np.linspace(0, len(kept) - 1, 30).astype(int)
+    rows = np.linspace(0, len(with_b) - 1, 30).astype(int)
     view.add_legend_entry("way", GREYS[2], "from home to the tool")
     pictures = []
     for i in rows:
-        drawn = view.painter.picture(forgotten.state(i), com=False, ghost=kept.state(i)) | pin
-        way = forgotten.state(i).point("tool0") - home
-        length = float(np.linalg.norm(way))
+        drawn = view.painter.picture(without_b.state(i), com=False, ghost=with_b.state(i)) | pin
+        offset = without_b.state(i).point("tool0") - home
+        length = float(np.linalg.norm(offset))
         if length > 2e-3:
             drawn["way"] = shapes.rod(
-                home, geometry.rotation_with_z_axis(way / length), length, 0.012, GREYS[2]
+                home, geometry.rotation_with_z_axis(offset / length), length, 0.012, GREYS[2]
             )  # the arm is dark
         pictures.append(drawn)
-    view.play_pictures(forgotten.time[rows], pictures, speed=0.1, ghost_name="with b")
+    view.play_pictures(without_b.time[rows], pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))
 
 
-def play_collapse(
-    view: Viewer, forgotten: Sequence[fb.State], kept: Sequence[fb.State], contacts: fb.Contacts, duration: float
+def play_collapse_comparison(
+    view: Viewer, without_b: Sequence[fb.State], with_b: Sequence[fb.State], contacts: fb.Contacts, duration: float
 ) -> Viewer:
     """The robot without b, and as a veil the robot with b; marks where the feet belong, lines to where they are.
 
-    forgotten, kept: states without and with b, equally many.
+    without_b, with_b: states without and with b, equally many.
     contacts: the pinned feet.
     duration: from the first state to the last, s.
     """
-    places = contacts.positions(forgotten[0])
+    places = contacts.positions(without_b[0])
     home = {f"home/{i}": shapes.contact_patch([*p[:2], 0.001], [0.0, 0.0, 1.0], 0.03) for i, p in enumerate(places)}
 
     def picture(ours: fb.State, theirs: fb.State) -> Picture:
         drawn = view.painter.picture(ours, com=False, ghost=theirs) | home
         for i, (a, b) in enumerate(zip(places, contacts.positions(ours), strict=True)):
-            way = b - a
-            length = float(np.linalg.norm(way))
+            offset = b - a
+            length = float(np.linalg.norm(offset))
             if length > 2e-3:  # beside the foot, where it is seen
                 start = a + [0.0, 0.06 * np.sign(a[1]), 0.0]
                 drawn[f"way/{i}"] = shapes.rod(
-                    start, geometry.rotation_with_z_axis(way / length), length, 0.006, view.painter.text_colour
+                    start, geometry.rotation_with_z_axis(offset / length), length, 0.006, view.painter.text_colour
                 )
         return drawn
 
-    rows = np.linspace(0, len(kept) - 1, 30).astype(int)
+    rows = np.linspace(0, len(with_b) - 1, 30).astype(int)
     view.add_legend_entry("way", view.painter.text_colour, "from where a foot belongs to where it is")
-    pictures = [picture(forgotten[i], kept[i]) for i in rows]
+    pictures = [picture(without_b[i], with_b[i]) for i in rows]
     view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(72.0, 10.0, 1.0, around=((0.0, 0.0, 0.16), 0.36)))
 
@@ -174,16 +174,16 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
     The picture has the disc at that time, its way on the ground, and marks where it starts and ends.
     """
 
-    def draw(way: float, turn: float, time: float) -> str:
-        states = park(robot, way, turn)
+    def draw(distance: float, angle: float, time: float) -> str:
+        states = parking_states(robot, distance, angle)
         picture = view.painter.ground_only()
-        corners = [wheel().positions(state)[0] for state in states[::20]]
+        corners = [rolling_wheel().positions(state)[0] for state in states[::20]]
         for i, (a, b) in enumerate(pairwise(corners)):
             length = float(np.linalg.norm(b - a))
             if length > 1e-6:
                 rod = shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, 0.006, view.painter.text_colour)
                 picture[f"way/{i}"] = rod
-        picture["wheel/now"] = _drawn(states[min(round(time * 20), len(states) - 1)], way, time)
+        picture["wheel/now"] = _disc_picture(states[min(round(time * 20), len(states) - 1)], distance, time)
         ends = {"start": corners[0], "end": corners[-1]}
         if np.linalg.norm(corners[-1] - corners[0]) < 0.1:
             ends = {"start and end": corners[0]}
@@ -192,19 +192,19 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
             picture[f"name/{name}"] = shapes.label(at + [-0.12, -0.13, 0.0], name, 0.05)
         view.draw(picture)
         gone = states[-1].q[:2] - states[0].q[:2]
-        slip = max(float(np.abs(wheel().slip(state)).max()) for state in states)
+        slip = max(float(np.abs(rolling_wheel().slip(state)).max()) for state in states)
         return (
             f"in the end: {gone[0]:+.2f} m ahead, <b>{gone[1]:+.2f} m to the left</b>, heading as before; "
             f"largest slip on the way {abs(slip):.3f} m/s"
         )
 
-    panel = slider_panel(view, draw, way=(0.0, 0.5, 1.0, "m"), turn=(-1.5, -0.7, 1.5, "rad"), time=(0.0, 1.5, 4.0, "s"))
+    panel = slider_panel(view, draw, distance=(0.0, 0.5, 1.0, "m"), angle=(-1.5, -0.7, 1.5, "rad"), time=(0.0, 1.5, 4.0, "s"))
     view.camera(View(-115.0, 32.0, 1.0, around=((0.4, -0.1, 0.1), 0.85)))
     return panel
 
 
-def _drawn(state: fb.State, way: float, time: float) -> shapes.Item:
-    """The disc at a time, s, of parking with rolls of `way` m, with spokes that show how far it has rolled."""
+def _disc_picture(state: fb.State, distance: float, time: float) -> shapes.Item:
+    """The disc at a time, s, of parking with rolls of `distance` m, with spokes that show how far it has rolled."""
     legs = np.clip(time - np.arange(4), 0.0, 1.0)
-    rolled = way / DISC_RADIUS * (legs[0] - legs[2])
+    rolled = distance / DISC_RADIUS * (legs[0] - legs[2])
     return props.wheel(state.q[:3], state.frame_pose("disc").rotation[:, 1], DISC_RADIUS, rolled, width=0.05)

@@ -2,17 +2,27 @@
 
 from floatbase.lessons.lesson03.exercises import EXERCISES
 from floatbase.lessons.lesson03.helpers import (
-    direction,
-    rising_solo8,
-    space_of,
-    standing_go2,
-    standing_still,
+    beta_direction,
+    rising_solo8_eom,
+    standing_go2_eom,
+    standing_space,
+    standing_still_beta,
     tilted_squeeze,
-    upright,
+    upright_solo12,
 )
-from floatbase.lessons.lesson03.pictures import bars, matrix_picture, show_beta, show_knee
+from floatbase.lessons.lesson03.pictures import matrix_picture, motion_bars, show_beta, show_knee
 
 __all__ = [
-    "EXERCISES", "bars", "direction", "matrix_picture", "rising_solo8", "show_beta", "show_knee", "space_of", "standing_go2",
-    "standing_still", "tilted_squeeze", "upright",
+    "EXERCISES",
+    "beta_direction",
+    "matrix_picture",
+    "motion_bars",
+    "rising_solo8_eom",
+    "show_beta",
+    "show_knee",
+    "standing_go2_eom",
+    "standing_space",
+    "standing_still_beta",
+    "tilted_squeeze",
+    "upright_solo12",
 ]  # fmt: skip

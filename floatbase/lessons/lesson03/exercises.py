@@ -9,16 +9,16 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces, torque_force_matrix, torque_force_space
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
-from floatbase.lessons.lesson03.helpers import rising_solo8, standing_go2, tilted_squeeze
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict
+from floatbase.lessons.lesson03.helpers import rising_solo8_eom, standing_go2_eom, tilted_squeeze
 from floatbase.linear_algebra import RANK_TOLERANCE, rank
 
-SAME = 1e-5  # part of the largest number by which two solutions may differ: rounding leaves 1e-12, the mistakes 1e-2
+TOLERANCE = 1e-5  # part of the largest number by which two solutions may differ: rounding leaves 1e-12, the mistakes 1e-2
 
 
-def _on_diagonal() -> EquationsOfMotion:
+def _diagonal_stance_eom() -> EquationsOfMotion:
     """(7) of go2 standing on two feet."""
-    standing = standing_go2()
+    standing = standing_go2_eom()
     return fb.equations_of_motion(standing.state, standing.contacts.only("FL_foot", "RR_foot"))
 
 
@@ -45,23 +45,23 @@ def _wrong_squeezes() -> dict[str, Any]:
         "transpose": lambda: -tilted_squeeze()[0].J[:, 6:] @ tilted_squeeze()[1],
         "into_base": torques(lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation.T)),
         "out_of_base": torques(lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation)),
-        "standing": lambda: -standing_go2().J[:, 6:].T @ tilted_squeeze()[1],
+        "standing": lambda: -standing_go2_eom().J[:, 6:].T @ tilted_squeeze()[1],
         "h_too": torques(after=lambda eom, tau: tau + eom.h[6:]),
     }
 
 
 def _standing_forces() -> Array:
     """The smallest forces, shape (12,), N, world, that carry the standing robot."""
-    eom = standing_go2()
+    eom = standing_go2_eom()
     return np.asarray(np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=RANK_TOLERANCE)[0])
 
 
 def _judge_unloading(answer: Any) -> Verdict:
     """Any forces will do that balance the standing robot and give FL its 20 N."""
-    forces = numbers(answer, (12,))
+    forces = array_or_verdict(answer, (12,))
     if isinstance(forces, Verdict):
         return forces
-    eom = standing_go2()
+    eom = standing_go2_eom()
     before = _standing_forces()
     if np.allclose(forces, before, atol=1e-3):
         return Verdict(False, f"Nothing has changed yet: the front left foot still carries {forces[2]:.0f} N.", "unchanged")
@@ -84,7 +84,7 @@ def _judge_unloading(answer: Any) -> Verdict:
 
 def _wrong_pairs() -> dict[tuple[str, str], Array]:
     """Name of a hint, hint -> the shortest pair (τ, λ) that this mistake leads to, shape (20,)."""
-    eom = rising_solo8()
+    eom = rising_solo8_eom()
     C, right_side = torque_force_matrix(eom)
     J, M, h, S, b = eom.J, eom.M, eom.h, eom.S, eom.b
     shortest = np.linalg.pinv(C, rcond=RANK_TOLERANCE)
@@ -101,35 +101,35 @@ def _wrong_pairs() -> dict[tuple[str, str], Array]:
     }
 
 
-def _same(x: Array, y: Array) -> bool:
-    return bool(np.max(np.abs(x - y)) <= SAME * np.max(np.abs(y)))
+def _nearly_equal(x: Array, y: Array) -> bool:
+    return bool(np.max(np.abs(x - y)) <= TOLERANCE * np.max(np.abs(y)))
 
 
 def _fault_of_pair(pair: Array) -> Verdict | None:
     """What is wrong with a shortest pair (τ, λ) of (11); None where nothing is."""
-    eom = rising_solo8()
+    eom = rising_solo8_eom()
     C, right_side = torque_force_matrix(eom)
-    if _same(pair, torque_force_space(eom).b):
+    if _nearly_equal(pair, torque_force_space(eom).b):
         return None
     if not pair.any():
         return Verdict(False, "The first column is still zero, and zero does not solve (10).", "zero")
-    if _same(C @ pair, right_side):
+    if _nearly_equal(C @ pair, right_side):
         return Verdict(
             False,
             "The first column solves (10), but it is longer than need be: some of the null space is in it. "
             "Was something divided by a singular value that is only rounding?",
             "longer",
         )
-    fitting = (Verdict(False, text, hint) for (hint, text), wrong in _wrong_pairs().items() if _same(pair, wrong))
+    fitting = (Verdict(False, text, hint) for (hint, text), wrong in _wrong_pairs().items() if _nearly_equal(pair, wrong))
     unknown = Verdict(False, "The first column does not solve (10). It is v, shape (20,): first τ, then λ.", "no_solution")
     return next(fitting, unknown)
 
 
 def _fault_of_directions(V: Array) -> Verdict | None:
     """What is wrong with columns that should be V⊥ of (11); None where nothing is."""
-    C = torque_force_matrix(rising_solo8())[0]
-    orthonormal = np.allclose(V.T @ V, np.eye(V.shape[1]), atol=SAME)
-    if np.max(np.abs(C @ V), initial=0.0) > SAME * np.max(np.abs(C)):
+    C = torque_force_matrix(rising_solo8_eom())[0]
+    orthonormal = np.allclose(V.T @ V, np.eye(V.shape[1]), atol=TOLERANCE)
+    if np.max(np.abs(C @ V), initial=0.0) > TOLERANCE * np.max(np.abs(C)):
         if orthonormal:
             return Verdict(
                 False,
@@ -161,7 +161,7 @@ def _judge_all_pairs(answer: Any) -> Verdict:
         shape = np.shape(answer)
     except ValueError:  # rows of different lengths
         shape = ()
-    given = numbers(answer, shape)
+    given = array_or_verdict(answer, shape)
     if isinstance(given, Verdict):
         return given
     if given.ndim != 2 or shape[0] != 20 or not shape[1]:
@@ -177,7 +177,7 @@ def _judge_all_pairs(answer: Any) -> Verdict:
 
 def _unloadings() -> list[Example]:
     wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])  # forces without a sum and without a moment
-    forces, squeezes = _standing_forces(), internal_forces(standing_go2())
+    forces, squeezes = _standing_forces(), internal_forces(standing_go2_eom())
     less = 20.0 - forces[2]
     short, moved = np.eye(12)[[2, 11]] * less
     return [
@@ -188,7 +188,7 @@ def _unloadings() -> list[Example]:
 
 
 def _pairs() -> list[Example]:
-    C, right_side = torque_force_matrix(rising_solo8())
+    C, right_side = torque_force_matrix(rising_solo8_eom())
     (U, s, Vt), r = np.linalg.svd(C), rank(C)
     v, V = Vt[:r].T @ (U[:, :r].T @ right_side / s[:r]), Vt[r:].T
     turned = V @ np.linalg.qr(np.random.default_rng(0).standard_normal((10, 10)))[0]
@@ -213,9 +213,9 @@ EXERCISES = (
         stub="moving = 12  # replace this number by what you find",
         solution='two_feet = fb.equations_of_motion(state, contacts.only("FL_foot", "RR_foot"))\n'
         "moving = dimensions(two_feet).rank_V_qdd",
-        judge=Numeric(
-            count=True,
-            right=lambda: rank(fb.accelerations_from_torques(_on_diagonal()).A),
+        judge=NumericJudge(
+            is_count=True,
+            right=lambda: rank(fb.accelerations_from_torques(_diagonal_stance_eom()).A),
             praise="Two feet have one internal force, along the line between them; every other direction moves something.",
             mistakes={
                 "all": lambda: 12,
@@ -242,8 +242,8 @@ EXERCISES = (
         statement="Which torques make the ground add exactly `squeeze` to the contact forces of the tilted robot?",
         stub="torques = np.zeros(12)  # replace: N·m, from tilted.J and squeeze",
         solution="torques = -tilted.J[:, 6:].T @ squeeze",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_squeeze_torques,
                 praise="Internal forces are answered joint by joint, in any posture, at any velocity, without M and without h.",
                 mistakes={"zero": lambda: np.zeros(12)} | _wrong_squeezes(),
@@ -277,7 +277,7 @@ EXERCISES = (
         "row = squeezes[2]  # what each of them does to the vertical force of FL\n"
         "new_forces = forces + squeezes @ row * (20 - forces[2]) / (row @ row)",
         judge=_judge_unloading,
-        names=lambda: {"forces": _standing_forces()},
+        namespace=lambda: {"forces": _standing_forces()},
         examples=_unloadings,
         explanation="Every λ = λ₀ + N x keeps the robot still; x is the shortest vector with row x = 20 - λ₀[2].",
     ),

@@ -15,7 +15,7 @@ from floatbase.robots import Robot
 
 
 @cache
-def standing_go2() -> EquationsOfMotion:
+def standing_go2_eom() -> EquationsOfMotion:
     """(7) of go2 standing on four feet."""
     robot = fb.load("go2")
     return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
@@ -32,7 +32,7 @@ def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
 
 
 @cache
-def rising_solo8() -> EquationsOfMotion:
+def rising_solo8_eom() -> EquationsOfMotion:
     """(7) of solo8 in its standing posture, moving forwards, upwards and nodding on four feet that stay: b is not zero.
 
     J has rank 10 of 12 there. All feet move in planes along the body, so b asks for nothing in the lost directions.
@@ -45,13 +45,13 @@ def rising_solo8() -> EquationsOfMotion:
     return fb.equations_of_motion(robot.standing().replace(v=np.concatenate([base, joints])), contacts)
 
 
-def space_of(robot: Robot, *frames: str) -> FeasibleSpace:
+def standing_space(robot: Robot, *frames: str) -> FeasibleSpace:
     """The space of motions (13) of a robot in its standing state on the feet of these frames; on all feet without `frames`."""
     contacts = fb.Contacts.points(robot, mu=0.7)
     return fb.feasible_space(fb.equations_of_motion(robot.standing(), contacts.only(*frames) if frames else contacts))
 
 
-def direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
+def beta_direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
     """The step in β, shape (dimension,), that changes the base's acceleration by `base` and the forces as little as possible.
 
     base: shape (6,), m/s² and rad/s², base frame.
@@ -62,7 +62,7 @@ def direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
     return step - idle @ np.linalg.pinv(to_forces @ idle, rcond=RANK_TOLERANCE) @ (to_forces @ step)
 
 
-def standing_still(space: FeasibleSpace) -> Array:
+def standing_still_beta(space: FeasibleSpace) -> Array:
     """The β with q̈ = 0 and the smallest forces that allow it, shape (dimension,)."""
     eom = space.eom
     J_base, J_joints = eom.J[:, :6], eom.J[:, 6:]
@@ -70,7 +70,7 @@ def standing_still(space: FeasibleSpace) -> Array:
     return space.coordinates(np.zeros(eom.nv), eom.h[6:] - J_joints.T @ forces, forces)
 
 
-def upright(robot: Robot, bend: float) -> fb.State:
+def upright_solo12(robot: Robot, bend: float) -> fb.State:
     """solo12 at rest on the ground, every foot below its hip, every knee bent by `bend` rad; 0 is a straight leg."""
     q = robot.standing().q.copy()
     for leg in range(4):

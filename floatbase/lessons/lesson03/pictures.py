@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import FeasibleSpace
-from floatbase.lessons.lesson03.helpers import upright
+from floatbase.lessons.lesson03.helpers import upright_solo12
 from floatbase.linear_algebra import rank
 from floatbase.robots import Robot
 from floatbase.viewer import Viewer
@@ -21,8 +21,8 @@ from floatbase.viewer.scene.colours import GHOST, GREYS, PLANNED, hex_code
 
 GHOST_TIME = 0.25  # s: the veil shows where an acceleration leads in this time from rest
 FULL = (20.0, 20.0, 100.0)  # m/s² or rad/s², N·m, N: bars of full length
-BAR, FULL_BAR, MIDDLE = 14, 40, 62  # px: width of a bar, length of a full one, and where they begin, below the top
-LETTER = 7  # px: width of a letter of a title, on average and at most
+BAR, FULL_BAR, ZERO_LINE = 14, 40, 62  # px: width of a bar, length of a full one, and where they begin, below the top
+LETTER_WIDTH = 7  # px: width of a letter of a title, on average and at most
 BLOCK, GAP = 58, 16  # px: a name of a leg, 11 px high, fits below its three bars; between the bars of two legs
 
 _Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]  # name, marks of its three numbers, unit
@@ -40,10 +40,10 @@ def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike, cones: bo
     ghost = state.replace(q=state.integrate(0.5 * GHOST_TIME**2 * qdd), v=np.zeros(space.eom.nv))
     name = "where q̈ leads in a quarter of a second"
     view.show(state, contacts=space.eom.contacts, planned=forces, cones=cones, ghost=ghost, ghost_name=name)
-    return bars(qdd, tau, forces)
+    return motion_bars(qdd, tau, forces)
 
 
-def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tuple[float, float, float] = FULL) -> str:
+def motion_bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tuple[float, float, float] = FULL) -> str:
     """All numbers of a quadruped's motion as bars, HTML, leg by leg. Under the mouse a bar says its name, number and unit.
 
     qdd: shape (18,), m/s² and rad/s².
@@ -61,13 +61,13 @@ def bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tu
         ("λ", "N", PLANNED, [(leg, axes, "N") for leg in legs], forces, full[2]),
     )
     drawn = [
-        _group(f"{name}, ± {most:g} {units}", hex_code(colour), blocks, np.reshape(values, (-1, 3)), most)
+        _bar_group(f"{name}, ± {most:g} {units}", hex_code(colour), blocks, np.reshape(values, (-1, 3)), most)
         for name, units, colour, blocks, values, most in groups
     ]
     return f'<div style="display: flex; flex-wrap: wrap; gap: 10px 16px">{"".join(drawn)}</div>'
 
 
-def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
+def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
     """The bars of q̈, τ or λ, SVG, as large as it says: it wraps, but never shrinks. Text has the page's own colour.
 
     title: what stands above, the symbol first.
@@ -76,9 +76,9 @@ def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float)
     values: shape (len(blocks), 3).
     most: what a bar of full length means.
     """
-    width, bottom = BLOCK * len(blocks), MIDDLE + FULL_BAR
+    width, bottom = BLOCK * len(blocks), ZERO_LINE + FULL_BAR
     parts = [f'<text y="12" font-size="13">{title}</text>']
-    parts.append(f'<path d="M0 {MIDDLE}H{width}" stroke="currentColor" stroke-opacity="0.5"/>')
+    parts.append(f'<path d="M0 {ZERO_LINE}H{width}" stroke="currentColor" stroke-opacity="0.5"/>')
     for i, ((block, marks, unit), three) in enumerate(zip(blocks, values, strict=True)):
         parts.append(f'<text x="{BLOCK * (i + 0.5)}" y="{bottom + 28}" text-anchor="middle">{block}</text>')
         for j, (mark, value) in enumerate(zip(marks, three, strict=True)):
@@ -86,15 +86,15 @@ def _group(title: str, colour: str, blocks: _Blocks, values: Array, most: float)
             parts.append(f"<g><title>{title.split(',')[0]} {block} {mark}: {number} {unit}</title>")
             parts.append(_bar(x, value / most, colour))
             parts.append(f'<text x="{x + BAR / 2}" y="{bottom + 14}" text-anchor="middle">{mark[0]}</text></g>')
-    size = f'width="{max(width, LETTER * len(title))}" height="{bottom + 32}" role="img" aria-label="{title}"'
+    size = f'width="{max(width, LETTER_WIDTH * len(title))}" height="{bottom + 32}" role="img" aria-label="{title}"'
     return f'<svg {size} font-size="11" fill="currentColor">{"".join(parts)}</svg>'
 
 
 def _bar(x: float, part: float, colour: str) -> str:
     """A bar at x, up or down from the middle, on a column that feels the mouse. part: of the full length."""
     length = min(abs(part), 1.0) * FULL_BAR
-    top, end = (MIDDLE - length, MIDDLE - FULL_BAR) if part > 0 else (MIDDLE, MIDDLE + FULL_BAR - 3)
-    drawn = f'<rect x="{x}" y="{MIDDLE - FULL_BAR}" width="{BAR}" height="{2 * FULL_BAR + 16}" fill-opacity="0"/>'
+    top, end = (ZERO_LINE - length, ZERO_LINE - FULL_BAR) if part > 0 else (ZERO_LINE, ZERO_LINE + FULL_BAR - 3)
+    drawn = f'<rect x="{x}" y="{ZERO_LINE - FULL_BAR}" width="{BAR}" height="{2 * FULL_BAR + 16}" fill-opacity="0"/>'
     drawn += f'<rect x="{x + 1}" y="{top:.1f}" width="{BAR - 2}" height="{length:.1f}" fill="{colour}"/>'
     return drawn + (f'<rect x="{x + 1}" y="{end}" width="{BAR - 2}" height="3"/>' if abs(part) > 1.0 else "")
 
@@ -138,7 +138,7 @@ def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
     bend: of every knee, rad. wobble: internal forces to add to those that carry the weight, shape (12,), N, world.
     """
     contacts = fb.Contacts.points(robot)
-    eom = fb.equations_of_motion(upright(robot, bend), contacts)
+    eom = fb.equations_of_motion(upright_solo12(robot, bend), contacts)
     forces = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0] + wobble
     tau = eom.h[6:] - eom.J[:, 6:].T @ forces
     extra = eom.J[:, 6:].T @ wobble
@@ -146,5 +146,5 @@ def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
     return (
         f"rank J = <b>{rank(eom.J)}</b>, smallest singular value {np.linalg.svd(eom.J)[1][-1]:.3f}; "
         f"torques for the wobble: <b>{np.linalg.norm(extra):.3f} N·m</b>"
-        + bars(np.zeros(18), tau, forces, full=(20.0, 2.0, 20.0))
+        + motion_bars(np.zeros(18), tau, forces, full=(20.0, 2.0, 20.0))
     )

@@ -1,10 +1,24 @@
 """Lesson 04, One cost, many spaces."""
 
 from floatbase.lessons.lesson04.exercises import EXERCISES
-from floatbase.lessons.lesson04.helpers import DESIRED, LeastCost, counted_in, measured_acceleration, tilted
-from floatbase.lessons.lesson04.pictures import effort_picture, level_curves, show_torques, slices
+from floatbase.lessons.lesson04.helpers import (
+    DESIRED_ACCELERATION,
+    MinimumCostController,
+    measured_acceleration,
+    rescaled_space,
+    tilted_go2_eom,
+)
+from floatbase.lessons.lesson04.pictures import cost_slices, effort_picture, level_curves, show_torques
 
 __all__ = [
-    "DESIRED", "EXERCISES", "LeastCost", "counted_in", "effort_picture", "level_curves", "measured_acceleration",
-    "show_torques", "slices", "tilted",
+    "DESIRED_ACCELERATION",
+    "EXERCISES",
+    "MinimumCostController",
+    "cost_slices",
+    "effort_picture",
+    "level_curves",
+    "measured_acceleration",
+    "rescaled_space",
+    "show_torques",
+    "tilted_go2_eom",
 ]  # fmt: skip

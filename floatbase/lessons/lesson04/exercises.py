@@ -10,19 +10,19 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, least_point
-from floatbase.lessons.lesson03 import standing_go2
-from floatbase.lessons.lesson04.helpers import DESIRED, tilted
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, minimiser_or_verdict
+from floatbase.lessons.lesson03 import standing_go2_eom
+from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION, tilted_go2_eom
 from floatbase.linear_algebra import rank
 from floatbase.objectives import tangential_bias
 
 
 def _gradient_by_newton() -> Array:
     """By the forces, a_c = Σ f / m + g with λ = ζ(τ): no Jacobian of the centre of mass, no drift of it."""
-    eom = tilted()
+    eom = tilted_go2_eom()
     zeta, mass = fb.forces_from_torques(eom), eom.robot.mass
     sums = np.tile(np.eye(3), 4) / mass
-    return (sums @ zeta.A).T @ (sums @ zeta.b + eom.robot.model.gravity.linear - DESIRED)
+    return (sums @ zeta.A).T @ (sums @ zeta.b + eom.robot.model.gravity.linear - DESIRED_ACCELERATION)
 
 
 def _gradients() -> dict[str, Callable[[], Any]]:
@@ -30,10 +30,10 @@ def _gradients() -> dict[str, Callable[[], Any]]:
         drift: float = 1.0, offset: float = 1.0, turned: int = 0, back: Callable[[Array], Array] = np.transpose
     ) -> Callable[[], Array]:
         def value() -> Array:
-            eom = tilted()
+            eom = tilted_go2_eom()
             state, eta = eom.state, fb.accelerations_from_torques(eom)
             R = state.frame_pose("base").rotation
-            desired = (DESIRED, R @ DESIRED, R.T @ DESIRED)[turned]
+            desired = (DESIRED_ACCELERATION, R @ DESIRED_ACCELERATION, R.T @ DESIRED_ACCELERATION)[turned]
             J = state.com_jacobian
             return back(eta.A) @ J.T @ (offset * J @ eta.b + drift * state.com_drift - desired)
 
@@ -57,43 +57,43 @@ def _gradients() -> dict[str, Callable[[], Any]]:
 
 def _gradient_of_standing() -> Array:
     """The lesson's own cost, made where the robot stands, pulled back through η of the moving robot."""
-    state = standing_go2().state
-    cost = fb.Quadratic.from_residual(state.com_jacobian, DESIRED - state.com_drift)
-    return cost.pullback(fb.accelerations_from_torques(tilted())).g
+    state = standing_go2_eom().state
+    cost = fb.Quadratic.from_residual(state.com_jacobian, DESIRED_ACCELERATION - state.com_drift)
+    return cost.pullback(fb.accelerations_from_torques(tilted_go2_eom())).g
 
 
 def _flat_on_three_feet() -> int:
     """Flat directions of com + turn on three feet, counted in τ: β is as long as τ there, since J has full rank."""
-    state = standing_go2().state
+    state = standing_go2_eom().state
     return _unseen_by(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]))
 
 
 def _flat_for_com() -> int:
-    return _unseen_by(standing_go2().state.com_jacobian)
+    return _unseen_by(standing_go2_eom().state.com_jacobian)
 
 
 def _unseen_by(rows: Array) -> int:
-    eta = fb.accelerations_from_torques(_on_three_feet())
+    eta = fb.accelerations_from_torques(_three_feet_eom())
     return eta.n_in - rank(rows @ eta.A)
 
 
 def _squeezes_on_three_feet() -> int:
-    return internal_forces(_on_three_feet()).shape[1]
+    return internal_forces(_three_feet_eom()).shape[1]
 
 
-def _on_three_feet() -> EquationsOfMotion:
+def _three_feet_eom() -> EquationsOfMotion:
     """(7) of go2 standing on all feet but FL."""
-    standing = standing_go2()
+    standing = standing_go2_eom()
     return fb.equations_of_motion(standing.state, standing.contacts.without("FL_foot"))
 
 
-def _first_costs() -> dict[str, Any]:
+def _lesson_costs() -> dict[str, Any]:
     """η and the lesson's three costs: on q̈ the centre of mass and the turning of the base, on τ the effort."""
-    eom = standing_go2()
+    eom = standing_go2_eom()
     J, drift = eom.state.frame_jacobian("base")[3:], eom.state.frame_drift("base")[3:]
     return {
         "eta": fb.accelerations_from_torques(eom),
-        "com": fb.Quadratic.from_residual(eom.state.com_jacobian, DESIRED - eom.state.com_drift),
+        "com": fb.Quadratic.from_residual(eom.state.com_jacobian, DESIRED_ACCELERATION - eom.state.com_drift),
         "turn": fb.Quadratic.from_residual(J, -drift),
         "effort": fb.Quadratic.from_residual(np.eye(12), np.zeros(12)),
     }
@@ -101,18 +101,18 @@ def _first_costs() -> dict[str, Any]:
 
 def _judge_design(answer: Any) -> Verdict:
     """Any cost on torques whose least point does what exercise 04.3 states."""
-    eom = standing_go2()
-    tau = least_point(answer, eom.d, "τ", "Pull it back through η.")
+    eom = standing_go2_eom()
+    tau = minimiser_or_verdict(answer, eom.d, "τ", "Pull it back through η.")
     if isinstance(tau, Verdict):
         return tau
     eta, zeta = fb.accelerations_from_torques(eom), fb.forces_from_torques(eom)
     a = eom.state.com_jacobian @ eta(tau)
     turning = np.linalg.norm(eta(tau)[3:6])
     friction = np.linalg.norm(zeta(tau).reshape(4, 3)[:, :2], axis=1).max()
-    if np.linalg.norm(a + DESIRED) < 0.05:
+    if np.linalg.norm(a + DESIRED_ACCELERATION) < 0.05:
         return Verdict(False, "The sign: this accelerates to the right.", "sign")
-    if np.linalg.norm(a - DESIRED) > 0.01:
-        moves = f"The centre of mass accelerates by {_rounded(a)} m/s², not {_rounded(DESIRED)}"
+    if np.linalg.norm(a - DESIRED_ACCELERATION) > 0.01:
+        moves = f"The centre of mass accelerates by {_rounded(a)} m/s², not {_rounded(DESIRED_ACCELERATION)}"
         return Verdict(False, f"{moves}: weigh that more.", "com")
     if turning > 0.05:
         return Verdict(
@@ -131,12 +131,12 @@ def _rounded(a: Array) -> list[float]:
 
 
 def _designs() -> list[Example]:
-    eom = standing_go2()
-    eta, com, turn, effort = _first_costs().values()
+    eom = standing_go2_eom()
+    eta, com, turn, effort = _lesson_costs().values()
     zeta, wish = fb.forces_from_torques(eom), (com + turn).pullback(eta)
     friction = tangential_bias(eom.contacts).pullback(zeta)
     even = fb.Quadratic.from_residual(np.eye(12), np.tile([0.0, 2.0, eom.robot.weight / 4], 4), 1e-6).pullback(zeta)
-    to_the_right = fb.Quadratic.from_residual(eom.state.com_jacobian, -DESIRED - eom.state.com_drift)
+    to_the_right = fb.Quadratic.from_residual(eom.state.com_jacobian, -DESIRED_ACCELERATION - eom.state.com_drift)
     return [
         (wish + 1e-4 * effort + 3e-5 * friction, ""), (wish + 1e-4 * effort + 1e-4 * friction, ""), (wish + even, ""),
         (wish + 1e-4 * effort, "friction"), (com.pullback(eta) + 1e-4 * effort, "turning"), (wish + effort, "com"),
@@ -151,8 +151,8 @@ EXERCISES = (
         stub="gradient = np.zeros(12)  # replace: from eta_moving, J_moving, drift_moving, desired",
         solution="residual = J_moving @ eta_moving.b + drift_moving - desired\n"
         "gradient = eta_moving.A.T @ J_moving.T @ residual",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_gradient_by_newton,
                 praise="The chain rule: points go forward by η, slopes come back by its transpose.",
                 mistakes=_gradients(),
@@ -186,8 +186,8 @@ EXERCISES = (
         solution='three = fb.feasible_space(fb.equations_of_motion(state, contacts.without("FL_foot")))\n'
         "flat = null_space((com + turn).pullback(three.qdd).H)\n"
         'moving = rank(state.frame_jacobian("FL_foot")[:3] @ three.qdd.A @ flat)',
-        judge=Numeric(
-            count=True,
+        judge=NumericJudge(
+            is_count=True,
             right=lambda: _flat_on_three_feet() - _squeezes_on_three_feet(),
             praise="Three squeezes are left on three feet; the other three flat directions take the free foot where you like.",
             mistakes={
@@ -196,7 +196,7 @@ EXERCISES = (
                 "none": lambda: 0,
                 "one": lambda: 1,
                 "two": lambda: 2,
-                "all": lambda: _on_three_feet().d,
+                "all": lambda: _three_feet_eom().d,
             },
             hints={
                 "all_flat": "Those are all flat directions. Can three feet still squeeze, and what does that move?",
@@ -219,7 +219,7 @@ EXERCISES = (
         "wishes = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort\n"
         "design = wishes + 1e-4 * friction.pullback(zeta)",
         judge=_judge_design,
-        names=_first_costs,
+        namespace=_lesson_costs,
         examples=_designs,
         explanation="Friction is easy to say in λ, so say it there and bring it to the torques through ζ. Its weight is small "
         "enough not to spoil the acceleration.",

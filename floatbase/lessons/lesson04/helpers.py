@@ -11,35 +11,35 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, FeasibleSpace
-from floatbase.lessons.controllers import Torques
+from floatbase.lessons.controllers import TorqueCommand
 from floatbase.lessons.lesson03 import tilted_squeeze
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
-DESIRED = np.array([0.0, 0.5, 0.0])  # m/s², world: to the left
-RISE_TIME = 0.02  # s in which the engine's soft contact settles
+DESIRED_ACCELERATION = np.array([0.0, 0.5, 0.0])  # m/s², world: to the left
+SETTLING_TIME = 0.02  # s in which the engine's soft contact settles
 
 
-class LeastCost:
+class MinimumCostController:
     """A controller: in every tick the torques of least cost. contacts: its stance. cost: eom -> `Quadratic` on τ."""
 
     def __init__(self, robot: Robot, contacts: fb.Contacts, cost: Callable[[EquationsOfMotion], fb.Quadratic]):
         self.robot, self.contacts, self.cost = robot, contacts, cost
 
-    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques for configuration q and velocity v."""
         eom = fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)
-        return Torques(self.cost(eom).minimiser())
+        return TorqueCommand(self.cost(eom).minimiser())
 
 
 def measured_acceleration(record: Rollout) -> Array:
     """Mean acceleration of the centre of mass, shape (3,), m/s², from its velocities in a record of the physics."""
-    first = int(np.searchsorted(record.time, RISE_TIME))
+    first = int(np.searchsorted(record.time, SETTLING_TIME))
     change = record.final.com_velocity - record.state(first).com_velocity
     return change / (record.time[-1] - record.time[first])
 
 
-def counted_in(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
+def rescaled_space(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
     """The same space of motions with another β: v and V⊥ of (13) as they are where a length is ‖W (q̈, τ, λ)‖.
 
     W: shape (nv + d + k, nv + d + k), invertible. The maps give q̈, τ and λ in SI units as before.
@@ -51,6 +51,6 @@ def counted_in(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
 
 
 @cache
-def tilted() -> EquationsOfMotion:
+def tilted_go2_eom() -> EquationsOfMotion:
     """(7) of go2 on four feet, tilted and moving."""
     return tilted_squeeze()[0]

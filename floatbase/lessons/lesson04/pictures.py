@@ -15,12 +15,12 @@ from floatbase.dynamics import EquationsOfMotion
 from floatbase.viewer import Viewer, shapes
 from floatbase.viewer.scene.colours import COM, GREYS, hex_code
 
-ARROW = 0.5  # m drawn for 1 m/s²
+ARROW_SCALE = 0.5  # m drawn for 1 m/s²
 LEVELS = (0.02, 0.125, 0.4, 1.0, 2.0)  # of a cost above its least value
-VALLEY = 0.02  # a direction that is so many times less curved than another counts as the floor of a valley
+VALLEY_RATIO = 0.02  # a direction that is so many times less curved than another counts as the floor of a valley
 
 
-def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, length: float = ARROW) -> Array:
+def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, length: float = ARROW_SCALE) -> Array:
     """Draw the forces that torques bring about and the acceleration of the centre of mass, which is returned.
 
     tau: shape (d,), N·m. length: m drawn for 1 m/s². Returns shape (3,), m/s², world.
@@ -35,7 +35,7 @@ def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, lengt
     return a
 
 
-def slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
+def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
     """Level curves of costs on two variables. costs: title=(cost, name of x, name of y, half the width of the picture).
 
     Yellow is cheap. A dot marks the least point, except where the cost is a valley.
@@ -49,7 +49,7 @@ def slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
         ax.contourf(x, y, np.sqrt(height), levels=14, cmap="viridis_r")
         ax.contour(x, y, height, levels=LEVELS, colors="white", linewidths=0.8)
         flat, curved = np.linalg.eigvalsh(cost.H)
-        if flat > VALLEY * curved:
+        if flat > VALLEY_RATIO * curved:
             ax.plot(*cost.minimiser(), "o", color=hex_code(GREYS[0]), markeredgecolor="white", markersize=8)
         ax.set(xlabel=x_name, ylabel=y_name, title=title.replace("_", " "), aspect="equal")
     plt.close(figure)

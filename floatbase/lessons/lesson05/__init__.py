@@ -2,19 +2,30 @@
 
 from floatbase.lessons.lesson05.exercises import EXERCISES
 from floatbase.lessons.lesson05.helpers import (
-    GivenForces,
-    arm_robot,
+    ConstantForceController,
+    arm_robot_eom,
     com_in_base,
-    leans,
-    pressed,
-    reaching,
-    rose_controller,
-    squeezes,
-    three_feet,
+    friction_ratios,
+    make_controller,
+    squeeze_forces,
+    squeezed_standing_forces,
+    stretched_arm_state,
+    three_feet_eom,
 )
-from floatbase.lessons.lesson05.pictures import planned_pull, show_forces, show_moved_com
+from floatbase.lessons.lesson05.pictures import plot_planned_pull, show_forces, show_moved_com
 
 __all__ = [
-    "EXERCISES", "GivenForces", "arm_robot", "com_in_base", "leans", "planned_pull", "pressed",
-    "reaching", "rose_controller", "show_forces", "show_moved_com", "squeezes", "three_feet",
+    "EXERCISES",
+    "ConstantForceController",
+    "arm_robot_eom",
+    "com_in_base",
+    "friction_ratios",
+    "make_controller",
+    "plot_planned_pull",
+    "show_forces",
+    "show_moved_com",
+    "squeeze_forces",
+    "squeezed_standing_forces",
+    "stretched_arm_state",
+    "three_feet_eom",
 ]  # fmt: skip

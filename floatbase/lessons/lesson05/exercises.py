@@ -10,10 +10,17 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, least_point
-from floatbase.lessons.lesson03 import standing_go2, standing_still
-from floatbase.lessons.lesson05.helpers import GivenForces, arm_robot, leans, pressed, squeezes, three_feet
-from floatbase.lessons.rounding import about
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, minimiser_or_verdict
+from floatbase.lessons.lesson03 import standing_go2_eom, standing_still_beta
+from floatbase.lessons.lesson05.helpers import (
+    ConstantForceController,
+    arm_robot_eom,
+    friction_ratios,
+    squeeze_forces,
+    squeezed_standing_forces,
+    three_feet_eom,
+)
+from floatbase.lessons.rounding import rounded
 from floatbase.objectives import centroidal_momentum_rate, com_wrench_map, force_bias, tangential_bias, wrench_objective
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
@@ -26,7 +33,7 @@ MOST_SLIP = 0.005  # m; the engine's soft contact gives way by 2 mm without a sl
 
 def _moments_by_jacobian() -> Array:
     """G_τ from the base's rows of J: the moment at the base's origin, moved to the centre of mass."""
-    state, J = three_feet().state, three_feet().J
+    state, J = three_feet_eom().state, three_feet_eom().J
     pose = state.frame_pose("base")
     at_base = pose.rotation @ J[:, 3:6].T
     return at_base + _blocks([pose.translation - state.com] * 3)
@@ -40,8 +47,8 @@ def _blocks(levers: Any, order: float = 1.0) -> Array:
 def _moments() -> dict[str, Callable[[], Any]]:
     def moments(about: Callable[[fb.State], Any], factor: float = 1.0, feet: Any = (0, 1, 2)) -> Callable[[], Array]:
         def value() -> Array:
-            state = three_feet().state
-            return factor * _blocks(three_feet().contacts.positions(state)[list(feet)] - about(state))
+            state = three_feet_eom().state
+            return factor * _blocks(three_feet_eom().contacts.positions(state)[list(feet)] - about(state))
 
         return value
 
@@ -61,13 +68,13 @@ def _moments() -> dict[str, Callable[[], Any]]:
 
 def _force_by_momentum() -> Array:
     """By the momentum of all links: some q̈ that accelerates the centre of mass so, and what has to change it."""
-    state = standing_go2().state
+    state = standing_go2_eom().state
     rate = centroidal_momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
     return np.asarray(rate - state.robot.mass * state.robot.model.gravity.linear)
 
 
 def _forces() -> dict[str, Callable[[], Any]]:
-    robot = standing_go2().robot
+    robot = standing_go2_eom().robot
     m, weight = robot.mass, np.array([0.0, 0.0, robot.weight])
     g = weight / m
     return {
@@ -84,28 +91,28 @@ def _forces() -> dict[str, Callable[[], Any]]:
 
 def _smallest_by_zeta() -> Array:
     """By (9) alone: the shortest τ with ζ(τ) = λ."""
-    zeta = fb.forces_from_torques(arm_robot())
-    return np.asarray(np.linalg.pinv(zeta.A) @ (pressed() - zeta.b))
+    zeta = fb.forces_from_torques(arm_robot_eom())
+    return np.asarray(np.linalg.pinv(zeta.A) @ (squeezed_standing_forces() - zeta.b))
 
 
 def _torques() -> dict[str, Callable[[], Any]]:
     def torques(offset: float = 1.0, forces: float = 1.0, back: Callable[[Array], Array] = np.linalg.pinv) -> Callable[[], Any]:
         def value() -> Array:
-            C, a = torque_force_matrix(arm_robot())
-            return back(C[:, :18]) @ (offset * a - forces * C[:, 18:] @ pressed())
+            C, a = torque_force_matrix(arm_robot_eom())
+            return back(C[:, :18]) @ (offset * a - forces * C[:, 18:] @ squeezed_standing_forces())
 
         return value
 
     def whole() -> Array:
-        C, a = torque_force_matrix(arm_robot())
+        C, a = torque_force_matrix(arm_robot_eom())
         return np.asarray((np.linalg.pinv(C) @ a)[:18])
 
     def still(forces: Callable[[], Array]) -> Callable[[], Array]:
-        return lambda: arm_robot().h[6:] - arm_robot().J[:, 6:].T @ forces()
+        return lambda: arm_robot_eom().h[6:] - arm_robot_eom().J[:, 6:].T @ forces()
 
     def standing_forces() -> Array:
-        space = fb.feasible_space(arm_robot())
-        return space.forces(standing_still(space))
+        space = fb.feasible_space(arm_robot_eom())
+        return space.forces(standing_still_beta(space))
 
     return {
         "zero": lambda: np.zeros(18),
@@ -115,10 +122,10 @@ def _torques() -> dict[str, Callable[[], Any]]:
         "forces_sign": torques(forces=-1.0),
         "a_sign": torques(offset=-1.0),
         "transpose": torques(back=np.transpose),
-        "all_still": still(pressed),
+        "all_still": still(squeezed_standing_forces),
         "no_squeeze": still(standing_forces),
         "standing": lambda: (
-            np.linalg.pinv(fb.forces_from_torques(arm_robot()).A) @ (standing_forces() - fb.forces_from_torques(arm_robot()).b)
+            np.linalg.pinv(fb.forces_from_torques(arm_robot_eom()).A) @ (standing_forces() - fb.forces_from_torques(arm_robot_eom()).b)
         ),
     }
 
@@ -127,9 +134,9 @@ def _cost_60(eom: EquationsOfMotion) -> fb.Quadratic:
     return wrench_objective(eom.state, eom.contacts, [FORWARDS, 0.0, eom.robot.weight], [0.0, 0.0, 0.0])
 
 
-def _first_design() -> dict[str, Any]:
+def _stub_names() -> dict[str, Any]:
     """What the stub of exercise 05.4 names."""
-    eom = standing_go2()
+    eom = standing_go2_eom()
     return {
         "cost60": _cost_60(eom),
         "force_bias": force_bias,
@@ -141,8 +148,8 @@ def _first_design() -> dict[str, Any]:
 
 def _judge_design(answer: Any) -> Verdict:
     """Any cost on λ whose least point does what exercise 05.4 states, on paper and on the physics."""
-    eom = standing_go2()
-    forces = least_point(answer, eom.k, "λ")
+    eom = standing_go2_eom()
+    forces = minimiser_or_verdict(answer, eom.k, "λ")
     if isinstance(forces, Verdict):
         return forces
     return _wrong_forces(eom, forces) or _on_physics(eom, forces)
@@ -158,14 +165,14 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
             return Verdict(
                 False, "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the pullback.", "on_torques"
             )
-        f_c = about(points.sum(axis=0), "N", digits=3)
+        f_c = rounded(points.sum(axis=0), "N", digits=3)
         better = "A smaller weight for the preference, or a better preference."
         return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. {better}", "force")
     if np.linalg.norm(moment) > MISSED_MOMENT:
         return Verdict(False, f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.", "moment")
     if points[:, 2].min() <= 0:
         return Verdict(False, "The wrench is right, but a foot pulls on the ground.", "pulls")
-    lean = leans(eom.contacts, forces)
+    lean = friction_ratios(eom.contacts, forces)
     if lean.max() > MOST_LEAN + ROUNDING:
         worst = eom.contacts.names[int(np.argmax(np.round(lean, 4)))].split("_")[0]
         prefers = "What does your preference call a good direction for a force, and which would be better?"
@@ -181,7 +188,7 @@ def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
 
 def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
     """Give the forces for a moment on a floor with μ = 0.5."""
-    record = fb.rollout(fb.Simulation(eom.robot, MOST_LEAN), GivenForces(eom.robot, eom.contacts, forces), SHORT)
+    record = fb.rollout(fb.Simulation(eom.robot, MOST_LEAN), ConstantForceController(eom.robot, eom.contacts, forces), SHORT)
     slip = record.slip().max() if record.outcome == "completed" else np.inf
     if slip > MOST_SLIP:
         return Verdict(
@@ -193,18 +200,18 @@ def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
 
 def _leaning(direction: Any, weight: float = 1e-3) -> fb.Quadratic:
     """The wish, and friction counted from another direction than the ground's normal."""
-    eom = standing_go2()
+    eom = standing_go2_eom()
     normals = np.asarray(direction) / np.linalg.norm(direction)
     return _cost_60(eom) + weight * tangential_bias(fb.Contacts.points(eom.robot, normals=normals))
 
 
 def _designs() -> list[Example]:
-    eom = standing_go2()
+    eom = standing_go2_eom()
     cost, share, force = _cost_60(eom), eom.robot.weight / 4, np.array([FORWARDS, 0.0, eom.robot.weight])
     right, smallest = _leaning(force), cost.minimiser()
     by_hand = np.linalg.pinv(com_wrench_map(eom.state, eom.contacts).A) @ [*force, 0, 0, 0]
     by_hand[0::3] += [-7.8, -7.8, 7.8, 7.8]
-    diagonal = squeezes(eom.contacts)["diagonal"]
+    diagonal = squeeze_forces(eom.contacts)["diagonal"]
     return [
         (right, ""), (fb.Quadratic.from_residual(np.eye(12), by_hand), ""),
         (cost + 1e-3 * force_bias(eom.contacts, 0.1, share), "leans"), (_leaning([30.0, 0.0, eom.robot.weight]), "leans"),
@@ -212,7 +219,7 @@ def _designs() -> list[Example]:
         (cost + 1e-3 * force_bias(eom.contacts, 10.0, share), "moment"),
         (fb.Quadratic.from_residual(np.eye(12), smallest + 25.0 * diagonal), "pulls"),
         (cost.pullback(fb.forces_from_torques(eom)), "on_torques"), (right.pullback(fb.forces_from_torques(eom)), "on_torques"),
-        (cost.pullback(fb.forces_from_torques(arm_robot())), "other_block"),
+        (cost.pullback(fb.forces_from_torques(arm_robot_eom())), "other_block"),
     ]  # fmt: skip
 
 
@@ -221,12 +228,12 @@ EXERCISES = (
         name="05.1",
         statement="G_τ of (21) for three feet, shape (3, 9), from `x_feet` (3, 3) and `x_com` (3,), m, world.",
         stub="G_three = np.zeros((3, 9))  # replace: from x_feet and x_com",
-        solution="x_feet = three_feet().contacts.positions(three_feet().state)\n"
-        "x_com = three_feet().state.com\n"
+        solution="x_feet = three_feet_eom().contacts.positions(three_feet_eom().state)\n"
+        "x_com = three_feet_eom().state.com\n"
         "levers = x_feet - x_com\n"
         "G_three = np.hstack([np.cross(lever, np.eye(3)).T for lever in levers])",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_moments_by_jacobian,
                 praise="One block for each foot; the base's rows of J say the same.",
                 mistakes=_moments(),
@@ -254,7 +261,7 @@ EXERCISES = (
         statement="f̃_c, shape (3,), N, world: go2 shall accelerate by 0.5 m/s² forwards and 1 m/s² upwards.",
         stub="f_wish = np.array([0, 0, robot.weight])  # replace",
         solution="f_wish = robot.mass * np.array([0.5, 0, 1.0]) + np.array([0, 0, robot.weight])",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_force_by_momentum,
             praise="m a, and m g on top: gravity is the one outside force that is not in λ.",
             mistakes=_forces(),
@@ -269,7 +276,7 @@ EXERCISES = (
                 "weight_times_a": "Weight times acceleration: the weight is m g already.",
             },
         ),
-        names=lambda: {"robot": standing_go2().robot},
+        namespace=lambda: {"robot": standing_go2_eom().robot},
         explanation="Newton: m a = f_c + m g with g pointing down. `desired_wrench(state, a)` of floatbase.objectives does it.",
     ),
     Exercise(
@@ -277,8 +284,8 @@ EXERCISES = (
         statement="The smallest torques, shape (18,), N·m, with which anymal_kinova's feet get the forces `pressed`.",
         stub="tau_pressed = np.zeros(18)  # replace: from C_tau, C_forces, a and pressed",
         solution="tau_pressed = np.linalg.pinv(C_tau) @ (a - C_forces @ pressed)",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_smallest_by_zeta,
                 praise="(25) in one line: what λ leaves to τ, by the pseudo-inverse of C_τ alone.",
                 mistakes=_torques(),
@@ -303,7 +310,7 @@ EXERCISES = (
                 (18, 1): "This is a matrix with one column; the answer is a vector of shape (18,).",
             },
         ),
-        names=lambda: {"pressed": pressed()},
+        namespace=lambda: {"pressed": squeezed_standing_forces()},
         explanation="(10) reads C_τ τ + C_λ λ = a. For a given λ that is a linear system for τ, with more unknowns than rows; "
         "the pseudo-inverse gives its shortest solution. No β is needed.",
     ),
@@ -315,7 +322,7 @@ EXERCISES = (
         "leaning = fb.Contacts.points(robot, normals=whole / np.linalg.norm(whole))\n"
         "design = cost60 + 1e-3 * tangential_bias(leaning)",
         judge=_judge_design,
-        names=_first_design,
+        namespace=_stub_names,
         examples=_designs,
         explanation="(23) calls a force without friction the best, and shares the friction equally. Where friction is the "
         "wish, a better preference is the direction of the whole: then each foot leans as the sum does, by 60 / 158.",

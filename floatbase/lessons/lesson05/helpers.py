@@ -11,26 +11,26 @@ import floatbase as fb
 from floatbase._validation import Array, as_array, as_forces
 from floatbase.control import AnalyticController
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.lessons.controllers import Torques
-from floatbase.lessons.lesson03 import standing_still
+from floatbase.lessons.controllers import TorqueCommand
+from floatbase.lessons.lesson03 import standing_still_beta
 from floatbase.objectives import torques_from_forces
 from floatbase.robots import Robot
 
-STRETCHED = (np.pi / 2, np.pi / 2, np.pi, 0.0, 0.0, 0.0)  # rad: anymal_kinova's arm, straight forwards
+STRETCHED_ARM = (np.pi / 2, np.pi / 2, np.pi, 0.0, 0.0, 0.0)  # rad: anymal_kinova's arm, straight forwards
 
 
-def rose_controller() -> AnalyticController:
+def make_controller() -> AnalyticController:
     """The controller of this lesson, whose push rose ends it: costs alone, on go2."""
     robot = fb.load("go2")
     return AnalyticController(robot, fb.Contacts.points(robot, mu=0.7), robot.standing())
 
 
-def reaching(turn: float) -> fb.State:
-    """anymal_kinova at rest with its arm stretched out. turn: rad, of the arm to the left; 0 is forwards."""
+def stretched_arm_state(angle: float) -> fb.State:
+    """anymal_kinova at rest with its arm stretched out. angle: rad, of the arm to the left; 0 is forwards."""
     robot = fb.load("anymal_kinova")
     q = robot.standing().q.copy()
-    q[-6:] = STRETCHED
-    q[-6] -= turn
+    q[-6:] = STRETCHED_ARM
+    q[-6] -= angle
     return fb.State(robot, q)
 
 
@@ -40,7 +40,7 @@ def com_in_base(state: fb.State) -> Array:
     return np.asarray(pose.rotation.T @ (state.com - pose.translation))
 
 
-def squeezes(contacts: fb.Contacts) -> dict[str, Array]:
+def squeeze_forces(contacts: fb.Contacts) -> dict[str, Array]:
     """Four of the six squeezes of a quadruped on level ground: name -> forces of 1 N at each foot concerned, shape (12,).
 
     contacts: feet in the order FL, FR, RL, RR, those at the front side by side, as those at the rear.
@@ -54,7 +54,7 @@ def squeezes(contacts: fb.Contacts) -> dict[str, Array]:
     return {name: as_array(name, np.ravel(forces).astype(float), (contacts.k,)) for name, forces in rows.items()}
 
 
-def leans(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
+def friction_ratios(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
     """How far the force of each point leans from its normal, tangential over normal part, shape (n,).
 
     μ where a force lies on its cone. Infinite where it has no normal part or pulls. forces: shape (k,) or (n, 3), N, world.
@@ -67,7 +67,7 @@ def leans(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
     return found
 
 
-class GivenForces:
+class ConstantForceController:
     """A controller: in every tick the smallest torques that give the same forces, by (25).
 
     contacts: its stance. forces: shape (k,), N, world.
@@ -76,30 +76,30 @@ class GivenForces:
     def __init__(self, robot: Robot, contacts: fb.Contacts, forces: npt.ArrayLike):
         self.robot, self.contacts, self.forces = robot, contacts, as_forces(forces, contacts.k)
 
-    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques for configuration q and velocity v."""
         eom = fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)
-        return Torques(torques_from_forces(eom).torque(self.forces), self.forces)
+        return TorqueCommand(torques_from_forces(eom).torque(self.forces), self.forces)
 
 
 @cache
-def three_feet() -> EquationsOfMotion:
+def three_feet_eom() -> EquationsOfMotion:
     """(7) of go2, tilted and moving, on all feet but FL."""
     robot = fb.load("go2")
     return fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7).without("FL_foot"))
 
 
 @cache
-def arm_robot() -> EquationsOfMotion:
+def arm_robot_eom() -> EquationsOfMotion:
     """(7) of anymal_kinova standing on four feet."""
     robot = fb.load("anymal_kinova")
     return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
 
 
-def pressed() -> Array:
+def squeezed_standing_forces() -> Array:
     """The forces of exercise 05.3, shape (12,), N, world: those of standing still, with 20 N between the front feet."""
-    space = fb.feasible_space(arm_robot())
-    forces = space.forces(standing_still(space)).copy()
+    space = fb.feasible_space(arm_robot_eom())
+    forces = space.forces(standing_still_beta(space)).copy()
     for foot, side in (("LF_FOOT", 20.0), ("RF_FOOT", -20.0)):
-        forces[arm_robot().contacts.force_slice(foot)] += [0.0, side, 0.0]
+        forces[arm_robot_eom().contacts.force_slice(foot)] += [0.0, side, 0.0]
     return np.asarray(forces)

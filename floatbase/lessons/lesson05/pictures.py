@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 
 import floatbase as fb
 from floatbase._validation import as_forces
-from floatbase.lessons.rounding import about
+from floatbase.lessons.rounding import rounded
 from floatbase.objectives import com_wrench_map
 from floatbase.simulation import Rollout
 from floatbase.viewer import View, Viewer, markers, plots, prefixed, shapes
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 LEAST_FORCE, LEAST_MOMENT = 5e-3, 5e-4  # N, N·m: less is shown as zero
-RANGE = (-40.0, 100.0)  # N: a plan that has lost its robot asks for thousands
+PLOT_RANGE = (-40.0, 100.0)  # N: a plan that has lost its robot asks for thousands
 
 
 def show_forces(
@@ -39,7 +39,7 @@ def show_forces(
         drawn["wish"] = shapes.arrow(higher, scale * np.asarray(wish, dtype=float), GREYS[1], size)
     view.show(state, contacts=contacts, planned=forces, extra=drawn)
     f_c, tau_c = np.split(wrench, [3])
-    return f"beside the weight: f<sub>c</sub> = <b>{about(f_c, 'N')}</b>, τ<sub>c</sub> = <b>{about(tau_c, 'N·m')}</b>"
+    return f"beside the weight: f<sub>c</sub> = <b>{rounded(f_c, 'N')}</b>, τ<sub>c</sub> = <b>{rounded(tau_c, 'N·m')}</b>"
 
 
 def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> Viewer:
@@ -54,12 +54,12 @@ def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> 
     return view.camera(View(20.0, 24.0, 0.75))
 
 
-def planned_pull(record: Rollout, until: float) -> Figure:
-    """Normal forces that were planned and measured up to a time in s, N, with a line at zero. Beyond `RANGE` they are cut."""
+def plot_planned_pull(record: Rollout, until: float) -> Figure:
+    """Normal forces that were planned and measured up to a time in s, N, with a line at zero. Beyond `PLOT_RANGE` they are cut."""
     figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
     plots.plot_forces(record, axis)
     axis.axhline(0.0, color=hex_code(GREYS[0]), linewidth=1.0)
-    axis.set(xlim=(0.0, until), ylim=RANGE)
+    axis.set(xlim=(0.0, until), ylim=PLOT_RANGE)
     axis.legend(loc="lower left", fontsize="small")
     plt.close(figure)
     return figure

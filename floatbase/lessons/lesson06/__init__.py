@@ -1,21 +1,42 @@
 """Lesson 06, Friction cones."""
 
-from floatbase.lessons.lesson06.exercises import EXERCISES, on_hill
-from floatbase.lessons.lesson06.helpers import ConeController, beside_its_feet, least_inside, rose_controller, with_feet
+from floatbase.lessons.lesson06.exercises import EXERCISES, stance_on_hill
+from floatbase.lessons.lesson06.helpers import (
+    ConeController,
+    com_beside_feet,
+    constrained_minimiser,
+    make_controller,
+    state_with_feet_at,
+)
 from floatbase.lessons.lesson06.pictures import (
-    AROUND,
-    FROM_ABOVE,
+    SINGLE_FOOT_VIEW,
+    TOP_VIEW,
     compass_row,
-    lean,
+    friction_ratios,
     region_picture,
     show_force,
     show_polyhedron,
     show_region,
     show_slope,
-    uphill,
+    slope_normal,
 )
 
 __all__ = [
-    "AROUND", "EXERCISES", "FROM_ABOVE", "ConeController", "beside_its_feet", "compass_row", "lean", "least_inside", "on_hill",
-    "region_picture", "rose_controller", "show_force", "show_polyhedron", "show_region", "show_slope", "uphill", "with_feet",
+    "EXERCISES",
+    "SINGLE_FOOT_VIEW",
+    "TOP_VIEW",
+    "ConeController",
+    "com_beside_feet",
+    "compass_row",
+    "constrained_minimiser",
+    "friction_ratios",
+    "make_controller",
+    "region_picture",
+    "show_force",
+    "show_polyhedron",
+    "show_region",
+    "show_slope",
+    "slope_normal",
+    "stance_on_hill",
+    "state_with_feet_at",
 ]  # fmt: skip

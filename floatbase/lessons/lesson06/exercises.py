@@ -11,14 +11,14 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
-from floatbase.lessons.lesson06.pictures import uphill
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict
+from floatbase.lessons.lesson06.pictures import slope_normal
 from floatbase.objectives import com_wrench_map
 
 BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5  # of exercise 06.1: normal, not unit; μ; facets
 FACETS, MU = 8, 0.7  # of exercise 06.2
 LOSS = 0.05  # of exercise 06.3
-HILL, ROOM = 20.0, 3.0  # of exercise 06.4: degrees; N
+HILL, MARGIN = 20.0, 3.0  # of exercise 06.4: degrees; N
 BALANCE = 0.1  # N, and N·m: what may be missing in exercise 06.4
 SOLVED = 1e-3  # N: what any solver may leave of the margin in exercise 06.4
 
@@ -39,7 +39,7 @@ def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
     low, high = 0.0, 89.0
     while high - low > 1e-9:  # degrees
         middle = 0.5 * (low + high)
-        n = uphill(middle)
+        n = slope_normal(middle)
         cone = FrictionCone(n, MU) if facets is None else FrictionPolyhedron(n, MU, facets, inside)
         low, high = (middle, high) if cone.contains([0.0, 0.0, 1.0]) else (low, middle)
     return low
@@ -62,15 +62,15 @@ def _lost_area(facets: int) -> float:
 
 
 @cache
-def on_hill() -> tuple[fb.State, fb.Contacts]:
+def stance_on_hill() -> tuple[fb.State, fb.Contacts]:
     """go2 standing on the slope of exercise 06.4, and its contacts."""
-    robot, n = fb.load("go2"), uphill(HILL)
+    robot, n = fb.load("go2"), slope_normal(HILL)
     return fb.Simulation(robot, fb.Ground(normal=n)).state, fb.Contacts.points(robot, MU, normals=n)
 
 
 def _judge_forces(answer: Any) -> Verdict:
     """Any forces that do what exercise 06.4 states, judged with forces and levers one by one."""
-    given = numbers(answer, (12,))
+    given = array_or_verdict(answer, (12,))
     if isinstance(given, Verdict):
         return given
     f = given.reshape(4, 3)
@@ -79,8 +79,8 @@ def _judge_forces(answer: Any) -> Verdict:
 
 def _out_of_balance(f: Array) -> Verdict | None:
     """What is wrong with the sum or the moment of forces on the hill, shape (4, 3), N; None where nothing is."""
-    state, contacts = on_hill()
-    weight, n = state.robot.weight, uphill(HILL)
+    state, contacts = stance_on_hill()
+    weight, n = state.robot.weight, slope_normal(HILL)
     carried = weight * np.array([0.0, 0.0, 1.0])
     missing = float(np.linalg.norm(f.sum(axis=0) - carried))
     sums = {
@@ -102,11 +102,11 @@ def _out_of_balance(f: Array) -> Verdict | None:
 
 def _judge_margins(f: Array) -> Verdict:
     """Of forces in balance on the hill, shape (4, 3), N: whether each has room enough in its cone."""
-    names, n = on_hill()[1].names, uphill(HILL)
+    names, n = stance_on_hill()[1].names, slope_normal(HILL)
     margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
     least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
-    if margins.min() >= ROOM - SOLVED:
+    if margins.min() >= MARGIN - SOLVED:
         return Verdict(True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N.")
     if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
         return Verdict(
@@ -114,7 +114,7 @@ def _judge_margins(f: Array) -> Verdict:
         )
     if margins.min() >= -BALANCE:
         return Verdict(False, f"In balance and in the cones, but {least} only.", "in_cones")
-    if upright.min() >= ROOM:
+    if upright.min() >= MARGIN:
         return Verdict(
             False, f"In balance, with room enough in cones about the vertical; in the slope's own, {least}.", "vertical_cones"
         )
@@ -123,16 +123,16 @@ def _judge_margins(f: Array) -> Verdict:
 
 def _in_balance(facets: int, room: float) -> Array:
     """The smallest forces on the hill, (12,) N, that carry go2, with room to polyhedra of so many facets."""
-    state, contacts = on_hill()
+    state, contacts = stance_on_hill()
     carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
-    rows = np.kron(np.eye(4), FrictionPolyhedron(uphill(HILL), MU, facets).face_matrix)
+    rows = np.kron(np.eye(4), FrictionPolyhedron(slope_normal(HILL), MU, facets).face_matrix)
     balance = (com_wrench_map(state, contacts).A, carry)
     return fb.solve(fb.QP(np.eye(12), np.zeros(12), *balance, rows, np.full(len(rows), -room))).x
 
 
 def _forces() -> list[Example]:
-    state, contacts = on_hill()
-    weight, n = state.robot.weight, uphill(HILL)
+    state, contacts = stance_on_hill()
+    weight, n = state.robot.weight, slope_normal(HILL)
     smallest = np.linalg.pinv(com_wrench_map(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
     squeeze = np.zeros(12)  # the left feet against the right ones: it changes neither sum nor moment
     squeeze[[7, 10]] = 1.0, -1.0
@@ -156,8 +156,8 @@ EXERCISES = (
         "turns = 2 * np.pi * np.arange(5) / 5\n"
         "directions = np.outer(np.cos(turns), t1) + np.outer(np.sin(turns), t2)\n"
         "rows = directions - 0.5 * np.cos(np.pi / 5) * n_bank",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_rows_from_edges,
                 praise="Five half-spaces; where two meet is an edge, and the edges lie on the cone.",
                 mistakes={
@@ -196,7 +196,7 @@ EXERCISES = (
         statement="The steepest slope, degrees, on which a force straight up stays in 8 facets inside the cone, μ = 0.7.",
         stub="steepest = 45.0  # degrees; replace by your expression",
         solution="steepest = np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 8)))",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_slip_angle,
             praise="Two degrees less than the cone itself: the price of flat facets.",
             mistakes={
@@ -229,8 +229,8 @@ EXERCISES = (
         statement="The fewest facets inside the cone whose middles lose less than 5 % of the tangential force.",
         stub="fewest = 4  # replace this number",
         solution="fewest = min(n for n in range(3, 50) if 1 - np.cos(np.pi / n) < 0.05)",
-        judge=Numeric(
-            count=True,
+        judge=NumericJudge(
+            is_count=True,
             right=partial(_fewest, _lost_force),
             praise="With 10 facets 4.9 % are lost in their middle, nothing at the edges.",
             mistakes={
@@ -258,7 +258,7 @@ EXERCISES = (
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
         "from floatbase.objectives import com_wrench_map\n\n"
-        "state_on_hill, contacts_on_hill = on_hill()\n"
+        "state_on_hill, contacts_on_hill = stance_on_hill()\n"
         "G_hill = com_wrench_map(state_on_hill, contacts_on_hill).A\n"
         "carry = np.array([0, 0, robot.weight, 0, 0, 0])\n"
         "facets = [FrictionPolyhedron(n, 0.7, 8).face_matrix for n in contacts_on_hill.normals]\n"
@@ -267,7 +267,7 @@ EXERCISES = (
         "least = (np.eye(12), np.zeros(12))\n"
         "forces_on_hill = fb.solve(fb.QP(*least, G_hill, carry, rows_on_hill, room)).x",
         judge=_judge_forces,
-        names=lambda: {"robot": fb.load("go2"), "on_hill": on_hill},
+        namespace=lambda: {"robot": fb.load("go2"), "on_hill": stance_on_hill},
         examples=_forces,
         explanation="The rows of all feet with -3 on their right side, the balance as equalities, and least forces to choose.",
     ),

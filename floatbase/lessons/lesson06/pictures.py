@@ -15,11 +15,11 @@ from floatbase.viewer import View, Viewer, prefixed, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 
-NEWTON = 0.01  # m drawn for 1 N at a single foot
-TALL = 0.7  # m: height of a single cone
-AROUND = View(25.0, 20.0, 1.0, around=((0.0, 0.0, 0.36), 0.52))  # of a single foot
-FROM_ABOVE = View(180.0, 89.0, 1.0)  # forwards is up, as in the plots
-SIDE = 250  # pixels of a drawing from above
+FORCE_SCALE = 0.01  # m drawn for 1 N at a single foot
+CONE_HEIGHT = 0.7  # m: height of a single cone
+SINGLE_FOOT_VIEW = View(25.0, 20.0, 1.0, around=((0.0, 0.0, 0.36), 0.52))  # of a single foot
+TOP_VIEW = View(180.0, 89.0, 1.0)  # forwards is up, as in the plots
+DRAWING_SIZE = 250  # pixels of a drawing from above
 
 
 def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
@@ -29,11 +29,11 @@ def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
     """
     cone, f = FrictionCone(np.array([0.0, 0.0, 1.0]), mu), np.asarray(force, dtype=np.float64)
     picture = {
-        "cone": shapes.friction_cone(np.zeros(3), cone.normal, mu, TALL, cone.status(f)),
+        "cone": shapes.friction_cone(np.zeros(3), cone.normal, mu, CONE_HEIGHT, cone.status(f)),
         "patch": shapes.contact_patch(np.zeros(3), cone.normal, 0.05),
     }
     if np.any(f):
-        picture["measured"] = shapes.arrow(np.zeros(3), NEWTON * f, MEASURED, view.painter.size)
+        picture["measured"] = shapes.arrow(np.zeros(3), FORCE_SCALE * f, MEASURED, view.painter.size)
     view.draw(view.painter.ground_only() | picture)
     parts, margin = decompose(f, cone.normal), cone.margin(f)
     sizes = f"α⊥ = {parts.alpha_perp:.0f} N, α∥ = {parts.alpha_par:.0f} N, μ α⊥ - α∥ = {margin:.0f} N: "
@@ -51,15 +51,15 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
     """
     inner, outer = (FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside) for inside in (True, False))
     most = 45.0 * np.array([inner.mu_facet, 0.0, 1.0])  # N: the furthest that facet 0 lets a force lean forwards
-    picture = prefixed("cone", shapes.friction_polyhedron(np.zeros(3), inner, TALL, inner.status(most)))
-    picture["planned"] = shapes.arrow(np.zeros(3), NEWTON * most, PLANNED, view.painter.size)
-    picture["round"] = shapes.friction_cone(np.zeros(3), inner.normal, mu, TALL, "idle")
+    picture = prefixed("cone", shapes.friction_polyhedron(np.zeros(3), inner, CONE_HEIGHT, inner.status(most)))
+    picture["planned"] = shapes.arrow(np.zeros(3), FORCE_SCALE * most, PLANNED, view.painter.size)
+    picture["round"] = shapes.friction_cone(np.zeros(3), inner.normal, mu, CONE_HEIGHT, "idle")
     picture["patch"] = shapes.contact_patch(np.zeros(3), inner.normal, 0.05)
     view.draw(view.painter.ground_only() | picture)
     rays = {"inside": (inner.rays, ""), "outside": (outer.rays, "6 4")}
-    half = SIDE / 2
+    half = DRAWING_SIZE / 2
     s = 0.64 * half / mu  # pixels for 1: a triangle outside reaches 2 μ, and its corners may be cut
-    drawn = "".join(_polygon(half + s * _from_above(corners), dashes) for corners, dashes in rays.values())
+    drawn = "".join(_polygon(half + s * _to_pixels(corners), dashes) for corners, dashes in rays.values())
     circle = f'<circle cx="{half}" cy="{half}" r="{s * mu:.1f}" fill="none" stroke="currentColor" stroke-width="2"/>'
     areas = " · ".join(f"{name} {100 * cone.area_ratio:.0f} %" for name, cone in (("inside", inner), ("outside", outer)))
     weakest = f"weakest {inner.mu_facet:.2f} inside, strongest {np.linalg.norm(outer.rays[0, :2]):.2f} outside"
@@ -89,12 +89,12 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
 
     slope, believed: degrees, up towards x.
     """
-    robot, n = view.robot, uphill(slope)
+    robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
-    contacts = fb.Contacts.points(robot, normals=uphill(believed))
+    contacts = fb.Contacts.points(robot, normals=slope_normal(believed))
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(start), facets=facets)
     planned = controller(start.q, start.v).forces
-    front, rear = lean(planned, n)[[0, 2]]
+    front, rear = friction_ratios(planned, n)[[0, 2]]
     picture = view.painter.picture(start, fb.Contacts.points(robot, normals=n), planned=planned, cones=False)
     drawn = view.painter.picture(start, contacts, planned=planned)
     view.draw(picture | {path: item for path, item in drawn.items() if path.split("/")[0] == "cone"})
@@ -106,7 +106,7 @@ def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
 
     slope: degrees, up towards x. mu, facets: of its friction polyhedra.
     """
-    robot, n = view.robot, uphill(slope)
+    robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
     contacts = fb.Contacts.points(robot, mu, normals=n)
     view.draw(view.painter.picture(start, contacts))
@@ -114,13 +114,13 @@ def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
     return region_picture(start, contacts.positions(start), region)
 
 
-def uphill(degrees: float) -> Array:
+def slope_normal(degrees: float) -> Array:
     """Unit normal of a slope that rises towards x, shape (3,)."""
     angle = np.deg2rad(degrees)
     return np.array([-np.sin(angle), 0.0, np.cos(angle)])
 
 
-def lean(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
+def friction_ratios(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
     """α_∥ / α_⊥ of the force at each point, shape (n,): how far it leans from the normal; μ at the surface of its cone."""
     parts = [decompose(f, normal) for f in np.reshape(forces, (-1, 3))]
     return np.array([part.alpha_par / part.alpha_perp for part in parts])
@@ -131,10 +131,10 @@ def region_picture(state: fb.State, feet: Array, region: Array) -> str:
 
     feet: shape (n, 3), m. region: vertices, shape (k, 2), m, as `support_region` gives them; none says nowhere.
     """
-    half, s, middle = SIDE / 2, SIDE / 0.6, feet[:, :2].mean(axis=0)  # s: pixels for 1 m
+    half, s, middle = DRAWING_SIZE / 2, DRAWING_SIZE / 0.6, feet[:, :2].mean(axis=0)  # s: pixels for 1 m
 
     def seen(points: Array) -> Array:
-        return half + s * _from_above(np.asarray(points) - middle)
+        return half + s * _to_pixels(np.asarray(points) - middle)
 
     words = "filled: where the CoM may be" if len(region) else "nowhere: the feet cannot carry it"
     drawn = _polygon(seen(feet[ConvexHull(feet[:, :2]).vertices, :2]), "6 4")
@@ -146,7 +146,7 @@ def region_picture(state: fb.State, feet: Array, region: Array) -> str:
     return _svg(drawn + dots, "from above; forwards is up", words, "dashed: the feet's hull, dot: the CoM")
 
 
-def _from_above(points: Array) -> Array:
+def _to_pixels(points: Array) -> Array:
     """Where horizontal places, shape (n, 2) or more, are in a drawing with x upwards and y to the left."""
     return np.column_stack([-points[:, 1], -points[:, 0]])
 
@@ -159,9 +159,9 @@ def _polygon(corners: Array, dashes: str, opacity: float = 0.12) -> str:
 
 def _svg(drawn: str, *lines: str) -> str:
     words = "".join(
-        f'<text x="{SIDE / 2}" y="{SIDE + 18 + 18 * i}" text-anchor="middle" font-size="13">{line}</text>'
+        f'<text x="{DRAWING_SIZE / 2}" y="{DRAWING_SIZE + 18 + 18 * i}" text-anchor="middle" font-size="13">{line}</text>'
         for i, line in enumerate(lines)
     )
-    box = f'<svg x="0" y="0" width="{SIDE}" height="{SIDE}">{drawn}</svg>'
-    height = SIDE + 18 * len(lines) + 10
+    box = f'<svg x="0" y="0" width="{DRAWING_SIZE}" height="{DRAWING_SIZE}">{drawn}</svg>'
+    height = DRAWING_SIZE + 18 * len(lines) + 10
     return f'<svg width="300" viewBox="-25 0 300 {height}" style="max-width: 100%" fill="currentColor">{box}{words}</svg>'

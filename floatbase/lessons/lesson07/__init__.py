@@ -1,10 +1,27 @@
 """Lesson 07, Control as a quadratic program."""
 
 from floatbase.lessons.lesson07.exercises import EXERCISES
-from floatbase.lessons.lesson07.helpers import WithoutRows, WithRows, leaning, milliseconds, pushed, rose_controller, tuned
-from floatbase.lessons.lesson07.pictures import named, plot_rounds, plot_ways
+from floatbase.lessons.lesson07.helpers import (
+    WithConstraints,
+    WithoutInequalities,
+    leaning_controller,
+    make_controller,
+    median_time_ms,
+    run_with_push,
+    tuned_controller,
+)
+from floatbase.lessons.lesson07.pictures import multiplier_text, plot_com_distance, plot_rounds
 
 __all__ = [
-    "EXERCISES", "WithRows", "WithoutRows", "leaning", "milliseconds", "named", "plot_rounds", "plot_ways", "pushed",
-    "rose_controller", "tuned",
+    "EXERCISES",
+    "WithConstraints",
+    "WithoutInequalities",
+    "leaning_controller",
+    "make_controller",
+    "median_time_ms",
+    "multiplier_text",
+    "plot_com_distance",
+    "plot_rounds",
+    "run_with_push",
+    "tuned_controller",
 ]  # fmt: skip

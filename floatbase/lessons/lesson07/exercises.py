@@ -11,10 +11,17 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.errors import InputError
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
-from floatbase.lessons.lesson03 import standing_go2
-from floatbase.lessons.lesson07.helpers import LENGTH, MU, START, leaning, pushed, tuned
-from floatbase.lessons.rounding import about
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict
+from floatbase.lessons.lesson03 import standing_go2_eom
+from floatbase.lessons.lesson07.helpers import (
+    MU,
+    PUSH_DURATION,
+    PUSH_START,
+    leaning_controller,
+    run_with_push,
+    tuned_controller,
+)
+from floatbase.lessons.rounding import rounded
 from floatbase.qp import ConstraintLabel
 from floatbase.simulation import Rollout
 
@@ -30,7 +37,7 @@ STEP = 0.005  # by which μ grows in exercise 07.3
 
 def _rows_on_three_feet() -> int:
     """Counted in the package's own QP."""
-    state = standing_go2().state
+    state = standing_go2_eom().state
     contacts = fb.Contacts.points(state.robot, mu=MU).without("FL_foot")
     return len(fb.WholeBodyController(state.robot, contacts, fb.standing_tasks(state), facets=6).qp(state).G)
 
@@ -40,7 +47,7 @@ def _rows_on_three_feet() -> int:
 
 def _judge_rows(answer: Any) -> Verdict:
     """Rows G, whose G x ≤ 0 are tried on vectors x: any order and any length of the rows will do."""
-    G = numbers(answer, (4, 42))
+    G = array_or_verdict(answer, (4, 42))
     if isinstance(G, Verdict):
         return G
     if not np.any(G):
@@ -101,18 +108,18 @@ def _agrees(rows: Array, slope: float) -> bool:
 
 def _change_of_psi() -> float:
     """From two problems solved anew on either side: no price in it."""
-    state = standing_go2().state
-    below, above = (fb.solve(leaning(0.5 + d).qp(state)).objective for d in (-1e-4, 1e-4))
+    state = standing_go2_eom().state
+    below, above = (fb.solve(leaning_controller(0.5 + d).qp(state)).objective for d in (-1e-4, 1e-4))
     return (above - below) / 2e-4 * STEP
 
 
 def _changes() -> dict[str, Callable[[], Any]]:
     def change(cos: float = np.pi / 8, part: str = "own", grows: float = STEP, sign: float = -1.0) -> Callable[[], float]:
         def value() -> float:
-            solution = fb.solve(leaning(0.5).qp(standing_go2().state))
+            solution = fb.solve(leaning_controller(0.5).qp(standing_go2_eom().state))
             f = solution["forces"].reshape(4, 3)
             of = {"own": f[:, 2], "all": np.full(4, f[:, 2].sum()), "1": np.ones(4), "tangent": np.hypot(f[:, 0], f[:, 1])}
-            names = standing_go2().contacts.names
+            names = standing_go2_eom().contacts.names
             rows = [(row, price) for row, price in solution.multipliers.items() if isinstance(row, ConstraintLabel)]
             room = {row: of[part][names.index(row.owner)] * np.cos(cos) * grows for row, _ in rows if row.kind == "friction"}
             return float(sign * sum(price * room.get(row, 0.0) for row, price in rows))
@@ -137,12 +144,12 @@ def _changes() -> dict[str, Callable[[], Any]]:
 
 @cache
 def _record(design: tuple[float, ...]) -> Rollout:
-    return pushed(tuned(*design), HARD, round(START + LENGTH + AFTER, 3))
+    return run_with_push(tuned_controller(*design), HARD, round(PUSH_START + PUSH_DURATION + AFTER, 3))
 
 
 def _judge_design(answer: Any) -> Verdict:
     """Gains and weights, judged on the physics."""
-    given = numbers(answer, (4,))
+    given = array_or_verdict(answer, (4,))
     if isinstance(given, Verdict):
         return given
     if np.any(given < 0) or given[2] == 0:
@@ -152,11 +159,11 @@ def _judge_design(answer: Any) -> Verdict:
     except InputError as error:
         return Verdict(False, str(error), "input_error")
     if record.outcome != "completed":
-        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.", "falls")
+        return Verdict(False, f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the start.", "falls")
     away = 1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
     strayed = 1e3 * record.slip().max()
-    end = about(round(away[-1], 1), "mm", floor=0.5)
-    told = f"{about(away.max(), 'mm')} away, {end} at the end; a foot strays {about(strayed, 'mm')}"
+    end = rounded(round(away[-1], 1), "mm", floor=0.5)
+    told = f"{rounded(away.max(), 'mm')} away, {end} at the end; a foot strays {rounded(strayed, 'mm')}"
     if away.max() > AWAY and away[-1] > BACK:
         return Verdict(
             False, f"It goes too far and does not come back: {told}. Look at what each gain does to e.", "stays_away"
@@ -215,8 +222,8 @@ EXERCISES = (
         statement="go2 on three feet, six facets each, and its twelve motors: how many inequality rows?",
         stub="rows = 24  # replace this number by what you find",
         solution="rows = 3 * (6 + 1) + 2 * 12",
-        judge=Numeric(
-            count=True,
+        judge=NumericJudge(
+            is_count=True,
             right=_rows_on_three_feet,
             praise="Six sides and a normal force for each foot that stands, two limits for each motor.",
             mistakes={
@@ -252,7 +259,7 @@ EXERCISES = (
         solution="inner = 0.7 * np.cos(np.pi / 4)\n"
         "G_RL = np.zeros((4, 42))\n"
         "G_RL[:, 36:39] = [[1, 0, -inner], [0, 1, -inner], [-1, 0, -inner], [0, -1, -inner]]",
-        judge=Shaped(
+        judge=ShapeJudge(
             _judge_rows,
             {
                 (4, 12): "12 columns are λ alone; x begins with q̈ and τ.",
@@ -275,7 +282,7 @@ EXERCISES = (
         "    for row, price in solution.multipliers.items()\n"
         '    if row.kind == "friction"\n'
         ")",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_change_of_psi,
             praise="Price times room, summed over the active rows: a derivative, read off a solution that you had anyway.",
             mistakes=_changes(),

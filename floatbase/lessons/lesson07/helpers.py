@@ -15,16 +15,16 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.control import AnalyticController
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.lessons.controllers import Torques
-from floatbase.lessons.lesson03 import standing_go2
+from floatbase.lessons.controllers import TorqueCommand
+from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.simulation import Controller, Rollout
 
-START, LENGTH = 0.05, 0.1  # s: when a push begins, and how long it lasts
+PUSH_START, PUSH_DURATION = 0.05, 0.1  # s: when a push begins, and how long it lasts
 MU = 0.7
 LEFT = np.array([0.0, 1.0, 0.0])
 
 
-class WithoutRows:
+class WithoutInequalities:
     """A controller from which the inequality rows of some kinds were taken away: its QP without them, at every tick.
 
     controller: the controller. kinds: "friction", "normal force" and others, as of `QP.without`.
@@ -34,50 +34,50 @@ class WithoutRows:
         self.robot, self.contacts = controller.robot, controller.contacts
         self.controller, self.kinds = controller, kinds
 
-    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques for configuration q and velocity v."""
         solution = fb.solve(self.controller.qp(fb.State(self.robot, q, v), t).without(*self.kinds))
-        return Torques(solution["tau"], solution["forces"])
+        return TorqueCommand(solution["tau"], solution["forces"])
 
 
-class WithRows:
+class WithConstraints:
     """The costs of one controller with the rows of another: ψ of lesson 05, least where (27) holds.
 
-    costs: of objectives alone. rows: gives the equalities and inequalities.
+    costs: of objectives alone. constraints: gives the equalities and inequalities.
     """
 
-    def __init__(self, costs: AnalyticController, rows: fb.WholeBodyController):
+    def __init__(self, costs: AnalyticController, constraints: fb.WholeBodyController):
         self.robot, self.contacts = costs.robot, costs.contacts
-        self.costs, self.rows = costs, rows
+        self.costs, self.constraints = costs, constraints
 
     def qp(self, eom: EquationsOfMotion) -> fb.QP:
         """The QP of one tick."""
-        qp, costs = self.rows.qp(eom.state), self.costs.objective(eom)
+        qp, costs = self.constraints.qp(eom.state), self.costs.objective(eom)
         H, g = block_diag(*(cost.H for cost in costs)), np.concatenate([cost.g for cost in costs])
         return fb.QP(H, g, qp.A, qp.b, qp.G, qp.h, qp.equality_names, qp.inequality_names, qp.blocks)
 
-    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques for configuration q and velocity v."""
         solution = fb.solve(self.qp(fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)))
-        return Torques(solution["tau"], solution["forces"])
+        return TorqueCommand(solution["tau"], solution["forces"])
 
 
-def pushed(controller: Controller, newtons: float, duration: float = 0.6) -> Rollout:
+def run_with_push(controller: Controller, newtons: float, duration: float = 0.6) -> Rollout:
     """The record of go2 on the physics, pushed to its left at the base from 0.05 to 0.15 s.
 
     newtons: how hard. duration: s, of the record.
     """
-    push = fb.Push(newtons * LEFT, start=START, duration=LENGTH)
-    return fb.rollout(fb.Simulation(standing_go2().robot), controller, duration, [push])
+    push = fb.Push(newtons * LEFT, start=PUSH_START, duration=PUSH_DURATION)
+    return fb.rollout(fb.Simulation(standing_go2_eom().robot), controller, duration, [push])
 
 
-def rose_controller() -> fb.WholeBodyController:
+def make_controller() -> fb.WholeBodyController:
     """Motion, forces and torques in one QP: the controller whose push rose ends the lesson."""
-    state = standing_go2().state
+    state = standing_go2_eom().state
     return fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state))
 
 
-def milliseconds(function: Callable[[], Any], repeats: int = 20) -> float:
+def median_time_ms(function: Callable[[], Any], repeats: int = 20) -> float:
     """How long a function takes, ms: the median of some calls, after one that does not count."""
     function()
     took = []
@@ -89,17 +89,17 @@ def milliseconds(function: Callable[[], Any], repeats: int = 20) -> float:
 
 
 @cache
-def leaning(mu: float) -> fb.WholeBodyController:
+def leaning_controller(mu: float) -> fb.WholeBodyController:
     """The controller of exercise 07.3, for a coefficient of friction: 8 facets, and more wish than friction gives."""
-    state = standing_go2().state
+    state = standing_go2_eom().state
     wish = fb.CoMTask(state.com, acceleration=[6.0, 0.0, 0.0])
     contacts = fb.Contacts.points(state.robot, mu=mu)
     return fb.WholeBodyController(state.robot, contacts, [wish, *fb.standing_tasks(state)[1:]], facets=8)
 
 
-def tuned(kp: float, kd: float, weight: float, posture: float) -> fb.WholeBodyController:
+def tuned_controller(kp: float, kd: float, weight: float, posture: float) -> fb.WholeBodyController:
     """The controller of exercise 07.4: gains and weight of the centre of mass, and the weight of the posture."""
-    state = standing_go2().state
+    state = standing_go2_eom().state
     com = fb.CoMTask(state.com, kp=kp, kd=kd, weight=weight)
     tasks = [com, fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]
     return fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot, mu=MU), tasks)

@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from floatbase.lessons.rounding import about
+from floatbase.lessons.rounding import rounded
 from floatbase.qp import Solution
 from floatbase.simulation import Rollout
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _STYLES = ("-", "--", ":")
-_MOST = 4  # rows that a note lists
+_MAX_LISTED = 4  # rows that a note lists
 
 
 def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figure:
@@ -30,7 +30,7 @@ def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figur
     return figure
 
 
-def plot_ways(records: Mapping[str, Rollout]) -> Figure:
+def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
     """How far the centre of mass is from where it was first, and each foot at most. records: name -> record."""
     figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.2), layout="constrained")
     for (name, record), colour, style in zip(records.items(), GREYS, _STYLES, strict=False):
@@ -46,9 +46,9 @@ def plot_ways(records: Mapping[str, Rollout]) -> Figure:
     return figure
 
 
-def named(solution: Solution) -> str:
+def multiplier_text(solution: Solution) -> str:
     """The active rows of a solution with their prices, dearest first, as a line of text."""
     prices = sorted(solution.multipliers.items(), key=lambda row: -row[1])
-    shown = [f"{name} {about(price)}" for name, price in prices if price > 1e-3]
-    more = f" and {len(shown) - _MOST} more" if len(shown) > _MOST else ""
-    return "dearest rows: " + ", ".join(shown[:_MOST]) + more if shown else "no row has a price"
+    shown = [f"{name} {rounded(price)}" for name, price in prices if price > 1e-3]
+    more = f" and {len(shown) - _MAX_LISTED} more" if len(shown) > _MAX_LISTED else ""
+    return "dearest rows: " + ", ".join(shown[:_MAX_LISTED]) + more if shown else "no row has a price"

@@ -2,20 +2,40 @@
 
 from floatbase.lessons.lesson08.exercises import EXERCISES
 from floatbase.lessons.lesson08.helpers import (
-    crawled,
-    least_margin,
-    moved_body,
-    rose_controller,
-    run_of,
-    shortest_shift,
-    speed,
-    tilt,
+    largest_tilt,
+    make_controller,
+    mean_velocity,
+    run_crawl,
+    run_go2,
+    shortest_com_shift,
+    smallest_support_margin,
+    state_with_moved_body,
     torque_jump,
     uneven_stance,
 )
-from floatbase.lessons.lesson08.pictures import PushTogether, footholds, plot_fall, plot_loads, triangles
+from floatbase.lessons.lesson08.pictures import (
+    PushComparison,
+    foothold_marks,
+    plot_foot_loads,
+    plot_pendulum_fall,
+    plot_support_triangles,
+)
 
 __all__ = [
-    "EXERCISES", "PushTogether", "crawled", "footholds", "least_margin", "moved_body", "plot_fall", "plot_loads",
-    "rose_controller", "run_of", "shortest_shift", "speed", "tilt", "torque_jump", "triangles", "uneven_stance",
+    "EXERCISES",
+    "PushComparison",
+    "foothold_marks",
+    "largest_tilt",
+    "make_controller",
+    "mean_velocity",
+    "plot_foot_loads",
+    "plot_pendulum_fall",
+    "plot_support_triangles",
+    "run_crawl",
+    "run_go2",
+    "shortest_com_shift",
+    "smallest_support_margin",
+    "state_with_moved_body",
+    "torque_jump",
+    "uneven_stance",
 ]  # fmt: skip

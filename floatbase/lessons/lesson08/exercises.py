@@ -14,9 +14,15 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.errors import InputError
 from floatbase.friction import wrench_set
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
-from floatbase.lessons.lesson08.helpers import CRAWL, crawled, least_margin, shortest_shift, uneven_stance
-from floatbase.lessons.rounding import about
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict
+from floatbase.lessons.lesson08.helpers import (
+    CRAWL_DURATION,
+    run_crawl,
+    shortest_com_shift,
+    smallest_support_margin,
+    uneven_stance,
+)
+from floatbase.lessons.rounding import rounded
 
 FOOT = "FR_foot"  # of exercise 08.1
 CLEARANCE = 0.05  # m, of exercise 08.2
@@ -46,21 +52,21 @@ def _shifts() -> dict[str, Callable[[], Any]]:
     triangle = np.mean([place[:2] for name, place in feet.items() if name != FOOT], axis=0)
 
     def along(axis: int) -> Array:
-        way = 1e3 * shortest_shift(state, FOOT)
+        way = 1e3 * shortest_com_shift(state, FOOT)
         return np.eye(2)[axis] * (way @ way) / way[axis]
 
     usual = state.robot.standing()
     return {
         "zero": lambda: np.zeros(2),
-        "sign": lambda: -1e3 * shortest_shift(state, FOOT),
-        "metres": lambda: shortest_shift(state, FOOT),
-        "usual_stance": lambda: 1e3 * shortest_shift(usual, FOOT),
-        "usual_feet": lambda: 1e3 * shortest_shift(usual, FOOT, lambda _: state.com[:2]),
-        "order": lambda: 1e3 * shortest_shift(state, FOOT)[::-1],
-        "y_sign": lambda: 1e3 * shortest_shift(state, FOOT) * [1.0, -1.0],
-        "x_sign": lambda: 1e3 * shortest_shift(state, FOOT) * [-1.0, 1.0],
-        "other_foot": lambda: 1e3 * shortest_shift(state, "FL_foot"),
-        "from_middle": lambda: 1e3 * shortest_shift(state, FOOT, lambda _: middle),
+        "sign": lambda: -1e3 * shortest_com_shift(state, FOOT),
+        "metres": lambda: shortest_com_shift(state, FOOT),
+        "usual_stance": lambda: 1e3 * shortest_com_shift(usual, FOOT),
+        "usual_feet": lambda: 1e3 * shortest_com_shift(usual, FOOT, lambda _: state.com[:2]),
+        "order": lambda: 1e3 * shortest_com_shift(state, FOOT)[::-1],
+        "y_sign": lambda: 1e3 * shortest_com_shift(state, FOOT) * [1.0, -1.0],
+        "x_sign": lambda: 1e3 * shortest_com_shift(state, FOOT) * [-1.0, 1.0],
+        "other_foot": lambda: 1e3 * shortest_com_shift(state, "FL_foot"),
+        "from_middle": lambda: 1e3 * shortest_com_shift(state, FOOT, lambda _: middle),
         "to_middle": lambda: 1e3 * (triangle - state.com[:2]),
         "straight_back": lambda: along(0),
         "straight_left": lambda: along(1),
@@ -169,7 +175,7 @@ def _pushes() -> dict[str, Callable[[], Any]]:
 
 def _judge_crawl(answer: Any) -> Verdict:
     """A crawl, judged on the physics."""
-    given = numbers(answer, (3,))
+    given = array_or_verdict(answer, (3,))
     if isinstance(given, Verdict):
         return given
     swing, pause, forwards = given.tolist()
@@ -182,14 +188,14 @@ def _judge_crawl(answer: Any) -> Verdict:
     if forwards < 0:
         return Verdict(False, "Forwards, please.", "backwards")
     try:
-        record = crawled(swing, pause, forwards)
+        record = run_crawl(swing, pause, forwards)
     except InputError as error:
         return Verdict(False, str(error), "input_error")
     if record.outcome != "completed":
-        return Verdict(False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.", "falls")
+        return Verdict(False, f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the start.", "falls")
     far = 1e3 * float((record.com[-1] - record.com[0])[0])
-    inside, pressed = 1e3 * least_margin(record), float(record.measured[:, 2::3].max())
-    told = f"{far:.0f} mm in {CRAWL:g} s, at least {inside:.0f} mm inside, at most {pressed:.0f} N at a foot"
+    inside, pressed = 1e3 * smallest_support_margin(record), float(record.measured[:, 2::3].max())
+    told = f"{far:.0f} mm in {CRAWL_DURATION:g} s, at least {inside:.0f} mm inside, at most {pressed:.0f} N at a foot"
     if far < FAR and inside < INSIDE:
         return Verdict(
             False, f"Too slow, and too near to the edge: {told}. Speed and pause are two different numbers.", "slow_and_near"
@@ -224,8 +230,8 @@ EXERCISES = (
         'a, b = feet["FL_foot"][:2], feet["RR_foot"][:2]\n'
         "across = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)\n"
         "way = 1000 * ((a - uneven.com[:2]) @ across) * across",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_shift,
                 praise="The nearest point of the diagonal FL-RR: there RL carries nothing, and a bit further FR may lift.",
                 mistakes=_shifts(),
@@ -250,7 +256,7 @@ EXERCISES = (
             {(3,): "Two numbers: heights do not count.", (): "Two numbers: how far forwards and how far to the left."},
         ),
         explanation="Without FR the triangle ends at the line from FL to RR. The shortest way to a line is across it.",
-        names=lambda: {"uneven": uneven_stance()},
+        namespace=lambda: {"uneven": uneven_stance()},
     ),
     Exercise(
         name="08.2",
@@ -258,8 +264,8 @@ EXERCISES = (
         "there, and 0.05 m high half-way.",
         stub="coefficients = np.zeros(7)  # replace: coefficients of u⁰, u¹, …, u⁶, in m",
         solution="coefficients = 0.05 * 64 * np.array([0, 0, 0, 1, -3, 3, -1])  # 64 u³ (1 - u)³",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_bump,
                 praise="64 u³ (1 - u)³: a factor of three at each end for position, velocity and acceleration.",
                 mistakes=_BUMPS,
@@ -292,7 +298,7 @@ EXERCISES = (
         "hind = fb.Contacts.points(arm).positions(stands)[:, 0].min()\n"
         "rate = np.sqrt(arm.gravity / stands.com[2])\n"
         "force = arm.mass * rate * (stands.com[0] - hind) / 0.1",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_hardest,
             praise="F T = m ω s: mass, pendulum, and the way to the edge.",
             mistakes=_pushes(),

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 
 import floatbase as fb
 from floatbase.lessons.lesson06 import region_picture
-from floatbase.lessons.panels import live
-from floatbase.lessons.stops import recorded_pushes
+from floatbase.lessons.panels import live_run
+from floatbase.lessons.slider_samples import recorded_pushes
 from floatbase.simulation import LiveSimulation, Rollout, status_message
 from floatbase.viewer import Picture, Viewer, shapes
 from floatbase.viewer.export.display_mode import display_mode
@@ -25,15 +25,15 @@ from floatbase.viewer.export.thumbnail import with_thumbnail
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 
-_UP = np.array([0.0, 0.0, 1.0])
+_VERTICAL = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
-_LIFTED = 0.003  # m above the ground: no flicker with its lines
-_MOST = 600.0  # N: the hardest push of the panel
-_RECORDED = (150.0, 250.0, 350.0)  # N: what both stand, what only steps save, what they save to the side only
-_HALF = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")  # below each other where a page is narrow
+_PATCH_HEIGHT = 0.003  # m above the ground: no flicker with its lines
+_MAX_PUSH = 600.0  # N: the hardest push of the panel
+_RECORDED_PUSHES = (150.0, 250.0, 350.0)  # N: what both stand, what only steps save, what they save to the side only
+_HALF_WIDTH = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")  # below each other where a page is narrow
 
 
-def triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
+def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
     """From above, side by side: where the centre of mass may be with each of these feet lifted, and where it is."""
     feet = contacts.positions(state)
     drawn = ""
@@ -44,7 +44,7 @@ def triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
     return HTML(f'<div style="display: flex; flex-wrap: wrap; gap: 2em">{drawn}</div>')
 
 
-def plot_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
+def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
     """The distance of the centre of mass from the line of two feet, m, over time, s, and that of the pendulum of ω, 1/s."""
     t, d = np.asarray(time), np.asarray(away)
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
@@ -57,7 +57,7 @@ def plot_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
     return figure
 
 
-def plot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: float) -> Figure:
+def plot_foot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: float) -> Figure:
     """The normal force of one foot, planned and measured, N, from begin to end, s. records: title -> record."""
     figure, axes = plt.subplots(1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained")
     for ax, (title, record) in zip(np.atleast_1d(axes), records.items(), strict=True):
@@ -73,7 +73,7 @@ def plot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: flo
     return figure
 
 
-def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
+def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
     """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label.
 
     Two feet have the line between them, too.
@@ -82,21 +82,21 @@ def footholds(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
     picture: Picture = {}
     aside = np.array([0.0, 0.12, 0.03])  # of the first label; the next one stands on the other side
     for name, place in places.items():
-        at = np.array([*np.asarray(place, dtype=np.float64)[:2], _LIFTED])
+        at = np.array([*np.asarray(place, dtype=np.float64)[:2], _PATCH_HEIGHT])
         foot = name in feet
-        picture[f"place/{name}"] = shapes.contact_patch(at, _UP, _SIZES["foothold" if foot else "point"])
+        picture[f"place/{name}"] = shapes.contact_patch(at, _VERTICAL, _SIZES["foothold" if foot else "point"])
         if not foot:
             picture[f"label/{name}"] = shapes.label(at + aside, name, 0.035)
             aside = aside * [1.0, -1.0, 1.0]
-    ends = [np.array([*np.asarray(places[name], dtype=np.float64)[:2], _LIFTED]) for name in places if name in feet]
+    ends = [np.array([*np.asarray(places[name], dtype=np.float64)[:2], _PATCH_HEIGHT]) for name in places if name in feet]
     if len(ends) == 2:
         way = ends[1] - ends[0]
         length = float(np.linalg.norm(way))
-        picture["line"] = shapes.rod(ends[0], geometry.rotation_with_z_axis(way / length), length, _LIFTED, GREYS[1])
+        picture["line"] = shapes.rod(ends[0], geometry.rotation_with_z_axis(way / length), length, _PATCH_HEIGHT, GREYS[1])
     return picture
 
 
-class PushTogether(widgets.VBox):
+class PushComparison(widgets.VBox):
     """Robots side by side, each with a controller of its own, pushed alike by one handle. Nothing moves before the first push.
 
     controllers: title -> controller; each has a `robot`.
@@ -109,19 +109,19 @@ class PushTogether(widgets.VBox):
         for title, one in controllers.items():
             sim = fb.Simulation(one.robot)
             self.views[title].show(sim.state, contacts=sim.feet, cones=False)
-            self.runs[title] = live(sim, one, self.views[title])
+            self.runs[title] = live_run(sim, one, self.views[title])
             self.runs[title].on_status(partial(self._tell, title))
-        self.force = _slider("push [N]", 0.0, 200.0, _MOST, 10.0)
+        self.force = _slider("push [N]", 0.0, 200.0, _MAX_PUSH, 10.0)
         self.towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
-        self.button, self.reset = widgets.Button(description="push both"), widgets.Button(description="reset")
-        self.button.on_click(lambda _: self.push())
-        self.reset.on_click(lambda _: self.begin_anew())
+        self.push_button, self.reset_button = widgets.Button(description="push both"), widgets.Button(description="reset")
+        self.push_button.on_click(lambda _: self.push())
+        self.reset_button.on_click(lambda _: self.reset())
         self._pictures = {title: widgets.VBox() for title in controllers}
         columns = [
-            widgets.VBox([widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]], layout=_HALF)
+            widgets.VBox([widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]], layout=_HALF_WIDTH)
             for title in controllers
         ]
-        buttons = widgets.HBox([self.button, self.reset])
+        buttons = widgets.HBox([self.push_button, self.reset_button])
         row = widgets.HBox(columns, layout=widgets.Layout(flex_flow="row wrap"))
         super().__init__([row, self.force, self.towards, buttons])
 
@@ -131,7 +131,7 @@ class PushTogether(widgets.VBox):
         for run in self.runs.values():
             run.push([self.force.value * math.cos(angle), self.force.value * math.sin(angle), 0.0])
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Put all of them back on their feet."""
         for run in self.runs.values():
             run.reset()
@@ -151,7 +151,7 @@ class PushTogether(widgets.VBox):
         """The pictures are put in only here, as those of a slider panel; a site has some recorded pushes of both."""
         if display_mode() == "site":
             titles = {title: (self.views[title], run.sim, run.controller) for title, run in self.runs.items()}
-            return recorded_pushes(titles, _RECORDED, ["forwards", "to the left"])
+            return recorded_pushes(titles, _RECORDED_PUSHES, ["forwards", "to the left"])
         for title, picture in self._pictures.items():
             picture.children = [self.views[title].widget()]
         return with_thumbnail(

@@ -13,9 +13,17 @@ from floatbase._validation import Array
 from floatbase.dynamics import FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict, numbers
-from floatbase.lessons.lesson09.helpers import AFTER, BEGIN, MU, SLOW_PERIOD, leaning, pressure, talos
-from floatbase.lessons.rounding import about
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict
+from floatbase.lessons.lesson09.helpers import (
+    LEAN_START,
+    MU,
+    SLOW_PERIOD,
+    TIME_AFTER_LEAN,
+    centre_of_pressure_path,
+    leaning_controller,
+    load_talos,
+)
+from floatbase.lessons.rounding import rounded
 from floatbase.linear_algebra import rank
 from floatbase.simulation import Rollout
 
@@ -31,17 +39,17 @@ _LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it little hold
 
 
 @cache
-def ankle_sensor() -> Array:
+def ankle_sensor_reading() -> Array:
     """What a sensor in the left ankle of Talos reads, shape (6,): force, N, and moment about itself, N·m, world."""
-    state = talos().standing()
-    sole = fb.Contacts.flat_feet(talos()).only("left_sole_link")
+    state = load_talos().standing()
+    sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
     return contact_wrench(state, sole, np.array(CORNER_FORCES), state.point("left_sole_link") + [0.0, 0.0, ANKLE])
 
 
 def _pushed() -> Array:
     """As the mean of the corners, weighted by their forces: no moment in it. Shape (2,), m, from the point below the sensor."""
-    state = talos().standing()
-    sole = fb.Contacts.flat_feet(talos()).only("left_sole_link")
+    state = load_talos().standing()
+    sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
     return (centre_of_pressure(state, sole, np.array(CORNER_FORCES)) - state.point("left_sole_link"))[:2]
 
 
@@ -49,7 +57,7 @@ def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Call
     """The centre of pressure from the sensor. height: which is added to the moments as height · force, m."""
 
     def value() -> Array:
-        fx, fy, fz, tx, ty, _ = ankle_sensor()
+        fx, fy, fz, tx, ty, _ = ankle_sensor_reading()
         p = sign * np.array([-ty + height * fx, tx + height * fy]) / fz
         return p[::-1] if swap else p
 
@@ -69,7 +77,7 @@ def _new_soles() -> fb.Contacts:
 
 def _counted() -> Array:
     """By rank: λ that nobody feels, internal forces, and the dimension of all motions."""
-    eom = fb.equations_of_motion(talos().standing(), _new_soles())
+    eom = fb.equations_of_motion(load_talos().standing(), _new_soles())
     J = eom.J
     return np.array([len(J) - rank(J), len(J) - rank(J[:, :6]), fb.feasible_space(eom).dimension])
 
@@ -89,29 +97,29 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
 
 
 @cache
-def leaned(seconds: float, posture: float) -> Rollout:
+def run_lean(seconds: float, posture: float) -> Rollout:
     """The record of the lean that exercise 09.4 asks for. seconds: it takes. posture: weight of the posture."""
-    controller = leaning(LEAN, seconds, posture)
-    ticks = int(np.ceil((BEGIN + seconds + AFTER) / SLOW_PERIOD))
-    return fb.rollout(fb.Simulation(talos()), controller, ticks * SLOW_PERIOD, control_period=SLOW_PERIOD)
+    controller = leaning_controller(LEAN, seconds, posture)
+    ticks = int(np.ceil((LEAN_START + seconds + TIME_AFTER_LEAN) / SLOW_PERIOD))
+    return fb.rollout(fb.Simulation(load_talos()), controller, ticks * SLOW_PERIOD, control_period=SLOW_PERIOD)
 
 
 def _judge_lean(answer: Any) -> Verdict:
     """A lean, judged on the physics."""
-    given = numbers(answer, (2,))
+    given = array_or_verdict(answer, (2,))
     if isinstance(given, Verdict):
         return given
     seconds, posture = given.tolist()
     if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
         return Verdict(False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.", "range")
     try:
-        record = leaned(seconds, posture)
+        record = run_lean(seconds, posture)
     except InputError as error:
         return Verdict(False, str(error), "input_error")
     if record.outcome != "completed":
         why = " Hardly any wish says what arms and trunk do." if posture < _LOOSE else ""
         return Verdict(
-            False, f"It does not last: {record.outcome} {about(record.time[-1], 's')} after the start.{why}", "falls"
+            False, f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the start.{why}", "falls"
         )
     return _judge_record(record, seconds)
 
@@ -120,7 +128,7 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     """Of a lean that lasted: where it ended, how near to the edge the ground had to push, and how long it took."""
     settled = record.time > 0.1  # the robot is put down at first
     toes, heels = record.foot_positions[..., 0].max(axis=1), record.foot_positions[..., 0].min(axis=1)
-    pushed = pressure(record)[:, 0]
+    pushed = centre_of_pressure_path(record)[:, 0]
     if np.isnan(pushed[settled]).any():
         return Verdict(
             False, "For a moment no corner touches the ground. Arms and trunk are thrown about: what holds them?", "in_the_air"
@@ -128,9 +136,9 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
     where = "short" if short >= 0.0 else "too far"
-    told = f"{about(abs(short), 'mm', floor=0.05)} {where} at the end; "
-    told += f"the centre of pressure stays {about(ahead, 'mm', floor=0.5)} from the toes "
-    told += f"and {about(behind, 'mm', floor=0.5)} from the heels"
+    told = f"{rounded(abs(short), 'mm', floor=0.05)} {where} at the end; "
+    told += f"the centre of pressure stays {rounded(ahead, 'mm', floor=0.5)} from the toes "
+    told += f"and {rounded(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
         return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.", "tips")
     if ahead < EDGE and abs(short) > NEAR:
@@ -142,7 +150,7 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     if short < -NEAR:
         return Verdict(False, f"It goes beyond: {told}. Nothing brakes the rest of the body.", "beyond")
     if seconds > QUICK:
-        slow = about(seconds, "s", digits=3)
+        slow = rounded(seconds, "s", digits=3)
         return Verdict(False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.", "slow")
     return Verdict(True, f"On the physics: {told}.")
 
@@ -161,7 +169,7 @@ EXERCISES = (
         "ankle, 0.107 m above the sole, reads `sensor` = (f, τ), N and N·m, world, about itself.",
         stub="pushed_at = np.zeros(2)  # replace: forwards and to the left, m",
         solution="fx, fy, fz, tx, ty, tz = sensor\npushed_at = np.array([-ty - 0.107 * fx, tx - 0.107 * fy]) / fz",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_pushed,
             praise="The tangential force has a lever as long as the ankle is high.",
             mistakes={
@@ -171,12 +179,12 @@ EXERCISES = (
                 "swapped": _read(swap=True),
                 "no_height_swapped": _read(0.0, swap=True),
                 "sign": lambda: (
-                    np.array([ankle_sensor()[4] + ANKLE * ankle_sensor()[0], -ankle_sensor()[3] + ANKLE * ankle_sensor()[1]])
-                    / ankle_sensor()[2]
+                    np.array([ankle_sensor_reading()[4] + ANKLE * ankle_sensor_reading()[0], -ankle_sensor_reading()[3] + ANKLE * ankle_sensor_reading()[1]])
+                    / ankle_sensor_reading()[2]
                 ),
                 "millimetres": lambda: 1e3 * _pushed(),
-                "not_divided": lambda: _pushed() * ankle_sensor()[2],
-                "whole_force": lambda: _pushed() * ankle_sensor()[2] / np.linalg.norm(ankle_sensor()[:3]),
+                "not_divided": lambda: _pushed() * ankle_sensor_reading()[2],
+                "whole_force": lambda: _pushed() * ankle_sensor_reading()[2] / np.linalg.norm(ankle_sensor_reading()[:3]),
             },
             hints={
                 "zero": "Nothing there yet: that is the point below the sensor.",
@@ -199,12 +207,12 @@ EXERCISES = (
         "feels; dimensions of λ that do not push the base; dimension of all motions, dim β.",
         stub="counted = np.array([12, 18, 44])  # of the lesson; replace all three",
         solution="k, r, d = 36, 12, 32\ncounted = np.array([k - r, k - 6, d + k - r])",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_counted,
                 praise="More corners add nothing to what a sole can do, only to what nobody can know.",
                 tolerance=1e-6,
-                count=True,
+                is_count=True,
                 mistakes={
                     "four_corners": lambda: np.array([12, 18, 44]),
                     "one_sole": lambda: np.array([12, 12, 50]),
@@ -236,7 +244,7 @@ EXERCISES = (
         "middle, without a sideways force, by four corners with round cones.",
         stub="largest_twist = 0.0  # N·m; replace by your expression",
         solution="largest_twist = 0.6 * 400 * np.hypot(0.12, 0.05)",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_twist,
             praise="Each corner pushes at a right angle to its lever, as hard as friction lets it.",
             mistakes={

@@ -14,25 +14,25 @@ from floatbase._validation import Array, read_only
 from floatbase.behaviours import Gait, Stand, Swing
 from floatbase.dynamics import grasp_matrix
 from floatbase.friction import FrictionPolyhedron
-from floatbase.lessons.lesson06 import least_inside
+from floatbase.lessons.lesson06 import constrained_minimiser
 from floatbase.simulation import Rollout
 
 MU = 0.7
 PERIOD = 2e-3  # s: a tick of the controller; 1 ms makes no difference to what the lesson shows, and takes twice as long
 SLOW_PERIOD = 4e-3  # s, for long records
-ROSE_WATCH = 4.0  # s: who steps may fall late
+PUSH_RECOVERY_WATCH_TIME = 4.0  # s: who steps may fall late
 SWING = 0.4  # s of each step after a push
-_SETTLED = 1e-4  # weight of least corner forces beside a wish in N²
-BEGIN, AFTER = 0.2, 1.0  # s: before and after the lean of exercise 09.4
+_FORCE_WEIGHT = 1e-4  # weight of least corner forces beside a wish in N²
+LEAN_START, TIME_AFTER_LEAN = 0.2, 1.0  # s: before and after the lean of exercise 09.4
 
 
 @cache
-def talos() -> fb.Robot:
+def load_talos() -> fb.Robot:
     """The humanoid on its two soles."""
     return fb.load("talos")
 
 
-def held(
+def run_standing(
     contacts: fb.Contacts,
     duration: float,
     pushes: Sequence[fb.Push] = (),
@@ -44,13 +44,13 @@ def held(
     contacts: what the controller believes in. duration: s. pushes: on the robot.
     sim: the physics; Talos on its soles by default. options: of `fb.WholeBodyController`.
     """
-    sim = fb.Simulation(talos()) if sim is None else sim
+    sim = fb.Simulation(load_talos()) if sim is None else sim
     tasks = fb.standing_tasks(sim.state)
     controller = fb.WholeBodyController(sim.robot, contacts, tasks, **options)  # type: ignore[arg-type]
     return fb.rollout(sim, controller, duration, pushes, PERIOD)
 
 
-def how_it_ended(record: Rollout) -> str:
+def outcome_text(record: Rollout) -> str:
     """Whether a record's robot stands, or to which side it falls: where its centre of mass went, in words."""
     x, y, _ = record.com[-1] - record.com[0]
     if record.outcome == "completed":
@@ -60,7 +60,7 @@ def how_it_ended(record: Rollout) -> str:
     return "falls forwards" if x > 0.0 else "falls backwards"
 
 
-def pressure(record: Rollout) -> Array:
+def centre_of_pressure_path(record: Rollout) -> Array:
     """Where the ground pushed: the centre of pressure of all points together at each row, shape (n, 2), m, world.
 
     NaN while nothing touches. The ground is level.
@@ -71,7 +71,7 @@ def pressure(record: Rollout) -> Array:
     return read_only(np.einsum("ij,ijk->ik", normal, record.foot_positions[:, :, :2]) / total[:, None])
 
 
-def on_one_sole(record: Rollout, every: int = 5) -> dict[int, Array]:
+def single_support_rows(record: Rollout, every: int = 5) -> dict[int, Array]:
     """Rows of a record in which one foot stands alone, and its corners there from above, shape (n, 2), m, world.
 
     every: of so many rows one is looked at.
@@ -91,25 +91,25 @@ def corner_forces(state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, fac
     G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))
     weights = np.repeat([1.0, 10.0], 3)  # 1 N·m counts as 10 N: at the corners, 10 cm away, it is
     cost = fb.Quadratic.from_residual(weights[:, None] * G, weights * np.asarray(wrench))
-    return least_inside(cost + _SETTLED * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows)
+    return constrained_minimiser(cost + _FORCE_WEIGHT * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows)
 
 
-def leaning(centimetres: float, seconds: float, posture: float) -> fb.WholeBodyController:
+def leaning_controller(centimetres: float, seconds: float, posture: float) -> fb.WholeBodyController:
     """Talos moves its centre of mass forwards along a minimum-jerk path, from 0.2 s on, and stays there.
 
     centimetres: how far. seconds: how long it takes. posture: weight of the posture.
     """
-    robot, state = talos(), talos().standing()
-    path = Swing(state.com, state.com + [0.01 * centimetres, 0.0, 0.0], BEGIN, BEGIN + seconds, 0.0)
+    robot, state = load_talos(), load_talos().standing()
+    path = Swing(state.com, state.com + [0.01 * centimetres, 0.0, 0.0], LEAN_START, LEAN_START + seconds, 0.0)
     tasks = [fb.CoMTask(path), fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]
     return fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot, mu=MU), tasks)
 
 
-def rose_controller() -> Stand:
+def make_controller() -> Stand:
     """Talos stands on its soles, and steps when its capture point comes near their edge: its rose ends the lesson."""
-    return Stand(talos(), fb.Contacts.flat_feet(talos(), mu=MU), Gait.walk(talos(), swing=SWING))
+    return Stand(load_talos(), fb.Contacts.flat_feet(load_talos(), mu=MU), Gait.walk(load_talos(), swing=SWING))
 
 
-def standing_rose_controller() -> Stand:
+def make_standing_controller() -> Stand:
     """The same without steps."""
-    return Stand(talos(), fb.Contacts.flat_feet(talos(), mu=MU))
+    return Stand(load_talos(), fb.Contacts.flat_feet(load_talos(), mu=MU))

@@ -14,22 +14,22 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.behaviours import StepPlan
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
-from floatbase.lessons.lesson09.helpers import corner_forces, pressure
+from floatbase.lessons.lesson09.helpers import centre_of_pressure_path, corner_forces
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, prefixed, shapes
 from floatbase.viewer.scene.colours import GREYS, PLANNED, hex_code
 
-SOLES = View(30.0, 30.0, 1.0, around=((0.0, 0.03, 0.06), 0.27))  # where Talos stands
-ONE_SOLE = View(30.0, 30.0, 1.0, around=((0.0, 0.1, 0.07), 0.2))
-_RATE = 30.0  # 1/s: pictures of a movie
-_FAR = 1.0  # m from a sole: a plan that wants to be pushed there is not drawn
-QUIET = 1.0  # N: a force that is not drawn
-_ABOVE = ("robot", "com", "scale")  # what is drawn of Talos beside its feet
+SOLES_VIEW = View(30.0, 30.0, 1.0, around=((0.0, 0.03, 0.06), 0.27))  # where Talos stands
+ONE_SOLE_VIEW = View(30.0, 30.0, 1.0, around=((0.0, 0.1, 0.07), 0.2))
+_FRAME_RATE = 30.0  # 1/s: pictures of a movie
+_MAX_DISTANCE = 1.0  # m from a sole: a plan that wants to be pushed there is not drawn
+MIN_FORCE = 1.0  # N: a force that is not drawn
+_HIDDEN_PARTS = ("robot", "com", "scale")  # what is drawn of Talos beside its feet
 _BESIDE, _SIZE = (-0.1, 0.21, 0.002), 0.3  # m, world: where the scale of forces is, and the size of two feet
 WIDE, HIGH = 300, 250  # pixels of a drawing
 _COLUMNS = 261  # of a slice: one for each mm
-_BORDER = 1e-6  # of the normal force: a wrench this near to a limit is within it
-_ZERO = 1e-9  # of a row of length one: rounding
+_LIMIT_TOLERANCE = 1e-6  # of the normal force: a wrench this near to a limit is within it
+_ZERO_TOLERANCE = 1e-9  # of a row of length one: rounding
 
 
 def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
@@ -38,18 +38,18 @@ def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt
     forces: at the corners, shape (k,), N, world.
     """
     view.draw(_feet_only(view, view.painter.picture(state, contacts, planned=forces)))
-    return soles_from_above(state, contacts, forces)
+    return soles_picture(state, contacts, forces)
 
 
 def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
     """A picture of Talos without what is above its feet, its scale of forces beside them. side: of the one foot to keep."""
     feet = tuple(f"robot/leg_{name}_6" for name in ("left", "right") if side in ("", name))
-    kept = {path: item for path, item in picture.items() if path.startswith(feet) or path.split("/")[0] not in _ABOVE}
+    kept = {path: item for path, item in picture.items() if path.startswith(feet) or path.split("/")[0] not in _HIDDEN_PARTS}
     bar = shapes.scale_bar(_BESIDE, 100.0, 100.0 * view.scale, _SIZE, view.painter.text_colour)
     return kept | prefixed("scale", bar)
 
 
-def soles_from_above(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
+def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
     """Soles from above, as SVG: corners as dots with their normal force as area, centres of pressure as crosses, x_c as a ring.
 
     forces: at the corners, shape (k,), N, world.
@@ -59,15 +59,15 @@ def soles_from_above(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLi
     for contact in contacts:
         own = flat[first : first + contact.k]
         first += contact.k
-        one, corners = contacts.only(contact.name), _seen(contact.positions(state))
+        one, corners = contacts.only(contact.name), _to_pixels(contact.positions(state))
         drawn += _polygon(corners)
         for (x, y), normal in zip(corners, own[2::3], strict=True):
             radius = 0.8 * np.sqrt(max(float(normal), 0.0))
             drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{hex_code(PLANNED)}"/>'
-        if own[2::3].sum() > QUIET:
-            drawn += _cross(_seen(centre_of_pressure(state, one, own)[None])[0], 5)
-    drawn += _cross(_seen(centre_of_pressure(state, contacts, flat)[None])[0], 9)
-    x, y = _seen(state.com[None])[0]
+        if own[2::3].sum() > MIN_FORCE:
+            drawn += _cross(_to_pixels(centre_of_pressure(state, one, own)[None])[0], 5)
+    drawn += _cross(_to_pixels(centre_of_pressure(state, contacts, flat)[None])[0], 9)
+    x, y = _to_pixels(state.com[None])[0]
     drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="9" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
     words = ("small crosses: where each sole is pushed", "large cross: both together; ring: x_c")
     return _svg(drawn, "from above; forwards is up", *words)
@@ -82,14 +82,14 @@ def show_sole(view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSe
     w = np.asarray(wrench, dtype=np.float64)
     forces = corner_forces(state, sole, w)
     picture = view.painter.picture(state, sole, planned=forces, com=False)
-    if forces[2::3].sum() > QUIET:
+    if forces[2::3].sum() > MIN_FORCE:
         at = centre_of_pressure(state, sole, forces)
         total = view.scale * forces.reshape(-1, 3).sum(axis=0)
         picture["planned/sum"] = shapes.arrow(at, total, PLANNED, _SIZE, halo=True)
     view.draw(_feet_only(view, picture, "left"))
     missed = np.abs(contact_wrench(state, sole, forces, limits.reference_point) - w)
-    possible = bool(np.max(limits.face_matrix @ w) <= _BORDER * w[2])
-    told = "corner forces exist" if possible else f"no corner forces make this: {_broken(limits, w)}"
+    possible = bool(np.max(limits.face_matrix @ w) <= _LIMIT_TOLERANCE * w[2])
+    told = "corner forces exist" if possible else f"no corner forces make this: {_violated_limits(limits, w)}"
     nearest = "" if possible else f"the nearest miss it by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
     return _slice(limits, w, told, nearest)
 
@@ -99,15 +99,15 @@ def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> 
 
     speed: 1 for real time. title: a line in the corner.
     """
-    rows = range(0, len(record), max(1, round(speed / (_RATE * (record.time[1] - record.time[0])))))
+    rows = range(0, len(record), max(1, round(speed / (_FRAME_RATE * (record.time[1] - record.time[0])))))
     pictures = []
     for i in rows:
         state = record.state(i)
         picture = view.painter.picture(state)
         for contact, wrench in zip(record.contacts, record.planned[i].reshape(-1, 6), strict=True):
             f, tau = wrench[:3], wrench[3:]
-            ahead = np.array([-tau[1], tau[0], 0.0]) / f[2] if f[2] > QUIET else np.full(3, np.inf)
-            if np.linalg.norm(ahead) < _FAR:
+            ahead = np.array([-tau[1], tau[0], 0.0]) / f[2] if f[2] > MIN_FORCE else np.full(3, np.inf)
+            if np.linalg.norm(ahead) < _MAX_DISTANCE:
                 at = state.point(contact.name) + ahead
                 picture[f"planned/{contact.name}"] = shapes.arrow(at, view.scale * f, PLANNED, view.painter.size, halo=True)
         pictures.append(picture)
@@ -115,17 +115,17 @@ def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> 
     return view
 
 
-def _broken(limits: WrenchSet, wrench: Array) -> str:
+def _violated_limits(limits: WrenchSet, wrench: Array) -> str:
     """Which kinds of rows a wrench breaks."""
-    broken = limits.face_matrix[limits.face_matrix @ wrench > _BORDER * wrench[2]]
-    return ", ".join(dict.fromkeys(kinds_of(broken)))
+    broken = limits.face_matrix[limits.face_matrix @ wrench > _LIMIT_TOLERANCE * wrench[2]]
+    return ", ".join(dict.fromkeys(limit_kinds(broken)))
 
 
-def kinds_of(rows: npt.ArrayLike) -> list[str]:
+def limit_kinds(rows: npt.ArrayLike) -> list[str]:
     """What each row on the wrench of a level sole forbids, shape (n, 6), about the middle of the sole: its name."""
     R = np.asarray(rows)
     R = R / np.abs(R).max(axis=1, keepdims=True)
-    moment, twist = np.abs(R[:, 3:5]).max(axis=1) > _ZERO, np.abs(R[:, 5]) > _ZERO
+    moment, twist = np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE, np.abs(R[:, 5]) > _ZERO_TOLERANCE
     return ["twisting" if t else "tipping" if m else "sliding" for m, t in zip(moment, twist, strict=True)]
 
 
@@ -137,9 +137,9 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     many = np.tile(wrench, (len(x), 1))
     many[:, 4], many[:, 5] = -1e-3 * x * wrench[2], 0.0
     room, by_twist = -many @ limits.face_matrix.T, limits.face_matrix[:, 5]  # each row says: by_twist · twist ≤ room
-    up, down, free = by_twist > _ZERO, by_twist < -_ZERO, np.abs(by_twist) <= _ZERO
+    up, down, free = by_twist > _ZERO_TOLERANCE, by_twist < -_ZERO_TOLERANCE, np.abs(by_twist) <= _ZERO_TOLERANCE
     highest, lowest = (room[:, up] / by_twist[up]).min(axis=1), (room[:, down] / by_twist[down]).max(axis=1)
-    there = (highest >= lowest) & np.all(room[:, free] >= -_ZERO * wrench[2], axis=1)
+    there = (highest >= lowest) & np.all(room[:, free] >= -_ZERO_TOLERANCE * wrench[2], axis=1)
     across = np.concatenate([x[there], x[there][::-1]])
     twist = np.concatenate([highest[there], lowest[there][::-1]])
     corners = np.column_stack([WIDE / 2 + sx * across, HIGH / 2 - sy * twist])
@@ -160,7 +160,7 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
             corners = record.contacts.only(name).positions(state)[:, :2]
             label = "_" if axis.patches else "soles"
             axis.add_patch(Polygon(corners, closed=True, color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label=label))
-    pushed, com = pressure(record), record.com
+    pushed, com = centre_of_pressure_path(record), record.com
     axis.plot(pushed[:, 0], pushed[:, 1], color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
     axis.plot(com[:, 0], com[:, 1], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="forwards [m]", ylabel="to the left [m]", aspect="equal")
@@ -176,7 +176,7 @@ def plot_lean(record: Rollout) -> Axes:
     axis.fill_between(
         record.time, edges.min(axis=1), edges.max(axis=1), color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label="soles"
     )
-    axis.plot(record.time, pressure(record)[:, 0], color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
+    axis.plot(record.time, centre_of_pressure_path(record)[:, 0], color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
     axis.plot(record.time, record.com[:, 0], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="time [s]", ylabel="forwards [m]", ylim=(-0.15, 0.15))
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
@@ -184,7 +184,7 @@ def plot_lean(record: Rollout) -> Axes:
     return axis
 
 
-def _seen(places: Array) -> Array:
+def _to_pixels(places: Array) -> Array:
     """Where horizontal places, shape (n, 2) or more, m, are in a drawing with x upwards and y to the left."""
     scale = WIDE / 0.44  # pixels for 1 m
     return np.column_stack([WIDE / 2 - scale * places[:, 1], HIGH / 2 - scale * places[:, 0]])

@@ -1,10 +1,25 @@
 """Lesson A, Fictitious forces."""
 
 from floatbase.lessons.lessonA.exercises import EXERCISES
-from floatbase.lessons.lessonA.helpers import circling, figure_of_eight, tool_error
-from floatbase.lessons.lessonA.pictures import AT_TABLE, SIDEWAYS, play_travel, plot_errors, show_ride, show_tumble
+from floatbase.lessons.lessonA.helpers import elliptic_rotation, figure_of_eight, tool_error
+from floatbase.lessons.lessonA.pictures import (
+    SIDE_VIEW,
+    TABLE_VIEW,
+    play_travelling_feet,
+    plot_errors,
+    show_tumble,
+    show_turntable,
+)
 
 __all__ = [
-    "AT_TABLE", "EXERCISES", "SIDEWAYS", "circling", "figure_of_eight", "play_travel", "plot_errors", "show_ride",
-    "show_tumble", "tool_error",
+    "EXERCISES",
+    "SIDE_VIEW",
+    "TABLE_VIEW",
+    "elliptic_rotation",
+    "figure_of_eight",
+    "play_travelling_feet",
+    "plot_errors",
+    "show_tumble",
+    "show_turntable",
+    "tool_error",
 ]  # fmt: skip

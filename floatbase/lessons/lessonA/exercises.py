@@ -10,17 +10,17 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, coriolis_matrix
-from floatbase.lessons.exercises import Exercise, Numeric
+from floatbase.lessons.exercises import Exercise, NumericJudge
 
-TURNING, MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
-PLACE, WALK = np.array([2.0, 0.0, 0.0]), np.array([1.5, 0.0, 0.0])  # m and m/s, in the merry-go-round's axes
-LIFT, ELBOW = 1, 2  # of exercise A.2: ur5's joints
-MOVING = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # rad/s, of exercise A.3
+PLATFORM_RATE, CHILD_MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
+CHILD_POSITION, CHILD_VELOCITY = np.array([2.0, 0.0, 0.0]), np.array([1.5, 0.0, 0.0])  # m and m/s, in the merry-go-round's axes
+LIFT_JOINT, ELBOW_JOINT = 1, 2  # of exercise A.2: ur5's joints
+JOINT_VELOCITY = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # rad/s, of exercise A.3
 STEP = 1e-4  # s, and of differences
 
 
 @cache
-def arm(v: tuple[float, ...] = (0.0,) * 6) -> fb.State:
+def arm_state(v: tuple[float, ...] = (0.0,) * 6) -> fb.State:
     """ur5 as it stands, its joints moving with v, rad/s."""
     return fb.load("ur5").standing().replace(v=np.array(v))
 
@@ -29,43 +29,43 @@ def _force_on_the_walker() -> Array:
     """Mass times the second difference of where the child is in the world."""
 
     def place(t: float) -> Array:
-        angle = TURNING[2] * t
+        angle = PLATFORM_RATE[2] * t
         c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (PLACE + t * WALK)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (CHILD_POSITION + t * CHILD_VELOCITY)
 
-    return np.asarray(MASS * (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2)
+    return np.asarray(CHILD_MASS * (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2)
 
 
-def _walker(coriolis: float, inward: float, mass: float = MASS) -> Callable[[], Array]:
+def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callable[[], Array]:
     """Multiples of m 2 ω × ṗ and of m ω × (ω × p)."""
 
     def force() -> Array:
-        turned = 2.0 * np.cross(TURNING, WALK)
-        return np.asarray(mass * (coriolis * turned + inward * np.cross(TURNING, np.cross(TURNING, PLACE))))
+        turned = 2.0 * np.cross(PLATFORM_RATE, CHILD_VELOCITY)
+        return np.asarray(mass * (coriolis * turned + inward * np.cross(PLATFORM_RATE, np.cross(PLATFORM_RATE, CHILD_POSITION))))
 
     return force
 
 
-def _pair(i: int = LIFT, j: int = ELBOW) -> Array:
+def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
     """What two joints at 1 rad/s make together: both columns of the Coriolis matrix, at the other's velocity."""
     e = np.eye(6)
-    return np.asarray(coriolis_matrix(arm(tuple(e[i]))) @ e[j] + coriolis_matrix(arm(tuple(e[j]))) @ e[i])
+    return np.asarray(coriolis_matrix(arm_state(tuple(e[i]))) @ e[j] + coriolis_matrix(arm_state(tuple(e[j]))) @ e[i])
 
 
 def _both(fictitious_only: bool) -> Array:
-    state = arm(tuple(np.eye(6)[LIFT] + np.eye(6)[ELBOW]))
-    return np.asarray(state.h - arm().h if fictitious_only else state.h)
+    state = arm_state(tuple(np.eye(6)[LIFT_JOINT] + np.eye(6)[ELBOW_JOINT]))
+    return np.asarray(state.h - arm_state().h if fictitious_only else state.h)
 
 
 def _velocity_part() -> Array:
-    return bias_forces(arm(tuple(MOVING))).fictitious
+    return bias_forces(arm_state(tuple(JOINT_VELOCITY))).fictitious
 
 
 def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callable[[], Array]:
     """rate · Ṁ v + slope · ∇(vᵀ M v) + gravity · g."""
 
     def force() -> Array:
-        state = arm(tuple(MOVING))
+        state = arm_state(tuple(JOINT_VELOCITY))
         v = state.v
 
         def change(way: Array) -> Array:
@@ -73,7 +73,7 @@ def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callab
             return np.asarray((after - before) / (2.0 * STEP))
 
         gradient = np.array([v @ change(unit) @ v for unit in np.eye(6)])
-        return np.asarray(rate * change(v) @ v + slope * gradient + gravity * arm().h)
+        return np.asarray(rate * change(v) @ v + slope * gradient + gravity * arm_state().h)
 
     return force
 
@@ -86,7 +86,7 @@ EXERCISES = (
         solution="coriolis = -2 * np.cross(omega, p_dot)\n"
         "centrifugal = -np.cross(omega, np.cross(omega, p))\n"
         "floor = -mass * (coriolis + centrifugal)",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_force_on_the_walker,
             praise="Inwards to keep the child on the disc, and sideways to keep up with it: a real force, from the floor.",
             mistakes={
@@ -118,18 +118,18 @@ EXERCISES = (
         statement="What lift and elbow of ur5, at 1 rad/s each, make together and neither alone, shape (6,), N·m.",
         stub="pair = np.zeros(6)  # N·m; replace by calls of h_of",
         solution="lift, elbow = np.eye(6)[[1, 2]]\npair = h_of(lift + elbow) - h_of(lift) - h_of(elbow) + g",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_pair,
             praise="The Coriolis part of this pair. Two calls do: half of h(lift + elbow) - h(lift - elbow). Do you see why?",
             mistakes={
                 "zero": lambda: np.zeros(6),
-                "gravity_short": lambda: _pair() - arm().h,
-                "gravity_left": lambda: _pair() + arm().h,
+                "gravity_short": lambda: _pair() - arm_state().h,
+                "gravity_left": lambda: _pair() + arm_state().h,
                 "all_of_h": lambda: _both(False),
                 "alone_left": lambda: _both(True),
                 "half": lambda: 0.5 * _pair(),
                 "twice": lambda: 2.0 * _pair(),
-                "elbow_wrist": lambda: _pair(ELBOW, ELBOW + 1),
+                "elbow_wrist": lambda: _pair(ELBOW_JOINT, ELBOW_JOINT + 1),
                 "pan_lift": lambda: _pair(0, 1),
             },
             hints={
@@ -153,7 +153,7 @@ EXERCISES = (
         solution="change = lambda way: (M_at(1e-4 * way) - M_at(-1e-4 * way)) / 2e-4\n"
         "slopes = np.array([w @ change(unit) @ w for unit in np.eye(6)])\n"
         "Cv = change(w) @ w - slopes / 2",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_velocity_part,
             praise="All of the fictitious forces, from how the inertia changes with the posture. That is where h comes from.",
             mistakes={

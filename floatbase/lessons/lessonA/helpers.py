@@ -11,37 +11,37 @@ from floatbase._validation import Array
 from floatbase.behaviours import pitch_and_yaw
 from floatbase.simulation import Rollout
 
-REACH = np.array([0.5, 0.35, -0.5, 0.0, 0.0, 0.0])  # rad: how far ur5's joints swing on the figure of eight
-TIMES = np.array([1.0, 2.0, 2.0, 0.0, 0.0, 0.0])  # swings of each joint in one period
-SETTLED = 1.0 / 3.0  # of a record: what comes before does not count as an error
-TURN = 2.0 * np.pi  # rad
+SWING_AMPLITUDE = np.array([0.5, 0.35, -0.5, 0.0, 0.0, 0.0])  # rad: how far ur5's joints swing on the figure of eight
+SWINGS_PER_PERIOD = np.array([1.0, 2.0, 2.0, 0.0, 0.0, 0.0])  # swings of each joint in one period
+TRANSIENT_FRACTION = 1.0 / 3.0  # of a record: what comes before does not count as an error
+FULL_TURN = 2.0 * np.pi  # rad
 
-Path = Callable[[float], tuple[Array, Array, Array]]
+Trajectory = Callable[[float], tuple[Array, Array, Array]]
 
 
-def figure_of_eight(home: fb.State, period: float) -> Path:
+def figure_of_eight(home: fb.State, period: float) -> Trajectory:
     """Joint positions, velocities and accelerations as functions of t, each (6,), with which ur5's tool draws an eight.
 
     period: s, of one eight.
     """
-    w = TURN * TIMES / period
+    w = FULL_TURN * SWINGS_PER_PERIOD / period
 
     def path(t: float) -> tuple[Array, Array, Array]:
-        swing = REACH * np.sin(w * t)
-        return home.q + swing, REACH * w * np.cos(w * t), -(w**2) * swing
+        swing = SWING_AMPLITUDE * np.sin(w * t)
+        return home.q + swing, SWING_AMPLITUDE * w * np.cos(w * t), -(w**2) * swing
 
     return path
 
 
-def tool_error(record: Rollout, path: Path) -> float:
+def tool_error(record: Rollout, path: Trajectory) -> float:
     """Root mean square of the tool's distance from where the path has it, mm, after the first third of a record."""
-    rows = range(round(SETTLED * len(record)), len(record), 5)
+    rows = range(round(TRANSIENT_FRACTION * len(record)), len(record), 5)
     wanted = [fb.State(record.robot, path(record.time[i])[0]).point("tool0") for i in rows]
     off = np.array([record.state(i).point("tool0") for i in rows]) - wanted
     return float(1000.0 * np.sqrt(np.mean(np.sum(off**2, axis=1))))
 
 
-def circling(pitch: float, yaw: float, rate: float, loops: int, phase: float = 90.0) -> Path:
+def elliptic_rotation(pitch: float, yaw: float, rate: float, loops: int, phase: float = 90.0) -> Trajectory:
     """Base orientations that describe an ellipse in pitch and yaw `loops` times, as `OrientationTask` takes them.
 
     The ellipse grows from nothing in the first loop and shrinks to nothing in the last. Returns R (3, 3), angular velocity
@@ -55,6 +55,6 @@ def circling(pitch: float, yaw: float, rate: float, loops: int, phase: float = 9
     def angles(t: float) -> Array:
         s = np.clip(rate * min(t, total - t), 0.0, 1.0)
         size = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-        return np.asarray(size * np.array([pitch * np.sin(TURN * rate * t), yaw * np.sin(TURN * rate * t + shift)]))
+        return np.asarray(size * np.array([pitch * np.sin(FULL_TURN * rate * t), yaw * np.sin(FULL_TURN * rate * t + shift)]))
 
     return pitch_and_yaw(angles)

@@ -13,37 +13,37 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, view_from_rotating_frame
 from floatbase.lessons import props
-from floatbase.lessons.exercises import vector_text
+from floatbase.lessons.exercises import format_vector
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, shapes
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
-TABLE, HEIGHT = 1.0, 0.3  # m: radius of the turntable, and height of its top
+TABLE_RADIUS, TABLE_HEIGHT = 1.0, 0.3  # m: radius of the turntable, and height of its top
 START = np.array([-0.7, 0.3, 0.0])  # m: where the puck begins, from the axis
-AT_TABLE = View(-90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0))  # x to the right, y away, as in the rider's drawing
+TABLE_VIEW = View(-90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0))  # x to the right, y away, as in the rider's drawing
 PIECES = 24  # of a drawn path
 SIDE = 250  # pixels of a drawing
-ACCELERATION = 0.05  # m drawn for 1 m/s²
-NEWTON = 0.003  # m drawn for 1 N of what is called a force
-SIDEWAYS = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.62), 0.5))
-AT_FEET = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.44))
-SEEN = 1e-3  # m: a shorter rod is not drawn
-BESIDE = 0.05  # m: from a foot to its pin, away from the robot, where they are seen
-FRAMES = 10  # pictures for each second of the travelling feet
+ACCELERATION_SCALE = 0.05  # m drawn for 1 m/s²
+FORCE_SCALE = 0.003  # m drawn for 1 N of what is called a force
+SIDE_VIEW = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.62), 0.5))
+FEET_VIEW = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.44))
+MIN_ROD_LENGTH = 1e-3  # m: a shorter rod is not drawn
+PIN_DISTANCE = 0.05  # m: from a foot to its pin, away from the robot, where they are seen
+FRAME_RATE = 10  # pictures for each second of the travelling feet
 
 
-def show_ride(view: Viewer, omega: float, speed: float, time: float) -> str:
+def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str:
     """Draw a puck that slides straight over a turning table and leaves chalk on it; what a rider sees, as SVG.
 
     omega: rad/s, of the table, to the left. speed: m/s, of the puck, along x. time: s, at least a moment.
     """
     times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
     seen = view_from_rotating_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
-    top = np.array([0.0, 0.0, HEIGHT])
+    top = np.array([0.0, 0.0, TABLE_HEIGHT])
     straight = START + np.outer(times, [speed, 0.0, 0.0])
     chalk = seen.position @ seen.rotation[-1].T  # where the table has carried it by now
-    picture = view.painter.ground_only() | {"table": props.turntable(top, TABLE, omega * time)}
+    picture = view.painter.ground_only() | {"table": props.turntable(top, TABLE_RADIUS, omega * time)}
     picture |= _path("chalk", chalk + top + [0.0, 0.0, 0.006], 0.012, GREYS[0])
     picture |= _path("way", straight + top + [0.0, 0.0, 0.05], 0.006, GREYS[1])
     puck = straight[-1] + top
@@ -60,26 +60,26 @@ def _path(name: str, points: Array, radius: float, colour: tuple[float, float, f
 def _rod(a: Array, b: Array, radius: float, colour: tuple[float, float, float]) -> shapes.Item | None:
     length = float(np.linalg.norm(b - a))
     return (
-        shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, radius, colour) if length > SEEN / 10 else None
+        shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, radius, colour) if length > MIN_ROD_LENGTH / 10 else None
     )
 
 
 def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str:
     """From above, as SVG, with the table at rest: the path, (n, 3), m, and the accelerations at its end, m/s²."""
-    half, scale = SIDE / 2, 0.95 * SIDE / (2 * TABLE)
+    half, scale = SIDE / 2, 0.95 * SIDE / (2 * TABLE_RADIUS)
 
     def seen(points: Array) -> Array:
         return half + scale * np.asarray(points)[..., :2] * [1.0, -1.0]
 
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in seen(position))
     x, y = seen(position[-1])
-    tip = seen(np.array([0.95 * TABLE, 0.0]))
-    drawn = f'<circle cx="{half}" cy="{half}" r="{scale * TABLE:.1f}" fill="none" stroke="currentColor"/>'
+    tip = seen(np.array([0.95 * TABLE_RADIUS, 0.0]))
+    drawn = f'<circle cx="{half}" cy="{half}" r="{scale * TABLE_RADIUS:.1f}" fill="none" stroke="currentColor"/>'
     drawn += f'<line x1="{half}" y1="{half}" x2="{tip[0]:.1f}" y2="{tip[1]:.1f}" stroke="currentColor" stroke-width="3"/>'
     drawn += f'<polyline points="{path}" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
     drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7"/>'
     for acceleration, dashes in ((centrifugal, "4 3"), (coriolis, "")):
-        drawn += _arrow(seen(position[-1]), seen(position[-1] + ACCELERATION * acceleration), dashes)
+        drawn += _arrow(seen(position[-1]), seen(position[-1] + ACCELERATION_SCALE * acceleration), dashes)
     sizes = [float(np.linalg.norm(each)) for each in (centrifugal, coriolis)]
     words = ("what the rider sees", f"dashed: centrifugal, {sizes[0]:.1f} m/s²", f"solid: Coriolis, {sizes[1]:.1f} m/s²")
     lines = "".join(
@@ -123,14 +123,14 @@ def show_tumble(view: Viewer, glide: float, spin: float) -> str:
     picture = view.painter.picture(state, com=False)
     base = state.frame_pose("base").translation + [0.0, 0.0, 0.1]
     for (name, h), colour, lift in zip(parts.items(), (GREYS[0], GREYS[2]), (0.06, 0.0), strict=True):
-        tip = NEWTON * h[:3]
-        if np.linalg.norm(tip) > SEEN:
+        tip = FORCE_SCALE * h[:3]
+        if np.linalg.norm(tip) > MIN_ROD_LENGTH:
             picture[f"called/{name}"] = shapes.arrow(base + [0.0, 0.0, lift], tip, colour, view.painter.size)
             text_at = base + tip + np.array([0.0, 0.0, lift + 0.05]) + 0.12 * tip / np.linalg.norm(tip)
             picture[f"label/{name}"] = shapes.label(text_at, f"{name}'s axes", 0.05, plate=False)
     view.draw(picture)
     places = [_falling(state, h, axes) for axes, h in parts.items()]
-    forces = " N, ".join(f"in the {axes}'s axes {vector_text(h[:3])}" for axes, h in parts.items())
+    forces = " N, ".join(f"in the {axes}'s axes {format_vector(h[:3])}" for axes, h in parts.items())
     apart = float(np.linalg.norm(places[0] - places[1]))
     return f"{forces} N; the base's acceleration in the world by both: {apart:.1f} m/s² apart"
 
@@ -159,21 +159,21 @@ def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) 
     return axis
 
 
-def play_travel(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
+def play_travelling_feet(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
     """A robot whose feet travel: beside each a pin where it began to stand, and a line as far to the side as it is now."""
     contacts = record.contacts
     home = contacts.positions(record.state(0))
-    rows = np.arange(0, len(record), max(1, round(1.0 / FRAMES / (record.time[1] - record.time[0]))))
+    rows = np.arange(0, len(record), max(1, round(1.0 / FRAME_RATE / (record.time[1] - record.time[0]))))
 
     def picture(i: int) -> Picture:
         state = record.state(i)
         drawn = view.painter.picture(state, com=False)
         for j, (a, b) in enumerate(zip(home, contacts.positions(state), strict=True)):
-            pin = np.array([a[0] + np.sign(a[0]) * BESIDE, a[1], 0.006])
+            pin = np.array([a[0] + np.sign(a[0]) * PIN_DISTANCE, a[1], 0.006])
             drawn[f"pin/{j}"] = shapes.rod(pin, np.eye(3), 0.05, 0.004, GREYS[0])
             if rod := _rod(pin, np.array([pin[0], b[1], pin[2]]), 0.006, GREYS[0]):
                 drawn[f"way/{j}"] = rod
         return drawn
 
     view.play_pictures(record.time[rows], [picture(int(i)) for i in rows], speed=speed)
-    return view.camera(AT_FEET)
+    return view.camera(FEET_VIEW)

@@ -1,19 +1,29 @@
 """Lesson B, Torque is an abstraction."""
 
-from floatbase.lessons.lessonB.bench import Bench, held_then_turned, run_loop
+from floatbase.lessons.lessonB.bench import Bench, hold_then_turn, run_force_loop
 from floatbase.lessons.lessonB.exercises import EXERCISES
-from floatbase.lessons.lessonB.helpers import comes_back
+from floatbase.lessons.lessonB.helpers import push_response
 from floatbase.lessons.lessonB.pictures import (
-    AT_JOINT,
+    JOINT_VIEW,
+    plot_com_sway,
     plot_lever,
-    plot_sway,
+    plot_power,
     plot_torques,
-    plot_watts,
     show_crank,
-    show_step,
+    show_torque_step,
 )
 
 __all__ = [
-    "AT_JOINT", "EXERCISES", "Bench", "comes_back", "held_then_turned", "plot_lever", "plot_sway", "plot_torques",
-    "plot_watts", "run_loop", "show_crank", "show_step",
+    "EXERCISES",
+    "JOINT_VIEW",
+    "Bench",
+    "hold_then_turn",
+    "plot_com_sway",
+    "plot_lever",
+    "plot_power",
+    "plot_torques",
+    "push_response",
+    "run_force_loop",
+    "show_crank",
+    "show_torque_step",
 ]  # fmt: skip

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict, numbers
-from floatbase.lessons.lessonB.helpers import comes_back
-from floatbase.lessons.rounding import about
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict, array_or_verdict
+from floatbase.lessons.lessonB.helpers import push_response
+from floatbase.lessons.rounding import rounded
 
 FOOT, CRANK, GAMMA, PISTON = 0.40, 0.10, np.deg2rad(50.0), 5000.0  # of exercise B.1: m, m, rad, N
 STEP = 1e-5  # rad, of a difference
@@ -31,14 +31,14 @@ def _torque() -> float:
     return PISTON * (_length(GAMMA + STEP) - _length(GAMMA - STEP)) / (2.0 * STEP)
 
 
-def _opening(error: Callable[[Array, Array], Array]) -> Callable[[], Array]:
+def _valve_opening(error: Callable[[Array, Array], Array]) -> Callable[[], Array]:
     """k times an error of the forces of the piston, wanted and got."""
     return lambda: np.asarray(GAIN * error(WANTED / LEVER, GOT / LEVER))
 
 
 def _judge_gains(answer: Any) -> Verdict:
     """Whether go2 on 5 Hz comes back to within a millimetre; if not, what kind of mistake the gains look like."""
-    given = numbers(answer, (2,))
+    given = array_or_verdict(answer, (2,))
     if isinstance(given, Verdict):
         return given
     kp, kd = map(float, given)
@@ -48,10 +48,10 @@ def _judge_gains(answer: Any) -> Verdict:
         return Verdict(False, "kp comes first, in 1/s², and then kd, in 1/s: here kp is the smaller one.", "swapped")
     if kd > MOST_DAMPING:
         return Verdict(
-            False, f"kd = {about(kd)} is more than the {MOST_DAMPING:g} that the measured velocities allow.", "damping"
+            False, f"kd = {rounded(kd)} is more than the {MOST_DAMPING:g} that the measured velocities allow.", "damping"
         )
-    outcome, off, swing = comes_back(kp, kd)
-    far = f"{about(off)} mm off in the end"
+    outcome, off, swing = push_response(kp, kd)
+    far = f"{rounded(off)} mm off in the end"
     if outcome != "completed" or off > LOST:
         what = far if outcome == "completed" else outcome
         if kp < SOFT:
@@ -63,7 +63,7 @@ def _judge_gains(answer: Any) -> Verdict:
         return Verdict(True, f"{far}: stiff enough for what leaks, and not yet too stiff for a torque that comes late.")
     if swing > off:
         why = "A late torque lags more behind a quick swing: less kp, or more kd, if you may."
-        return Verdict(False, f"{far}, and it still swings, by {about(swing)} mm. {why}", "swings")
+        return Verdict(False, f"{far}, and it still swings, by {rounded(swing)} mm. {why}", "swings")
     return Verdict(
         False,
         f"{far}, but nearly at rest there. What leaks pushes it aside, and kp is the spring that holds against it.",
@@ -83,9 +83,9 @@ EXERCISES = (
         name="B.1",
         statement="The torque of an excavator's cylinder on its arm, N·m.",
         stub="torque = piston * b  # N·m, if crank and cylinder were square; replace",
-        names=lambda: {"piston": PISTON, "b": CRANK},
+        namespace=lambda: {"piston": PISTON, "b": CRANK},
         solution="length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(gamma))\ntorque = piston * a * b * np.sin(gamma) / length",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_torque,
             praise="Force times dℓ/dq: which is the distance of the joint from the line of the cylinder.",
             mistakes={
@@ -123,20 +123,20 @@ EXERCISES = (
         name="B.2",
         statement="What the loop tells the valve in four situations, shape (4,).",
         stub="u = k * (wanted - got)  # shape (4,); replace: an error of the piston's force",
-        names=lambda: {"k": GAIN, "wanted": WANTED, "got": GOT},
+        namespace=lambda: {"k": GAIN, "wanted": WANTED, "got": GOT},
         solution="u = k * (wanted / lever - got / lever)",
-        judge=Numeric(
-            right=_opening(lambda wanted, got: wanted - got),
+        judge=NumericJudge(
+            right=_valve_opening(lambda wanted, got: wanted - got),
             praise="Too little of a pull asks for oil on the other side; beyond the dead point out and in change their roles.",
             mistakes={
                 "torque_error": lambda: GAIN * (WANTED - GOT),
-                "sizes": _opening(lambda wanted, got: abs(wanted) - abs(got)),
-                "no_sign": _opening(lambda wanted, got: abs(wanted - got)),
-                "sign": _opening(lambda wanted, got: got - wanted),
+                "sizes": _valve_opening(lambda wanted, got: abs(wanted) - abs(got)),
+                "no_sign": _valve_opening(lambda wanted, got: abs(wanted - got)),
+                "sign": _valve_opening(lambda wanted, got: got - wanted),
                 "no_lever_sign": lambda: GAIN * (WANTED - GOT) / abs(LEVER),
                 "lever_sign_alone": lambda: GAIN * (WANTED - GOT) * np.sign(LEVER),
                 "times_lever": lambda: GAIN * (WANTED - GOT) * LEVER,
-                "no_loop": _opening(lambda wanted, got: wanted),
+                "no_loop": _valve_opening(lambda wanted, got: wanted),
             },
             hints={
                 "torque_error": "That is the error of the torque. The piston knows nothing of the joint: which force should "

@@ -13,19 +13,19 @@ from floatbase.actuators import HydraulicActuators, Hydraulics
 
 PUSH = np.array([0.0, 30.0, 0.0])  # N, to the left, for 0.1 s: the lesson's
 SETTLE, BEFORE, AFTER = 0.5, 0.1, 1.4  # s: on perfect torques, on oil before the push, and from its start to the end
-LAST = 0.2  # s, at the end, in which it is judged
+JUDGED_TIME = 0.2  # s, at the end, in which it is judged
 
 
-class Return(NamedTuple):
+class PushResponse(NamedTuple):
     """How a push ended: outcome; mm by which go2 is off its place at worst in the end, and by which it then still swings."""
 
     outcome: str
-    off: float
-    swing: float
+    offset: float
+    oscillation: float
 
 
 @cache
-def comes_back(kp: float, kd: float, bandwidth: float = 5.0) -> Return:
+def push_response(kp: float, kd: float, bandwidth: float = 5.0) -> PushResponse:
     """Push go2 as in the lesson, on the default cylinders.
 
     kp, kd: gains of all its tasks, 1/s² and 1/s. bandwidth: Hz, of the force loops.
@@ -40,5 +40,5 @@ def comes_back(kp: float, kd: float, bandwidth: float = 5.0) -> Return:
     oil.reset(controller(sim.q, sim.v).tau, sim.q[7:])
     push = fb.Push(PUSH, start=sim.time + BEFORE)
     record = fb.rollout(sim, controller, BEFORE + AFTER, [push], actuators=oil)
-    end = 1000.0 * (record.com - state.com)[record.time > record.time[-1] - LAST]
-    return Return(record.outcome, float(np.linalg.norm(end, axis=1).max()), float(np.ptp(end, axis=0).max()))
+    end = 1000.0 * (record.com - state.com)[record.time > record.time[-1] - JUDGED_TIME]
+    return PushResponse(record.outcome, float(np.linalg.norm(end, axis=1).max()), float(np.ptp(end, axis=0).max()))

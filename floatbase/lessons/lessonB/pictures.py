@@ -13,22 +13,22 @@ from matplotlib.axes import Axes
 from floatbase._validation import Array
 from floatbase.actuators import VACUUM, Hydraulics
 from floatbase.lessons import props
-from floatbase.lessons.lessonB.bench import Bench, Row, held_then_turned, run_loop
-from floatbase.lessons.rounding import about
+from floatbase.lessons.lessonB.bench import Bench, BenchSample, hold_then_turn, run_force_loop
+from floatbase.lessons.rounding import rounded
 from floatbase.simulation import Rollout
 from floatbase.viewer import View, Viewer, prefixed, shapes
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 BAR = 1e5  # Pa
-LARGER = 3.0  # times: how the crank and its cylinder are drawn
+DRAWING_SCALE = 3.0  # times: how the crank and its cylinder are drawn
 JOINT = np.array([0.0, 0.0, 0.35])  # m: where the joint is drawn
 BEND = np.deg2rad(115.0)  # rad: from the crank to the shank, one piece of steel
-SHANK = 0.35  # m
-AT_JOINT = View(-90.0, 4.0, 1.0, around=((0.05, 0.0, 0.55), 0.62))
+SHANK_LENGTH = 0.35  # m
+JOINT_VIEW = View(-90.0, 4.0, 1.0, around=((0.05, 0.0, 0.55), 0.62))
 DASHES = ("-", "--", ":", "-.")
 WIDTH, HEIGHT, LEFT, GAP = 620.0, 150.0, 58.0, 34.0  # pixels of a strip in the panel, of what is left of it and below it
-LASTS = 0.4  # s, of the panel's run
+RUN_DURATION = 0.4  # s, of the panel's run
 
 
 def show_crank(view: Viewer, angle: float, torque: float) -> str:
@@ -38,10 +38,10 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
     """
     bench = Bench(lambda t: (np.deg2rad(angle), 0.0))
     gamma = np.arccos(bench.crank / bench.base) + bench.angle
-    foot = JOINT + [0.0, 0.0, LARGER * bench.base]
-    end = JOINT + LARGER * bench.crank * _towards(gamma)
-    stroke = (LARGER * (bench.base - bench.crank), LARGER * (bench.base + bench.crank))
-    least, most = bench.reach()
+    foot = JOINT + [0.0, 0.0, DRAWING_SCALE * bench.base]
+    end = JOINT + DRAWING_SCALE * bench.crank * _towards(gamma)
+    stroke = (DRAWING_SCALE * (bench.base - bench.crank), DRAWING_SCALE * (bench.base + bench.crank))
+    least, most = bench.torque_range()
     a, b = _pressures(bench, min(most, max(least, torque)))
     supply = bench.hydraulics.supply_pressure
     picture = view.painter.ground_only() | prefixed(
@@ -54,7 +54,7 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
     for name, start, tip, radius in (
         ("thigh", JOINT, foot, 0.012),
         ("crank", JOINT, end, 0.016),
-        ("shank", JOINT, JOINT + SHANK * _towards(gamma + BEND), 0.02),
+        ("shank", JOINT, JOINT + SHANK_LENGTH * _towards(gamma + BEND), 0.02),
     ):
         way = tip - start
         length = float(np.linalg.norm(way))
@@ -64,7 +64,7 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
         JOINT + [0.0, -0.05, 0.0], geometry.rotation_with_z_axis([0.0, 1.0, 0.0]), 0.16, 0.028, GREYS[0]
     )
     view.draw(picture)
-    told = f"lever <b>{about(1000 * bench.lever, 'mm', floor=0.05)}</b>; within reach: {least:.0f} to {most:.0f} N·m; "
+    told = f"lever <b>{rounded(1000 * bench.lever, 'mm', floor=0.05)}</b>; within reach: {least:.0f} to {most:.0f} N·m; "
     if not least <= torque <= most:
         return f"{told}<b>{torque:.0f} N·m are more than the supply gives here</b>"
     return f"{told}for {torque:.0f} N·m <b>A {a / BAR:.0f} bar, B {b / BAR:.0f} bar</b>"
@@ -79,7 +79,7 @@ def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
     """Of both chambers, Pa, that make a torque, as much below the supply at one as above the tank at the other."""
     h = bench.hydraulics
     lines, force = h.supply_pressure + h.tank_pressure, torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0
-    a = (force + bench.ring * lines) / (bench.area + bench.ring)
+    a = (force + bench.ring_area * lines) / (bench.piston_area + bench.ring_area)
     return a, lines - a
 
 
@@ -91,7 +91,7 @@ def plot_lever(angles: npt.ArrayLike, levers: npt.ArrayLike) -> Axes:
     return axis
 
 
-def plot_torques(runs: Mapping[str, Sequence[Row]], wanted: float = 12.0) -> Axes:
+def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0) -> Axes:
     """Torques on the bench over time; name -> rows of a run. A thin line is what was wanted."""
     axis = _axes("time [ms]", "torque at the joint [N·m]")
     axis.axhline(wanted, color=hex_code(GREYS[2]), linewidth=1.0)
@@ -102,7 +102,7 @@ def plot_torques(runs: Mapping[str, Sequence[Row]], wanted: float = 12.0) -> Axe
     return axis
 
 
-def plot_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
+def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
     """How far the centre of mass has gone to the left, mm, over time from the start of each record; name -> record.
 
     side: -1 for to the right.
@@ -116,7 +116,7 @@ def plot_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
     return axis
 
 
-def plot_watts(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -> Axes:
+def plot_power(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -> Axes:
     """Powers over time, (n, k), W, with k names."""
     axis = _axes("time [s]", "power [W]")
     watts = np.asarray(watts)
@@ -134,20 +134,20 @@ def _axes(x: str, y: str) -> Axes:
     return axis
 
 
-def show_step(bandwidth: float, supply: float, turning: float) -> str:
+def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
     """The package's loop on the bench: 12 N·m wanted from 0 s on, and the joint turned for a while from 150 ms on; as SVG.
 
     bandwidth: Hz, of the loop. supply: bar. turning: rad/s; the rod goes out.
     """
     hydraulics = replace(Hydraulics(), supply_pressure=supply * BAR)
-    rows = run_loop(Bench(held_then_turned(turning), hydraulics=hydraulics), bandwidth, LASTS)
+    rows = run_force_loop(Bench(hold_then_turn(turning), hydraulics=hydraulics), bandwidth, RUN_DURATION)
     torques = [row.torque for row in rows]
     low, high = np.floor(min(torques) / 20 + 0.02), np.ceil(max(torques) / 20)
     ticks = 20 * np.linspace(low, high, round(high - low) + 1)
     drawn = _strip(0.0, "torque [N·m]", ticks, {"wanted": [12.0] * len(rows), "got": torques})
-    pressures = {"A": [row.a / BAR for row in rows], "B": [row.b / BAR for row in rows]}
+    pressures = {"A": [row.pressure_a / BAR for row in rows], "B": [row.pressure_b / BAR for row in rows]}
     drawn += _strip(HEIGHT + GAP, "pressure [bar]", np.linspace(0.0, 200.0, 5), pressures)
-    boiling = sum(min(row.a, row.b) <= VACUUM for row in rows)
+    boiling = sum(min(row.pressure_a, row.pressure_b) <= VACUUM for row in rows)
     reached = next((row.time for row in rows if abs(row.torque - 12.0) < 0.6), None)
     late = "12 N·m are not reached" if reached is None else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
     boils = f"<b>the oil boils for {boiling} ms</b>" if boiling else "no oil boils"
@@ -161,7 +161,7 @@ def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[f
     right, low, high = WIDTH - 70.0, ticks[0], ticks[-1]
 
     def x(t: float) -> float:
-        return LEFT + (right - LEFT) * t / LASTS
+        return LEFT + (right - LEFT) * t / RUN_DURATION
 
     def y(value: float) -> float:
         return float(top + HEIGHT * (high - value) / (high - low))
@@ -173,7 +173,7 @@ def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[f
             f'<line x1="{LEFT}" y1="{y(value):.1f}" x2="{right}" y2="{y(value):.1f}" stroke="currentColor" opacity="0.15"/>'
         )
         drawn += f'<text x="{LEFT - 6}" y="{y(value) + 4:.1f}" font-size="11" text-anchor="end">{value:.0f}</text>'
-    for t in np.linspace(0.0, LASTS, 5):
+    for t in np.linspace(0.0, RUN_DURATION, 5):
         drawn += f'<text x="{x(t):.1f}" y="{top + HEIGHT + 15}" font-size="11" text-anchor="middle">{1000 * t:.0f} ms</text>'
     heights = [y(values[-1]) for values in curves.values()]
     if abs(heights[0] - heights[1]) < 12.0:  # names must not lie on each other

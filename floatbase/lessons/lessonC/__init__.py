@@ -1,24 +1,40 @@
 """Lesson C, How a QP solver thinks."""
 
-from floatbase.lessons.lessonC.exercises import EXERCISES, rounds_from
+from floatbase.lessons.lessonC.exercises import EXERCISES, rounds_from_guess
 from floatbase.lessons.lessonC.helpers import (
-    EveryTick,
-    Stopped,
-    beale,
-    between_walls,
-    braking,
+    LimitedActiveSet,
+    SolverController,
+    answer_or_default,
+    beale_problem,
+    braking_qp,
+    central_path,
     corner_table,
+    hexagon_table,
     longest_step,
-    pushed,
-    right_or,
     row_to_drop,
-    six_edges,
-    standing,
+    run_with_push,
+    standing_controller,
 )
-from floatbase.lessons.lessonC.pictures import Game, plot_problem, plot_rounds, show_table, show_way
+from floatbase.lessons.lessonC.pictures import ActiveSetGame, plot_problem, plot_rounds, show_solver_path, show_table
 
 __all__ = [
-    "EXERCISES", "EveryTick", "Game", "Stopped", "beale", "between_walls", "braking", "corner_table", "longest_step",
-    "plot_problem", "plot_rounds", "pushed", "right_or", "rounds_from", "row_to_drop", "show_table",
-    "show_way", "six_edges", "standing",
+    "EXERCISES",
+    "ActiveSetGame",
+    "LimitedActiveSet",
+    "SolverController",
+    "answer_or_default",
+    "beale_problem",
+    "braking_qp",
+    "central_path",
+    "corner_table",
+    "hexagon_table",
+    "longest_step",
+    "plot_problem",
+    "plot_rounds",
+    "rounds_from_guess",
+    "row_to_drop",
+    "run_with_push",
+    "show_solver_path",
+    "show_table",
+    "standing_controller",
 ]  # fmt: skip

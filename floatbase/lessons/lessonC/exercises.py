@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict
-from floatbase.lessons.lessonC.helpers import braking
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict
+from floatbase.lessons.lessonC.helpers import braking_qp
 from floatbase.qp import QP, active_set
 
 _NONE = np.zeros((0, 2)), np.zeros(0)
@@ -21,7 +21,7 @@ _CLOSE = 1e-6  # of lengths, which are between 0 and 1
 # C.1 ----------------------------------------------------------------------------------------------------------------------
 
 
-def slanted() -> QP:
+def slanted_table() -> QP:
     """The bowl and the slanted table of exercise C.1: up ≥ 0.5 along, written as a row of 0.5 along - up ≤ 0."""
     H = np.diag([1.0, 4.0])
     return QP(H, -H @ [2.0, -2.0], *_NONE, np.array([[0.5, -1.0]]), np.zeros(1), inequality_names=("slant",))
@@ -29,7 +29,7 @@ def slanted() -> QP:
 
 def _price() -> float:
     """By the rate at which the least objective falls when the row is loosened: no system of equations in it."""
-    qp = slanted()
+    qp = slanted_table()
     h = 1e-4
     low, high = (fb.solve(QP(qp.H, qp.g, qp.A, qp.b, qp.G, np.array([d]))).objective for d in (-h, h))
     return (low - high) / (2 * h)
@@ -39,7 +39,7 @@ def _price() -> float:
 
 
 @dataclass(frozen=True)
-class _Way:
+class _StepCase:
     """A step in the plane, whose answer is known from how it was made, and what is said of a function that misses it."""
 
     hint: str  # its name
@@ -51,51 +51,51 @@ class _Way:
     answer: tuple[float, int | None]
 
 
-_WAYS = (
-    _Way(
+_STEP_CASES = (
+    _StepCase(
         "free", "Nothing is in the way here: 1, to arrive, and None.",
         (1, 0), [[1, 0], [0, 1]], [2, 2], [], (1.0, None),
     ),
-    _Way(
+    _StepCase(
         "halfway", "A row is in the way halfway: where it holds with equality, slack = length · speed.",
         (2, 0), [[0, 1], [1, 0]], [5, 1], [], (0.5, 1),
     ),
-    _Way(
+    _StepCase(
         "away", "A row that the step moves away from (speed < 0) is never in the way.",
         (1, 1), [[-1, 0], [0, -1]], [0.5, 0.25], [], (1.0, None),
     ),
-    _Way(
+    _StepCase(
         "along", "A row along which the step runs (speed 0) is never in the way, and nothing can be divided by its speed.",
         (1, 0), [[0, 1], [0, -1]], [0, 0], [], (1.0, None),
     ),
-    _Way(
+    _StepCase(
         "nearest", "Two rows are in the way: the step must end at the first that it meets.",
         (4, 0), [[1, 0], [2, 0], [1, 0]], [3, 2, 2.5], [], (0.25, 1),
     ),
-    _Way(
+    _StepCase(
         "soonest",
         "Here two rows are in the way at different speeds: it is not the slack alone that counts, but how soon it is used up.",
         (2, 2), [[1, 0], [3, 3]], [1, 3], [], (0.25, 1),
     ),
-    _Way(
+    _StepCase(
         "held", "A row of W is held already, and rounding must not let it block.",
         (1, 0), [[1, 1e-8], [1, 0]], [0, 0.5], [0], (0.5, 1),
     ),
-    _Way(
+    _StepCase(
         "touches",
         "The point touches a row that is not in W and would cross it: then the step has length 0, and that row blocks.",
         (1, 0), [[0, 1], [1, 0]], [1, 0], [], (0.0, 1),
     ),
-    _Way(
+    _StepCase(
         "beyond", "The row lies beyond the end of the step: length 1, and nothing blocks.",
         (1, 0), [[1, 0]], [1.5], [], (1.0, None),
     ),
-    _Way(
+    _StepCase(
         "slack_rounding",
         "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of equal rows the first.",
         (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
     ),
-    _Way(
+    _StepCase(
         "speed_rounding",
         "A speed of 1e-7 is zero and rounding: such a row is not in the way. Let 1e-6 be the limit.",
         (1, 0), [[1e-7, 1]], [0], [], (1.0, None),
@@ -104,7 +104,7 @@ _WAYS = (
 
 
 def _judge_step(answer: Any) -> Verdict:
-    def one(way: _Way) -> Verdict | None:
+    def one(way: _StepCase) -> Verdict | None:
         for origin in (np.zeros(2), np.array([0.3, -0.2])):  # the same step elsewhere: the slack is h - G x
             G = np.array(way.G, dtype=np.float64)
             h = np.array(way.h, dtype=np.float64) + G @ origin
@@ -128,7 +128,7 @@ def _judge_step(answer: Any) -> Verdict:
                 return Verdict(False, way.text, way.hint)
         return None
 
-    return _tried(answer, [partial(one, way) for way in _WAYS], "As far as all rows hold, and no further.")
+    return _tried(answer, [partial(one, way) for way in _STEP_CASES], "As far as all rows hold, and no further.")
 
 
 def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: str) -> Verdict:
@@ -162,7 +162,7 @@ class _Drop:
     answer: int | None
 
 
-_DROPS = (
+_DROP_CASES = (
     _Drop("pulls", "One row pulls (its price is negative): that one has to go.", [5, 3, 8], [2.0, -0.5, 1.0], 3),
     _Drop("pushes", "No price is negative here: every row pushes, and none leaves.", [4, 2], [1.0, 0.5], None),
     _Drop("empty", "W may be empty: then there is nothing to drop.", [], [], None),
@@ -181,7 +181,7 @@ def _judge_drop(answer: Any) -> Verdict:
             return Verdict(False, "Give the row's number in G, which stands in W, not its place in W.", "place")
         return None if given == drop.answer else Verdict(False, drop.text, drop.hint)
 
-    cases = [partial(one, drop) for drop in _DROPS]
+    cases = [partial(one, drop) for drop in _DROP_CASES]
     return _tried(answer, cases, "A row may push, never pull: that is the whole test of an optimum.")
 
 
@@ -194,7 +194,7 @@ def _judge_guess(answer: Any) -> Verdict:
         return Verdict(False, "There is no answer yet: list the names of rows.", "no_answer")
     if not isinstance(answer, list | tuple) or not all(isinstance(name, str) for name in answer):
         return Verdict(False, "The answer is a list of names, such as those in qp.inequality_names.", "no_names")
-    qp = braking()
+    qp = braking_qp()
     names = list(dict.fromkeys(answer))
     if unknown := [name for name in names if name not in qp.inequality_names]:
         return Verdict(False, f"There is no row {unknown[0]!r}; qp.inequality_names has all of them.", "no_such_row")
@@ -217,8 +217,8 @@ def _judge_guess(answer: Any) -> Verdict:
         return Verdict(True, "One system of equations, and nothing to correct: a solver that begins here is done in one round.")
     if not any("foot" in name for name in names):
         return Verdict(False, "Motors are far from their limits here. What does a push do to the feet?", "motors")
-    told = [f"{len(broken)} rows are broken, {_kinds(broken)}"] if broken else []
-    told += [f"{len(pulls)} of yours pull, {_kinds(pulls)}"] if pulls else []
+    told = [f"{len(broken)} rows are broken, {_example_of(broken)}"] if broken else []
+    told += [f"{len(pulls)} of yours pull, {_example_of(pulls)}"] if pulls else []
     return Verdict(
         False,
         f"With your rows on, {' and '.join(told)}. Correct the guess as the solver would, and check again.",
@@ -226,21 +226,21 @@ def _judge_guess(answer: Any) -> Verdict:
     )
 
 
-def _kinds(names: Sequence[str]) -> str:
+def _example_of(names: Sequence[str]) -> str:
     """The first of some rows, and how many more."""
     return f"such as {names[0]}" if len(names) > 1 else f"namely {names[0]}"
 
 
-def rounds_from(guess: Sequence[str]) -> int:
+def rounds_from_guess(guess: Sequence[str]) -> int:
     """How many rounds `active_set` takes for the QP of exercise C.4 from a guess of its active rows."""
-    return active_set(braking(), working_set=tuple(guess)).solution.iterations
+    return active_set(braking_qp(), working_set=tuple(guess)).solution.iterations
 
 
-STEP_STUB = '''def longest_step(x, p, G, h, W):
+LONGEST_STEP_STUB = '''def longest_step(x, p, G, h, W):
     """How far from x along p, at most 1, all rows hold, and the row that blocks."""
     return 1.0, None  # replace: from slack and speed of each row'''
 
-STEP = '''def longest_step(x, p, G, h, W):
+LONGEST_STEP = '''def longest_step(x, p, G, h, W):
     """How far from x along p, at most 1, all rows hold, and the row that blocks."""
     slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
@@ -249,11 +249,11 @@ STEP = '''def longest_step(x, p, G, h, W):
             length, blocking = slack[i] / speed[i], i
     return length, blocking'''
 
-DROP_STUB = '''def row_to_drop(W, prices):
+ROW_TO_DROP_STUB = '''def row_to_drop(W, prices):
     """The row of W that pulls hardest, or None."""
     return None  # replace; W and prices have one entry for each row that is on'''
 
-DROP = '''def row_to_drop(W, prices):
+ROW_TO_DROP = '''def row_to_drop(W, prices):
     """The row of W that pulls hardest, or None."""
     if len(W) == 0 or min(prices) > -1e-9:
         return None
@@ -320,8 +320,8 @@ def _drops() -> list[Example]:
 
 
 def _guesses() -> list[Example]:
-    active = list(fb.solve(braking()).active)
-    motor = next(name for name in braking().inequality_names if "upper" in name)
+    active = list(fb.solve(braking_qp()).active)
+    motor = next(name for name in braking_qp().inequality_names if "upper" in name)
     return [
         (active, ""), (tuple(reversed(active)), ""), ([], "no_row"), (active[:-1], "corrections"),
         (["RR facet 2"], "no_such_row"), ([*active, "FL_foot facet 0"], "corrections"), ([motor], "motors"),
@@ -337,7 +337,7 @@ EXERCISES = (
         solution="W = [[0.5, -1]]\n"
         "KKT = np.block([[np.diag([1, 4]), np.transpose(W)], [np.array(W), np.zeros((1, 1))]])\n"
         "price = np.linalg.solve(KKT, [2, -8, 0])[2]",
-        judge=Numeric(
+        judge=NumericJudge(
             right=_price,
             praise="Three equations: two say that the row balances the slope, one that the marble lies on it.",
             mistakes={
@@ -346,8 +346,8 @@ EXERCISES = (
                 "level": lambda: 8.0,
                 "no_curvature": lambda: _price_of([1.0, 1.0]),
                 "no_half": lambda: 2.0 * _price(),
-                "along": lambda: float(fb.solve(slanted()).x[0]),
-                "height": lambda: float(fb.solve(slanted()).x[1]),
+                "along": lambda: float(fb.solve(slanted_table()).x[0]),
+                "height": lambda: float(fb.solve(slanted_table()).x[1]),
                 "distance": lambda: 3.0,
             },
             hints={
@@ -368,8 +368,8 @@ EXERCISES = (
         name="C.2",
         statement="`longest_step(x, p, G, h, W)`: how far from x along p, at most 1, all rows of G x ≤ h hold, and the number "
         "of the row that blocks, or None. Rows in the list W are held already.",
-        stub=STEP_STUB,
-        solution=STEP,
+        stub=LONGEST_STEP_STUB,
+        solution=LONGEST_STEP,
         judge=_judge_step,
         examples=_steps,
         explanation="A row i leaves slack / speed of room along the step, if the step comes closer to it at all. The least of "
@@ -378,8 +378,8 @@ EXERCISES = (
     Exercise(
         name="C.3",
         statement="`row_to_drop(W, prices)`: the number of the row of W with the most negative price, or None if no row pulls.",
-        stub=DROP_STUB,
-        solution=DROP,
+        stub=ROW_TO_DROP_STUB,
+        solution=ROW_TO_DROP,
         judge=_judge_drop,
         examples=_drops,
         explanation="A negative price says: ψ would fall if this row were left. The most negative one promises the most.",

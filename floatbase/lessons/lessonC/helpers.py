@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 import floatbase as fb
 from floatbase._validation import Array, as_array
-from floatbase.lessons.controllers import Torques
+from floatbase.lessons.controllers import TorqueCommand
 from floatbase.lessons.exercises import all_exercises
-from floatbase.lessons.lesson03 import standing_go2
+from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.qp import ActiveSetRun, active_set
 from floatbase.simulation import Controller, Rollout
 
 MU = 0.7
-START, LENGTH = 0.05, 0.1  # s: when a push begins, and how long it lasts
+PUSH_START, PUSH_DURATION = 0.05, 0.1  # s: when a push begins, and how long it lasts
 _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
@@ -32,7 +32,7 @@ def corner_table(minimum: npt.ArrayLike = (-1.5, -1.5), curvature: npt.ArrayLike
     return fb.QP(H, -H @ as_array("minimum", minimum, (2,)), *_NONE, G, h, inequality_names=("table", "ramp", "roof", "wall"))
 
 
-def six_edges() -> fb.QP:
+def hexagon_table() -> fb.QP:
     """A table with six edges seen from above, 2 from its middle, and a long, slanting bowl that is lowest at (1, 3.9)."""
     angles = np.pi / 3 * np.arange(6) + np.pi / 6
     turn = np.deg2rad(15.0)
@@ -43,7 +43,7 @@ def six_edges() -> fb.QP:
     return fb.QP(H, -H @ [1.0, 3.9], *_NONE, G, np.full(6, 2.0), inequality_names=names)
 
 
-def beale(curvature: float = 0.1) -> fb.QP:
+def beale_problem(curvature: float = 0.1) -> fb.QP:
     """Beale's problem, on which careless rules go round for ever, with a little curvature: 4 variables, 7 rows.
 
     Six of the rows meet in the point 0, where it begins. Source: E. M. L. Beale, Cycling in the dual simplex algorithm, Naval
@@ -54,7 +54,7 @@ def beale(curvature: float = 0.1) -> fb.QP:
     return fb.QP(curvature * np.eye(4), g, np.zeros((0, 4)), np.zeros(0), np.array(rows), np.array([0, 0, 1.0, 0, 0, 0, 0]))
 
 
-class EveryTick:
+class SolverController:
     """A controller that hands the QP of every tick to a solver.
 
     controller: makes the QP. solver: is called with it, and returns x = (q̈, τ, λ), shape (n,).
@@ -64,54 +64,54 @@ class EveryTick:
         self.robot, self.contacts = controller.robot, controller.contacts
         self.controller, self.solver = controller, solver
 
-    def __call__(self, q: Array, v: Array, t: float) -> Torques:
+    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques for configuration q and velocity v."""
         qp = self.controller.qp(fb.State(self.robot, q, v), t)
         x = as_array("x", self.solver(qp), (qp.n,))
-        return Torques(x[qp.blocks["tau"]], x[qp.blocks["forces"]])
+        return TorqueCommand(x[qp.blocks["tau"]], x[qp.blocks["forces"]])
 
 
-class Stopped:
-    """A solver for `EveryTick`: the package's `active_set`, stopped after so many rounds, from nothing or from the tick before.
+class LimitedActiveSet:
+    """A solver for `SolverController`: the package's `active_set`, stopped after so many rounds, from nothing or from the tick before.
 
-    most: rounds in a tick. warm: whether it begins with the rows on which the tick before ended. runs: of all ticks.
+    max_rounds: rounds in a tick. warm: whether it begins with the rows on which the tick before ended. runs: of all ticks.
     """
 
-    def __init__(self, most: int, warm: bool):
-        self.most, self.warm = most, warm
+    def __init__(self, max_rounds: int, warm: bool):
+        self.max_rounds, self.warm = max_rounds, warm
         self.runs: list[ActiveSetRun] = []
 
     def __call__(self, qp: fb.QP) -> Array:
         """x of one tick, shape (n,)."""
         working: Sequence[str] = self.runs[-1].working_set if self.warm and self.runs else ()
-        self.runs.append(active_set(qp, working_set=working, max_iterations=self.most))
+        self.runs.append(active_set(qp, working_set=working, max_iterations=self.max_rounds))
         return self.runs[-1].solution.x
 
 
-def standing() -> fb.WholeBodyController:
+def standing_controller() -> fb.WholeBodyController:
     """go2 that stands, as in lesson 07: 42 variables, 30 equalities, 44 inequalities."""
-    state = standing_go2().state
+    state = standing_go2_eom().state
     return fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state))
 
 
-def pushed(controller: Controller, newtons: float, duration: float = 0.6, towards: float = 90.0) -> Rollout:
+def run_with_push(controller: Controller, newtons: float, duration: float = 0.6, towards: float = 90.0) -> Rollout:
     """The record of go2 on the physics, pushed at the base from 0.05 to 0.15 s.
 
     newtons: how hard. duration: s, of the record. towards: degrees, 0 forwards, 90 to its left.
     """
     angle = np.deg2rad(towards)
-    push = fb.Push(newtons * np.array([np.cos(angle), np.sin(angle), 0.0]), start=START, duration=LENGTH)
-    return fb.rollout(fb.Simulation(standing_go2().robot), controller, duration, [push])
+    push = fb.Push(newtons * np.array([np.cos(angle), np.sin(angle), 0.0]), start=PUSH_START, duration=PUSH_DURATION)
+    return fb.rollout(fb.Simulation(standing_go2_eom().robot), controller, duration, [push])
 
 
 @cache
-def braking() -> fb.QP:
+def braking_qp() -> fb.QP:
     """The QP of exercise C.4: 50 ms into a push of 120 N forwards and to the left."""
-    controller = standing()
-    return controller.qp(pushed(controller, 120.0, 0.101, 45.0).state(100))
+    controller = standing_controller()
+    return controller.qp(run_with_push(controller, 120.0, 0.101, 45.0).state(100))
 
 
-def between_walls(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> list[Array]:
+def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> list[Array]:
     """Where the marble lies when every row repels it, ψ - t Σ log(h - G x), for each softness t: Newton's method, damped.
 
     start: (n,), inside all rows. softness: (k,), from soft to hard, each begun where the last ended. This is the central path
@@ -131,7 +131,7 @@ def between_walls(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> l
     return points
 
 
-def right_or(name: str, answer: Any, otherwise: Any) -> Any:
+def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
     """The answer to an exercise if it is right; `otherwise` if it is not, and a line that says so. Counts no try."""
     if all_exercises()[name].judge(answer).right:
         print(f"{name}: the lesson goes on with yours.")

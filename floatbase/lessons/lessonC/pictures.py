@@ -21,7 +21,7 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons import qp_plots, static_export
 from floatbase.lessons.lessonC.helpers import corner_table
-from floatbase.lessons.rounding import about
+from floatbase.lessons.rounding import rounded
 from floatbase.qp import QP, table_top
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.scene.colours import GREYS, hex_code
@@ -44,10 +44,10 @@ def show_table(lowest: float) -> str:
     axis = _flat_axis(qp, (-2.5, 3.0, -2.2, 2.2), solution.active, solution.x)
     axis.plot(0.5, lowest, "x", color=GREYS[1], markersize=9)
     rests = "rests on the table" if solution.x[1] < _NEAR else "does not touch the table"
-    return _image(axis) + f"<div>the marble {rests}; price of the row: <b>{about(price)}</b></div>"
+    return _image(axis) + f"<div>the marble {rests}; price of the row: <b>{rounded(price)}</b></div>"
 
 
-class Game(widgets.VBox):
+class ActiveSetGame(widgets.VBox):
     """A QP in the plane to be solved by hand: a button for each row, which is on or off, and one for the next bowl.
 
     Each click solves one linear system, that of the rows which are on. `working` lists their names, `clicks` counts,
@@ -59,10 +59,10 @@ class Game(widgets.VBox):
         self._picture, self._told = widgets.HTML(), widgets.HTML()
         self.rows = {str(name): self._button(str(name)) for name in corner_table().inequality_names}
         self.next = widgets.Button(description="next bowl", layout=widgets.Layout(width="8em", flex="0 0 auto"))
-        self.next.on_click(self._go_on)
+        self.next.on_click(self._next_puzzle)
         buttons = widgets.HBox([*self.rows.values(), self.next], layout=widgets.Layout(flex_flow="row wrap"))
         super().__init__([self._picture, buttons, self._told])
-        self._begin()
+        self._start_puzzle()
 
     @property
     def qp(self) -> QP:
@@ -70,7 +70,7 @@ class Game(widgets.VBox):
         return corner_table(self._puzzles[self._at])
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """What the game says about the rows that are on, HTML."""
         return str(self._told.value)
 
@@ -79,14 +79,14 @@ class Game(widgets.VBox):
         made.on_click(lambda _: self._click(name))
         return made
 
-    def _begin(self) -> None:
+    def _start_puzzle(self) -> None:
         self.working: tuple[str, ...] = ()
         self.clicks = 0
         self._show()
 
-    def _go_on(self, _: object) -> None:
+    def _next_puzzle(self, _: object) -> None:
         self._at = (self._at + 1) % len(self._puzzles)
-        self._begin()
+        self._start_puzzle()
 
     def _click(self, name: str) -> None:
         on = set(self.working) ^ {name}
@@ -95,25 +95,25 @@ class Game(widgets.VBox):
         self._show()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        return self._all_rows() if display_mode() == "site" else super()._repr_mimebundle_(**kwargs)
+        return self._site_bundle() if display_mode() == "site" else super()._repr_mimebundle_(**kwargs)
 
-    def _all_rows(self) -> dict[str, Any]:
+    def _site_bundle(self) -> dict[str, Any]:
         """For a site: what every set of rows shows, in every bowl. The game is left at its beginning."""
         bowls = tuple(str(i + 1) for i in range(len(self._puzzles)))
         pack = static_export.StaticExport([], words="In the live lesson the clicks are counted.")
         switches = list(product((0, 1), repeat=len(self.rows)))
         for self._at, on in product(range(len(bowls)), switches):
             self.working = tuple(row for row, is_on in zip(self.rows, on, strict=True) if is_on)
-            picture, faults = self._seen()
-            pack.add_sample((self._at, *on), f"{picture}<div>{_words(faults)}</div>")
+            picture, faults = self._current_view()
+            pack.add_sample((self._at, *on), f"{picture}<div>{_describe_faults(faults)}</div>")
         self._at = 0
-        self._begin()
+        self._start_puzzle()
         rows = [static_export.Control(row, ("off", "on"), 0, kind="switch") for row in self.rows]
         return pack.bundle([static_export.Control("bowl", bowls, 0, kind="choice"), *rows])
 
-    def _seen(self) -> tuple[str, list[str]]:
+    def _current_view(self) -> tuple[str, list[str]]:
         """The picture of the rows that are on, HTML, and what is wrong with them."""
-        x, faults = verdict(self.qp, self.working)
+        x, faults = check_active_set(self.qp, self.working)
         axis = _flat_axis(self.qp, _BESIDE, self.working, x)
         axis.plot(*self._puzzles[self._at], "x", color=GREYS[1], markersize=9)
         return _image(axis), faults
@@ -121,17 +121,17 @@ class Game(widgets.VBox):
     def _show(self) -> None:
         for name, button in self.rows.items():
             button.icon, button.style.font_weight = ("check", "bold") if name in self.working else ("", "normal")
-        self._picture.value, faults = self._seen()
+        self._picture.value, faults = self._current_view()
         self.solved = not faults
         clicks = f"{self.clicks} click{'' if self.clicks == 1 else 's'}"
-        self._told.value = f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {_words(faults)}"
+        self._told.value = f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {_describe_faults(faults)}"
 
 
-def _words(faults: Sequence[str]) -> str:
+def _describe_faults(faults: Sequence[str]) -> str:
     return "; ".join(faults) if faults else "<b>solved</b>: no row is broken, and none that is on pulls"
 
 
-def verdict(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
+def check_active_set(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
     """The least point on the rows of `working`, shape (n,), and in words what is wrong with it; nothing at the optimum.
 
     None where these rows have no point in common, or depend on one another.
@@ -143,17 +143,17 @@ def verdict(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
     found = np.linalg.solve(np.block([[qp.H, G.T], [G, np.zeros((k, k))]]), np.concatenate([-qp.g, qp.h[rows]]))
     x, prices = found[: qp.n], found[qp.n :]
     over = qp.G @ x - qp.h
-    broken = [f"{name} is broken by {about(d)}" for name, d in zip(qp.inequality_names, over, strict=True) if d > _NEAR]
-    pulls = [f"{name} pulls: its price is {about(p)}" for name, p in zip(working, prices, strict=True) if p < -_NEAR]
+    broken = [f"{name} is broken by {rounded(d)}" for name, d in zip(qp.inequality_names, over, strict=True) if d > _NEAR]
+    pulls = [f"{name} pulls: its price is {rounded(p)}" for name, p in zip(working, prices, strict=True) if p < -_NEAR]
     return x, broken + pulls
 
 
 def plot_problem(qp: QP, start: npt.ArrayLike) -> Axes:
     """A problem in the plane, with a solver's start as a dot."""
-    return qp_plots.plot(qp, _six(), point=start)
+    return qp_plots.plot(qp, _hexagon_example(), point=start)
 
 
-def show_way(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
+def show_solver_path(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
     """The way of a solver in the plane after so many rounds, as HTML; in words the rows that are on, and the objective.
 
     ways: after each round, beginning with none, the point, shape (2,), and the rows that are on. rounds: between whole numbers
@@ -164,10 +164,10 @@ def show_way(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float)
     if rounds > whole:
         x = x + (rounds - whole) * (ways[whole + 1][0] - x)
     names = [str(qp.inequality_names[i]) for i in W]
-    axis = _flat_axis(qp, _six(), names, x)
+    axis = _flat_axis(qp, _hexagon_example(), names, x)
     passed = [point for point, _ in ways[: whole + 1]]
     axis.plot(*np.transpose([*passed, x]), "o-", color=GREYS[0], markersize=4, linewidth=1.5)
-    return _image(axis) + f"<div>on: {', '.join(names) or 'no row'}; objective {about(qp.objective(x), digits=3)}</div>"
+    return _image(axis) + f"<div>on: {', '.join(names) or 'no row'}; objective {rounded(qp.objective(x), digits=3)}</div>"
 
 
 def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
@@ -182,7 +182,7 @@ def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
     return figure
 
 
-def _six() -> tuple[float, float, float, float]:
+def _hexagon_example() -> tuple[float, float, float, float]:
     return (-3.2, 3.2, -2.9, 4.3)
 
 

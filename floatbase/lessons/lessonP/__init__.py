@@ -1,7 +1,7 @@
 """Lesson P, Playground."""
 
 from floatbase.lessons.lessonP.exercises import EXERCISES
-from floatbase.lessons.lessonP.helpers import BAG, box_in_the_dark, on_two_feet, sinks
+from floatbase.lessons.lessonP.helpers import BAG_MASS, com_sag, time_on_two_feet, unknown_mass_record
 from floatbase.lessons.lessonP.pictures import plot_gains, plot_outcomes
 
-__all__ = ["BAG", "EXERCISES", "box_in_the_dark", "on_two_feet", "plot_gains", "plot_outcomes", "sinks"]
+__all__ = ["BAG_MASS", "EXERCISES", "com_sag", "plot_gains", "plot_outcomes", "time_on_two_feet", "unknown_mass_record"]

@@ -9,26 +9,26 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Verdict, numbers
-from floatbase.lessons.lessonP.helpers import BAG, HIDDEN, box_in_the_dark, on_two_feet, sinks
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict, array_or_verdict
+from floatbase.lessons.lessonP.helpers import BAG_MASS, HIDDEN_MASS, com_sag, time_on_two_feet, unknown_mass_record
 
 G = 9.81  # m/s²
-MOST, LEAST = 10.0, 9.0  # mm that it may sink, and must: less is stiffer than was asked for
+MAX_SAG, MIN_SAG = 10.0, 9.0  # mm that it may sink, and must: less is stiffer than was asked for
 ROUNDING = 0.05  # mm
-STIFFEST = 1e5  # 1/s², that a judge still tries on physics
-NEAR = 0.01  # of a mistake's value
-UP = 1.0  # s on two feet
+MAX_KP = 1e5  # 1/s², that a judge still tries on physics
+MISTAKE_TOLERANCE = 0.01  # of a mistake's value
+TIME_ON_TWO_FEET = 1.0  # s on two feet
 HEIGHT = 1e-4  # m: less counts as none
 
 
 def _load() -> float:
     """The bag as a part of the robot's mass."""
-    return BAG / fb.load("go2").mass
+    return BAG_MASS / fb.load("go2").mass
 
 
 def _stiffness_slips() -> dict[str, float]:
     """Name of a hint -> the kp that this kind of mistake leads to."""
-    right, ratio, mass = _load() * G / (MOST / 1e3), _load(), fb.load("go2").mass
+    right, ratio, mass = _load() * G / (MAX_SAG / 1e3), _load(), fb.load("go2").mass
     return {
         "robot_too": right * (1.0 + ratio) / ratio,
         "robot_alone": right / ratio,
@@ -53,23 +53,23 @@ _STIFFNESS = {
 
 def _judge_stiffness(answer: Any) -> Verdict:
     """Physics decides: go2 with the bag, and this kp."""
-    given = numbers(answer, ())
+    given = array_or_verdict(answer, ())
     if isinstance(given, Verdict):
         return given
     kp = float(given)
     if kp <= 0.0:
         return Verdict(False, "A spring that pulls back needs kp > 0.", "not_above_zero")
     for hint, slip in _stiffness_slips().items():
-        if abs(kp - slip) <= NEAR * slip:
+        if abs(kp - slip) <= MISTAKE_TOLERANCE * slip:
             return Verdict(False, _STIFFNESS[hint], hint)
-    if kp > STIFFEST:
+    if kp > MAX_KP:
         return Verdict(False, "No motor follows that: the controller looks at the robot only every 4 ms.", "too_stiff")
-    below = 1e3 * sinks(kp)
+    below = 1e3 * com_sag(kp)
     if not np.isfinite(below):
         return Verdict(False, "So soft that the robot sinks to the ground.", "ground")
-    if below > MOST + ROUNDING:
+    if below > MAX_SAG + ROUNDING:
         return Verdict(False, f"On physics it sinks by {below:.1f} mm: too soft.", "soft")
-    if below < LEAST:
+    if below < MIN_SAG:
         return Verdict(False, f"On physics it sinks by {below:.1f} mm only: softer would do, and is kinder to motors.", "hard")
     return Verdict(True, f"On physics it sinks by {below:.1f} mm. (A kp does not weigh: the bag is still not known.)")
 
@@ -100,7 +100,7 @@ def _unit_line() -> Array:
     return np.asarray(line / np.linalg.norm(line))
 
 
-_SHIFT = Numeric(
+_SHIFT = NumericJudge(
     right=_nearest,
     praise="",
     mistakes={
@@ -133,7 +133,7 @@ _SHIFT = Numeric(
 
 def _judge_shift(answer: Any) -> Verdict:
     """Geometry, and then physics: how long it stands on two feet."""
-    given = numbers(answer, (3,))
+    given = array_or_verdict(answer, (3,))
     if isinstance(given, Verdict):
         return given
     if abs(given[2]) > HEIGHT:
@@ -141,27 +141,27 @@ def _judge_shift(answer: Any) -> Verdict:
     verdict = _SHIFT(given)
     if not verdict.right:
         return verdict
-    times = [on_two_feet(shift) for shift in (np.zeros(3), given)]
-    if times[1] < UP:
+    times = [time_on_two_feet(shift) for shift in (np.zeros(3), given)]
+    if times[1] < TIME_ON_TWO_FEET:
         return Verdict(False, f"On physics it stood on two feet for {times[1]:.1f} s only.", "short")
     return Verdict(True, f"On physics it stays up on FL and RR for {times[1]:.1f} s, and for {times[0]:.1f} s where it was.")
 
 
 def _measured(row: int = -1) -> float:
-    return float(box_in_the_dark().measured[row, 2::3].sum()) / fb.load("go2").weight
+    return float(unknown_mass_record().measured[row, 2::3].sum()) / fb.load("go2").weight
 
 
 def _planned() -> float:
-    return float(box_in_the_dark().planned[-1, 2::3].sum()) / fb.load("go2").weight
+    return float(unknown_mass_record().planned[-1, 2::3].sum()) / fb.load("go2").weight
 
 
 def _by_sinking(kp: float) -> float:
-    record = box_in_the_dark()
+    record = unknown_mass_record()
     return 1.0 + kp * float(record.state(0).com[2] - record.final.com[2]) / G
 
 
 def _stiffnesses() -> list[Example]:
-    right = _load() * G / (MOST / 1e3)
+    right = _load() * G / (MAX_SAG / 1e3)
     return [
         *((kp, hint) for hint, kp in _stiffness_slips().items()), (right, ""), (0.97 * right, ""), (-right, "not_above_zero"),
         (0.8 * right, "soft"), (1.5 * right, "hard"), (1e6, "too_stiff"), (3.0, "ground"),
@@ -198,18 +198,18 @@ EXERCISES = (
         statement="The mass in the world of a record, as a multiple of what the controller believes.",
         stub="factor = 1.0  # replace by what you read from dark",
         solution="factor = dark.measured[-1, 2::3].sum() / go2.weight",
-        judge=Numeric(
-            right=lambda: HIDDEN,
+        judge=NumericJudge(
+            right=lambda: HIDDEN_MASS,
             praise="Measured forces weigh, whatever anybody believes. (This is how a scale works, and a good robot has four.)",
             mistakes={
                 "believed": lambda: 1.0,
                 "first_row": lambda: _measured(0),
                 "planned": _planned,
-                "missing": lambda: HIDDEN - 1.0,
-                "inverse": lambda: 1.0 / HIDDEN,
-                "kilograms": lambda: HIDDEN * fb.load("go2").mass,
-                "newtons": lambda: HIDDEN * fb.load("go2").weight,
-                "one_foot": lambda: HIDDEN / 4.0,
+                "missing": lambda: HIDDEN_MASS - 1.0,
+                "inverse": lambda: 1.0 / HIDDEN_MASS,
+                "kilograms": lambda: HIDDEN_MASS * fb.load("go2").mass,
+                "newtons": lambda: HIDDEN_MASS * fb.load("go2").weight,
+                "one_foot": lambda: HIDDEN_MASS / 4.0,
                 "sinking": lambda: _by_sinking(100.0),
             },
             hints={

@@ -13,19 +13,19 @@ from floatbase._validation import Array, as_integer
 from floatbase.actuators import FirstOrderLag
 from floatbase.control import Command, ModelMismatch
 from floatbase.errors import InfeasibleError, unknown_name
-from floatbase.lessons.lesson06 import with_feet
-from floatbase.lessons.lessonA import circling
-from floatbase.lessons.lessonX.box import BlackBox
+from floatbase.lessons.lesson06 import state_with_feet_at
+from floatbase.lessons.lessonA import elliptic_rotation
+from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.objectives import Task
 from floatbase.simulation import Actuators, Rollout
 
 MU = 1.2  # friction that controllers are told: rubber on a rough mat
 KP_COM, KP_BASE, FACETS = 6.0, 30.0, 8  # a gentle robot: what the equations get wrong, gains hardly mend
 PERIOD, SECONDS = 2e-3, 3.0  # s: of a tick, and of a record
-EARLY = 0.5  # s, in which forgotten drift is measured: nothing has slid far yet
+DRIFT_TIME = 0.5  # s, in which forgotten drift is measured: nothing has slid far yet
 LOOPS = 10  # of the twist: more than a record has
 LARGEST_SEED, TRIES = 10**9, 4
-SOFT = 1e4  # weight of contacts that must give way, as of `Walk`
+SOFT_CONTACT_WEIGHT = 1e4  # weight of contacts that must give way, as of `Walk`
 
 Fault: TypeAlias = Literal["friction", "normal", "mass", "drift", "slow motors", "swapped motors"]
 FAULTS: tuple[Fault, ...] = ("friction", "normal", "mass", "drift", "slow motors", "swapped motors")
@@ -35,19 +35,19 @@ FAULTS: tuple[Fault, ...] = ("friction", "normal", "mass", "drift", "slow motors
 class Twist:
     """What a robot was to do and where.
 
-    pitch, yaw: rad, half the widths of the ellipse that its base describes. rate: loops for each second. way: 1 or -1.
+    pitch, yaw: rad, half the widths of the ellipse that its base describes. rate: loops for each second. direction: 1 or -1.
     tilt: degrees of the ground. heading: rad, where it rises least: the horizontal direction of its normal.
     """
 
     pitch: float = 0.22
     yaw: float = 0.45
     rate: float = 2.3
-    way: int = 1
+    direction: int = 1
     tilt: float = 0.0
     heading: float = 0.0
 
     @staticmethod
-    def drawn(rng: np.random.Generator) -> Twist:
+    def random(rng: np.random.Generator) -> Twist:
         """One by chance."""
         pitch, way = rng.uniform(0.2, 0.25), int(rng.choice([-1, 1]))
         yaw, rate = 0.44 + 0.6 * (0.25 - pitch), rng.uniform(2.28, 2.32)  # about as fast as friction allows
@@ -67,11 +67,11 @@ def tilted(normal: Array, degrees: float, heading: float) -> Array:
     return np.asarray(np.cos(angle) * normal + np.sin(angle) * aside / np.linalg.norm(aside))
 
 
-class Pilot:
+class TwistController:
     """A controller that remembers the accelerations it planned, and lets feet give way where nothing holds them."""
 
     def __init__(self, state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch):
-        path = circling(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.way)
+        path = elliptic_rotation(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.direction)
         tasks: list[Task] = [
             fb.CoMTask(state.com, kp=KP_COM),
             fb.OrientationTask("base", path, kp=KP_BASE),
@@ -80,7 +80,7 @@ class Pilot:
         options: dict[str, Any] = {"facets": FACETS, "mismatch": mismatch}
         self.contacts, self.planned = contacts, list[Array]()
         self._firm = fb.WholeBodyController(state.robot, contacts, tasks, **options)
-        self._soft = fb.WholeBodyController(state.robot, contacts, tasks, contact_weight=SOFT, **options)
+        self._soft = fb.WholeBodyController(state.robot, contacts, tasks, contact_weight=SOFT_CONTACT_WEIGHT, **options)
 
     def __call__(self, q: Array, v: Array, t: float) -> Command:
         try:
@@ -91,7 +91,7 @@ class Pilot:
         return command
 
 
-class Swapped:
+class SwappedMotors:
     """Two motors whose cables were swapped: each does what the other is told. `first`, `second`: their numbers."""
 
     def __init__(self, d: int, first: int, second: int):
@@ -104,23 +104,23 @@ class Swapped:
 
 
 @dataclass(frozen=True)
-class Mistake:
+class InjectedFault:
     """What was wrong; by default nothing.
 
-    fault: its name.
+    kind: its name.
     size: of "friction" the true coefficient, of "normal" degrees between the one told and the true one, of "mass" the believed
         one as a multiple of the true one, of "slow motors" their time constant, ms.
     heading: rad, of "normal": to where the one told is turned.
     joints: of "swapped motors", two names.
     """
 
-    fault: Fault | None = None
+    kind: Fault | None = None
     size: float = 0.0
     heading: float = 0.0
     joints: tuple[str, str] = ("", "")
 
     @staticmethod
-    def drawn(fault: Fault, rng: np.random.Generator) -> Mistake:
+    def random(fault: Fault, rng: np.random.Generator) -> InjectedFault:
         """One of this kind by chance."""
         low, high = {
             "friction": (0.4, 0.7),
@@ -133,41 +133,41 @@ class Mistake:
             size = 1.0 + size * float(rng.choice([-1.0, 1.0]))
         names = fb.load("go2").joint_names
         first, second = sorted(int(i) for i in rng.choice(len(names), 2, replace=False))
-        return Mistake(fault, size, heading, (names[first], names[second]))
+        return InjectedFault(fault, size, heading, (names[first], names[second]))
 
 
-def recorded(
+def record_box(
     name: str,
     twist: Twist,
-    mistake: Mistake,
+    injected_fault: InjectedFault,
     pushes: tuple[fb.Push, ...] = (),
     seconds: float = SECONDS,
 ) -> BlackBox:
     """The record of go2 that twists while something is wrong, until it falls or so many seconds are over."""
-    robot, fault = fb.load("go2"), mistake.fault
-    mu = mistake.size if fault == "friction" else MU
-    told = tilted(twist.normal, mistake.size, mistake.heading) if fault == "normal" else twist.normal
+    robot, fault = fb.load("go2"), injected_fault.kind
+    mu = injected_fault.size if fault == "friction" else MU
+    told = tilted(twist.normal, injected_fault.size, injected_fault.heading) if fault == "normal" else twist.normal
     contacts = fb.Contacts.points(robot, MU, normals=told)
     state = standing_on(robot, twist.normal)
-    mismatch = ModelMismatch(mass=mistake.size if fault == "mass" else 1.0, drift=fault != "drift")
-    pilot = Pilot(state, contacts, twist, mismatch)
-    actuators = motors(robot, mistake, pilot(state.q, state.v, 0.0).tau)
+    mismatch = ModelMismatch(mass=injected_fault.size if fault == "mass" else 1.0, drift=fault != "drift")
+    pilot = TwistController(state, contacts, twist, mismatch)
+    actuators = faulty_motors(robot, injected_fault, pilot(state.q, state.v, 0.0).tau)
     pilot.planned.clear()
     sim = fb.Simulation(robot, fb.Ground(mu, normal=twist.normal))
     sim.reset(state)
     record = fb.rollout(sim, pilot, seconds, pushes, PERIOD, actuators)
-    return boxed(name, record, np.array(pilot.planned[: len(record)]))
+    return black_box_of(name, record, np.array(pilot.planned[: len(record)]))
 
 
-def motors(robot: fb.Robot, mistake: Mistake, tau: Array) -> Actuators | None:
+def faulty_motors(robot: fb.Robot, injected_fault: InjectedFault, tau: Array) -> Actuators | None:
     """What stands between orders and joints; None where nothing does. tau: (d,) N·m, with which the robot stands at first."""
-    if mistake.fault == "slow motors":
-        lag = FirstOrderLag(robot, 1e3 / (2.0 * np.pi * mistake.size))
+    if injected_fault.kind == "slow motors":
+        lag = FirstOrderLag(robot, 1e3 / (2.0 * np.pi * injected_fault.size))
         lag.reset(tau)
         return lag
-    if mistake.fault == "swapped motors":
-        first, second = (robot.joint_names.index(joint) for joint in mistake.joints)
-        return Swapped(robot.d, first, second)
+    if injected_fault.kind == "swapped motors":
+        first, second = (robot.joint_names.index(joint) for joint in injected_fault.joints)
+        return SwappedMotors(robot.d, first, second)
     return None
 
 
@@ -178,10 +178,10 @@ def standing_on(robot: fb.Robot, normal: Array) -> fb.State:
         touch = np.array(home.point(foot.frame))
         touch[2] = -(normal[:2] @ touch[:2]) / normal[2]
         centres[foot.frame] = touch + foot.radius * normal
-    return with_feet(robot, home.q[:3], centres)
+    return state_with_feet_at(robot, home.q[:3], centres)
 
 
-def boxed(name: str, record: Rollout, qdd: Array) -> BlackBox:
+def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
     """What a record leaves to an investigation. qdd: (n, nv), as the controller planned."""
     return BlackBox(
         name, record.robot, record.contacts, record.time, record.q, record.v, record.measured, record.tau_desired,
@@ -193,47 +193,47 @@ def boxed(name: str, record: Rollout, qdd: Array) -> BlackBox:
 class Case:
     """One case as it was drawn: what the investigation does not know.
 
-    name: of the box. twists: by chance; the first that ends as it `falls` counts. mistake: the fault. pushes: kicks.
+    name: of the box. twists: by chance; the first that ends as it `falls` counts. injected_fault: what was wrong. pushes: kicks.
     """
 
     name: str
     twists: tuple[Twist, ...]
-    mistake: Mistake
+    injected_fault: InjectedFault
     pushes: tuple[fb.Push, ...] = ()
 
     @property
     def falls(self) -> bool:
         """Whether the robot is to fall."""
-        return bool(self.mistake.fault or self.pushes)
+        return bool(self.injected_fault.kind or self.pushes)
 
     def record(self) -> BlackBox:
         """What it leaves to the investigation. One forgotten drift in twenty is survived by good luck, and is tried again."""
         for twist in self.twists:
-            box = recorded(self.name, twist, self.mistake, self.pushes)
+            box = record_box(self.name, twist, self.injected_fault, self.pushes)
             if box.fell == self.falls:
                 break
         return box
 
 
-def drawn_cases(seed: int) -> tuple[Case, ...]:
+def random_cases(seed: int) -> tuple[Case, ...]:
     """Six cases by chance, one of each fault, in an order by chance. The same for the same seed, a whole number."""
     rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 6])
     order = [FAULTS[i] for i in rng.permutation(len(FAULTS))]
-    return tuple(Case(name, twists(rng), Mistake.drawn(fault, rng)) for name, fault in zip("ABCDEF", order, strict=True))
+    return tuple(Case(name, random_twists(rng), InjectedFault.random(fault, rng)) for name, fault in zip("ABCDEF", order, strict=True))
 
 
-def innocent_cases(seed: int) -> tuple[Case, ...]:
+def faultless_cases(seed: int) -> tuple[Case, ...]:
     """Two cases by chance without a fault: in the second somebody kicks the robot over."""
     rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 2])
-    return Case("N", twists(rng), Mistake()), Case("K", twists(rng), Mistake(), (drawn_kick(rng),))
+    return Case("N", random_twists(rng), InjectedFault()), Case("K", random_twists(rng), InjectedFault(), (random_kick(rng),))
 
 
-def twists(rng: np.random.Generator) -> tuple[Twist, ...]:
+def random_twists(rng: np.random.Generator) -> tuple[Twist, ...]:
     """Some by chance."""
-    return tuple(Twist.drawn(rng) for _ in range(TRIES))
+    return tuple(Twist.random(rng) for _ in range(TRIES))
 
 
-def drawn_kick(rng: np.random.Generator) -> fb.Push:
+def random_kick(rng: np.random.Generator) -> fb.Push:
     """A kick by chance, hard enough to fell go2."""
     angle, force = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(260.0, 320.0)
     return fb.Push(force * np.array([np.cos(angle), np.sin(angle), 0.0]), start=float(rng.uniform(0.4, 0.8)))
@@ -245,13 +245,13 @@ def black_boxes(seed: int) -> tuple[BlackBox, ...]:
 
     seed: a whole number.
     """
-    return tuple(case.record() for case in drawn_cases(seed))
+    return tuple(case.record() for case in random_cases(seed))
 
 
 @lru_cache(maxsize=8)
-def innocent_boxes(seed: int) -> tuple[BlackBox, ...]:
+def faultless_boxes(seed: int) -> tuple[BlackBox, ...]:
     """The black boxes of two robots without a fault: N twists to the end, K is kicked over. seed: a whole number."""
-    return tuple(case.record() for case in innocent_cases(seed))
+    return tuple(case.record() for case in faultless_cases(seed))
 
 
 def crash_test(
@@ -263,14 +263,14 @@ def crash_test(
     """A crash of our own, whose fault we know, to try instruments on.
 
     fault: one of `FAULTS`; None for a robot without.
-    size, joints: of the fault, see `Mistake`.
+    size, joints: of the fault, see `InjectedFault`.
     seconds: of the record, unless it ends in a fall before.
     """
     if fault is not None and fault not in FAULTS:
         raise unknown_name("fault", fault, FAULTS)
-    return recorded("our own", Twist(), Mistake(fault, size, 0.0, joints), seconds=seconds)
+    return record_box("our own", Twist(), InjectedFault(fault, size, 0.0, joints), seconds=seconds)
 
 
 def case_zero() -> BlackBox:
     """The case that the lesson solves."""
-    return recorded("0", Twist(), Mistake("slow motors", 45.0))
+    return record_box("0", Twist(), InjectedFault("slow motors", 45.0))

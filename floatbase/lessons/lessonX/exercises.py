@@ -12,17 +12,25 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.lessons.exercises import Example, Exercise, Numeric, Shaped, Verdict
-from floatbase.lessons.lessonX import program
-from floatbase.lessons.lessonX.box import BlackBox
-from floatbase.lessons.lessonX.cases import FAULTS, LARGEST_SEED, Case, black_boxes, drawn_cases, innocent_boxes, innocent_cases
-from floatbase.lessons.lessonX.tools import needed
-from floatbase.lessons.lessonX.verdicts import AGAINST, judged, mistaken
+from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict
+from floatbase.lessons.lessonX import investigation
+from floatbase.lessons.lessonX.black_box import BlackBox
+from floatbase.lessons.lessonX.cases import (
+    FAULTS,
+    LARGEST_SEED,
+    Case,
+    black_boxes,
+    faultless_boxes,
+    faultless_cases,
+    random_cases,
+)
+from floatbase.lessons.lessonX.diagnostics import required_forces
+from floatbase.lessons.lessonX.verdicts import COUNTER_EVIDENCE, judge_line, mistaken
 
-VISITED = 5  # seed of the box of exercise X.1
-_UNSEEN = (20611, 20612, 20613, 102, 20615, 20616)  # seeds from which the last exercise takes one fault each
-_SOUND = 20617  # and of its two robots without
-_TOUCHED = 20.0  # N: a larger residual is a kick, and none of the physics' own steps
+KICK_SEED = 5  # seed of the box of exercise X.1
+_UNSEEN_SEEDS = (20611, 20612, 20613, 102, 20615, 20616)  # seeds from which the last exercise takes one fault each
+_FAULTLESS_SEED = 20617  # and of its two robots without
+_KICK_FORCE = 20.0  # N: a larger residual is a kick, and none of the physics' own steps
 
 
 # X.1 ----------------------------------------------------------------------------------------------------------------------
@@ -31,16 +39,16 @@ _TOUCHED = 20.0  # N: a larger residual is a kick, and none of the physics' own 
 @cache
 def kicked_box() -> BlackBox:
     """The record of a robot without a fault that somebody kicked."""
-    return innocent_cases(VISITED)[1].record()
+    return faultless_cases(KICK_SEED)[1].record()
 
 
 @cache
 def _residual() -> tuple[Array, Array]:
     """Force on the base that (7) misses while somebody kicks, (m, 3) N, in base axes and in the world's."""
     box = kicked_box()
-    found = needed(box)[:, :3]
-    rows = np.flatnonzero(np.linalg.norm(found, axis=1) > _TOUCHED)
-    rows = rows[box.time[rows] < innocent_cases(VISITED)[1].pushes[0].start + 0.2]
+    found = required_forces(box)[:, :3]
+    rows = np.flatnonzero(np.linalg.norm(found, axis=1) > _KICK_FORCE)
+    rows = rows[box.time[rows] < faultless_cases(KICK_SEED)[1].pushes[0].start + 0.2]
     return found[rows], np.array([_turned(i, found[i]) for i in rows])
 
 
@@ -51,13 +59,13 @@ def _turned(i: int | np.integer[Any], row: Array) -> Array:
 
 def _impulse() -> Array:
     """As it was given."""
-    (push,) = innocent_cases(VISITED)[1].pushes
+    (push,) = faultless_cases(KICK_SEED)[1].pushes
     return np.asarray(push.force * push.duration)
 
 
 def _momentum() -> Array:
     """How the robot's momentum changed while it was kicked."""
-    box, (push,) = kicked_box(), innocent_cases(VISITED)[1].pushes
+    box, (push,) = kicked_box(), faultless_cases(KICK_SEED)[1].pushes
     first, last = (int(np.searchsorted(box.time, push.start + part * push.duration)) for part in (0.0, 1.0))
     return np.asarray(box.robot.mass * (box.state(last).com_velocity - box.state(first).com_velocity))
 
@@ -67,8 +75,8 @@ def _kicks() -> dict[str, Callable[[], Any]]:
         "zero": lambda: np.zeros(3),
         "base_axes": lambda: 0.002 * _residual()[0].sum(axis=0),
         "no_duration": lambda: _residual()[1].sum(axis=0),
-        "fall": lambda: 0.002 * np.sum([_turned(i, row) for i, row in enumerate(needed(kicked_box())[:, :3])], axis=0),
-        "force": lambda: _impulse() / innocent_cases(VISITED)[1].pushes[0].duration,
+        "fall": lambda: 0.002 * np.sum([_turned(i, row) for i, row in enumerate(required_forces(kicked_box())[:, :3])], axis=0),
+        "force": lambda: _impulse() / faultless_cases(KICK_SEED)[1].pushes[0].duration,
         "momentum": _momentum,
     }
 
@@ -92,7 +100,7 @@ def _judge_report(answer: Any) -> Verdict:
 
 def _report_of(seed: int, told: dict[str, str]) -> Verdict:
     """told: name of a box -> what is said of it."""
-    cases = {case.name: case for case in drawn_cases(seed)}
+    cases = {case.name: case for case in random_cases(seed)}
     if unknown := sorted(set(told) - set(cases)):
         return Verdict(False, f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.", "no_such_box")
     if not told:
@@ -100,7 +108,7 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
             False, 'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".', "nothing_said"
         )
     boxes = {box.name: box for box in black_boxes(seed)}
-    verdicts = {name: judged(cases[name], boxes[name], line) for name, line in sorted(told.items())}
+    verdicts = {name: judge_line(cases[name], boxes[name], line) for name, line in sorted(told.items())}
     wrong = [f"{name}: {verdict.text}" for name, verdict in verdicts.items() if not verdict.right]
     solved = [name for name, verdict in verdicts.items() if verdict.right]
     left = [name for name in cases if name not in verdicts]
@@ -115,13 +123,13 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
 
 
 @cache
-def _unseen(i: int) -> tuple[Case, BlackBox]:
+def _unseen_case(i: int) -> tuple[Case, BlackBox]:
     """One of the cases of the last exercise: six with a fault, then two without."""
     if i < len(FAULTS):
-        case = next(case for case in drawn_cases(_UNSEEN[i]) if case.mistake.fault == FAULTS[i])
+        case = next(case for case in random_cases(_UNSEEN_SEEDS[i]) if case.injected_fault.kind == FAULTS[i])
         return case, replace(case.record(), name="unseen")
     sound = i - len(FAULTS)
-    return innocent_cases(_SOUND)[sound], replace(innocent_boxes(_SOUND)[sound], name="unseen")
+    return faultless_cases(_FAULTLESS_SEED)[sound], replace(faultless_boxes(_FAULTLESS_SEED)[sound], name="unseen")
 
 
 def _judge_program(answer: Any) -> Verdict:
@@ -131,14 +139,14 @@ def _judge_program(answer: Any) -> Verdict:
     if not callable(answer):
         return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.", "no_function")
     for i in range(len(FAULTS) + 2):
-        if wrong := _tried(answer, *_unseen(i)):
+        if wrong := _tried(answer, *_unseen_case(i)):
             return wrong
     return Verdict(True, "Six faults found in boxes it had never seen, each with its evidence, and no innocent accused.")
 
 
 def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Verdict | None:
     """What is wrong with a program's word about a box; None where it is right."""
-    what = f"a robot with {case.mistake.fault}" if case.mistake.fault else "a sound robot"
+    what = f"a robot with {case.injected_fault.kind}" if case.injected_fault.kind else "a sound robot"
     what += " that was kicked over" if case.pushes else ""
     try:
         line = program(box)
@@ -147,14 +155,14 @@ def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Ver
     if not isinstance(line, str):
         said = f'Return a line of text, such as "mass 0.93" or "nothing"; this is {type(line).__name__}.'
         return Verdict(False, said, "no_text")
-    verdict = judged(case, box, line)
+    verdict = judge_line(case, box, line)
     return None if verdict.right else Verdict(False, f'Of {what} your program says "{line}": {verdict.text}', verdict.hint)
 
 
 def _reports() -> list[Example]:
     """On the boxes of seed 1."""
-    boxes, found = black_boxes(1), {box.name: program.investigate(box) for box in black_boxes(1)}
-    cases = {str(case.mistake.fault): case for case in drawn_cases(1)}
+    boxes, found = black_boxes(1), {box.name: investigation.investigate(box) for box in black_boxes(1)}
+    cases = {str(case.injected_fault.kind): case for case in random_cases(1)}
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 
     def but(fault: str, line: str) -> list[str]:
@@ -162,7 +170,7 @@ def _reports() -> list[Example]:
         name = cases[fault].name
         return [f"{name}: {line}" if said.startswith(name) else said for said in report]
 
-    right, wrong = cases["swapped motors"].mistake.joints, set(boxes[0].robot.joint_names)
+    right, wrong = cases["swapped motors"].injected_fault.joints, set(boxes[0].robot.joint_names)
     other, another = sorted(wrong - set(right))[:2]
     made: list[Example] = [
         (report, ""), ([f" {line} " for line in report], ""), (but("mass", found[cases["mass"].name].upper()), ""),
@@ -175,14 +183,14 @@ def _reports() -> list[Example]:
         (but("swapped motors", "swapped motors tail_joint"), "no_such_joint"),
     ]  # fmt: skip
     for fault, case in cases.items():
-        made += [(but(fault, f"{said} 0.9"), f"not {said}") for said in AGAINST if said != fault]
+        made += [(but(fault, f"{said} 0.9"), f"not {said}") for said in COUNTER_EVIDENCE if said != fault]
         made += [(but(fault, line), hint) for hint, line in mistaken(case, boxes["ABCDEF".index(case.name)]).items()]
         made += [(but(fault, f"{fault} 987"), "not_two_joints" if fault == "swapped motors" else "evidence")]
     return made
 
 
 def _programs() -> list[Example]:
-    found = program.investigate
+    found = investigation.investigate
     return [
         (found, ""), (lambda box: "nothing", "not nothing"), (lambda box: "friction 0.55", "evidence"),
         (lambda box: found(box).replace("nothing", "friction 0.9"), "innocent"),
@@ -196,13 +204,13 @@ EXERCISES = (
         name="X.1",
         statement="The impulse of a kick, (3,), N·s, world, from what (7) misses in the record of a robot without a fault.",
         stub="impulse = np.zeros(3)  # replace: N·s, in the world's axes",
-        solution="missed = needed(kicked)[:, :3]\n"
+        solution="missed = required_forces(kicked)[:, :3]\n"
         "rows = np.flatnonzero(np.linalg.norm(missed, axis=1) > 50)  # N\n"
         "rows = rows[rows < rows[0] + 100]  # the kick, and no blow of the fall\n"
         'R = [kicked.state(i).frame_pose("base").rotation for i in rows]\n'
         "impulse = 0.002 * sum(R_i @ missed[i] for R_i, i in zip(R, rows))",
-        judge=Shaped(
-            Numeric(
+        judge=ShapeJudge(
+            NumericJudge(
                 right=_impulse,
                 praise="Nobody recorded the kick, and you know how hard it was and where it came from.",
                 mistakes=_kicks(),
@@ -221,7 +229,7 @@ EXERCISES = (
         ),
         examples=lambda: [(0.002 * _residual()[1].sum(axis=0), "")],
         explanation="Who touches the robot is missing in (7). The first rows have no motor that could have done it.",
-        names=lambda: {"kicked": kicked_box(), "needed": needed},
+        namespace=lambda: {"kicked": kicked_box(), "required_forces": required_forces},
     ),
     Exercise(
         name="X.2",
@@ -230,20 +238,20 @@ EXERCISES = (
         '    f"seed {seed}",\n'
         '    "A: ?",  # a fault and its evidence, such as "A: mass 0.93"\n'
         '    "B: ?",\n    "C: ?",\n    "D: ?",\n    "E: ?",\n    "F: ?",\n]',
-        solution="from floatbase.lessons.lessonX.program import investigate as detective\n"
+        solution="from floatbase.lessons.lessonX.investigation import investigate as detective\n"
         "\n"
         'report = [f"seed {seed}"]\n'
         'report += [f"{box.name}: {detective(box)}" for box in black_boxes(seed)]',
         judge=_judge_report,
         examples=_reports,
         explanation="The detective is the solution of X.3, which reveal shows there.",
-        names=lambda: {"seed": 1, "black_boxes": black_boxes},
+        namespace=lambda: {"seed": 1, "black_boxes": black_boxes},
     ),
     Exercise(
         name="X.3",
         statement="A program that sees only a box, and names its fault with the evidence, or nothing.",
         stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as in your report',
-        solution=inspect.getsource(program),
+        solution=inspect.getsource(investigation),
         judge=_judge_program,
         examples=_programs,
         explanation="The plan first, then the motors, then the ground: each question has an answer of its own.",

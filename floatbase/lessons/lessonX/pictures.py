@@ -11,17 +11,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from floatbase._validation import Array
-from floatbase.lessons.lessonX.box import BlackBox
-from floatbase.lessons.lessonX.tools import lagged
+from floatbase.lessons.lessonX.black_box import BlackBox
+from floatbase.lessons.lessonX.diagnostics import lagged
 from floatbase.simulation import Rollout
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 WIDTH, HEIGHT, EDGE = 620, 240, 40  # pixels of a drawing, and of its edge
-_LEAST = 1.0  # N: a smaller force is not worth a word
+_MIN_TOLERANCE = 1.0  # N: a smaller force is not worth a word
 
 
-def film(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None = None) -> Viewer:
+def play_box(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None = None) -> Viewer:
     """Play a box: measured and planned forces, cones as they were told. speed: 1 for real time."""
     places = np.array([box.contacts.positions(box.state(i)) for i in range(len(box))])
     record = Rollout(
@@ -31,21 +31,21 @@ def film(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None = N
     return view.play(record, speed=speed, com=False, title=title)
 
 
-def show_moment(view: Viewer, box: BlackBox, missed: Array, time: float) -> str:
+def show_instant(view: Viewer, box: BlackBox, missed: Array, time: float) -> str:
     """Draw one row of a box; what was planned, what was measured, and what (7) misses there, as text.
 
-    missed: (n - 1, nv), as of `needed`. time: s.
+    missed: (n - 1, nv), as of `required_forces`. time: s.
     """
     i = int(np.clip(np.searchsorted(box.time, time), 0, len(missed) - 1))
     view.show(box.state(i), box.contacts, box.measured[i], box.planned[i], com=False)
     gaps = np.linalg.norm((box.measured[i] - box.planned[i]).reshape(-1, 3), axis=1)
     told = ", ".join(f"{name[:2]} {gap:.0f}" for name, gap in zip(box.contacts.names, gaps, strict=True))
     left = float(np.linalg.norm(missed[i, :3]))
-    return f"planned and measured forces differ by {told} N; (7) misses {left if left >= _LEAST else 0:.0f} N on the base"
+    return f"planned and measured forces differ by {told} N; (7) misses {left if left >= _MIN_TOLERANCE else 0:.0f} N on the base"
 
 
-def plot_missed(box: BlackBox, missed: npt.ArrayLike) -> Figure:
-    """The force on the base that (7) misses, and the weight for comparison. missed: (n - 1, nv), as of `needed`."""
+def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
+    """The force on the base that (7) misses, and the weight for comparison. missed: (n - 1, nv), as of `required_forces`."""
     forces = np.linalg.norm(np.asarray(missed)[:, :3], axis=1)
     figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
     ax.axhline(box.robot.weight, color=hex_code(GREYS[1]), linestyle="--", label="weight")
@@ -57,7 +57,7 @@ def plot_missed(box: BlackBox, missed: npt.ArrayLike) -> Figure:
     return figure
 
 
-def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
+def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> str:
     """Ordered and needed torque of a joint, as HTML, the order after a first-order lag; how well the two fit.
 
     got: (n - 1, d) N·m, the torques that the motion needed. joint: its number. ms: time constant of the lag.
@@ -65,7 +65,7 @@ def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
     times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
     told = box.tau[: len(got)]
     orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
-    frame = _Frame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
+    frame = _PlotFrame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
     drawn = frame.ticks() + frame.curve(times, got[:, joint], f'stroke="{hex_code(GREYS[2])}" stroke-width="6"')
     drawn += frame.curve(times, orders[:, joint], 'stroke="currentColor" stroke-width="1.5"')
     off = float(np.median(np.abs(orders - got)))
@@ -79,7 +79,7 @@ def draw_orders(box: BlackBox, got: Array, joint: int, ms: float) -> str:
 
 
 @dataclass(frozen=True)
-class _Frame:
+class _PlotFrame:
     """Where times, s, and torques, N·m, lie on a drawing."""
 
     begin: float

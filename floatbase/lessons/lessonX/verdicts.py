@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from floatbase.lessons.exercises import Verdict
-from floatbase.lessons.lessonX.box import BlackBox
-from floatbase.lessons.lessonX.cases import EARLY, FAULTS, MU, Case
-from floatbase.lessons.lessonX.tools import ground_normal
+from floatbase.lessons.lessonX.black_box import BlackBox
+from floatbase.lessons.lessonX.cases import DRIFT_TIME, FAULTS, MU, Case
+from floatbase.lessons.lessonX.diagnostics import ground_normal
 
 NOTHING = "nothing"
 EVIDENCE = {
@@ -23,7 +23,7 @@ EVIDENCE = {
     "swapped motors": "the names of two joints",
 }
 # what speaks against a fault in every box that has another
-AGAINST = {
+COUNTER_EVIDENCE = {
     "friction": "feet that slide get no less friction than the controller was told: |λt| / λn of the measured forces.",
     "normal": "the feet stand in a plane, and its normal is the one that was told.",
     "mass": "with M and h of the data sheet, the plan (q̈, τ, λ) satisfies the first line of (7) in every row.",
@@ -34,9 +34,9 @@ AGAINST = {
 }
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 _JOINT = re.compile(r"\w+_joint")
-_WORKS = {"friction": 0.04, "normal": 1.5, "mass": 0.02}  # how far evidence may be off
-_SHARE = 0.1  # of it, for the others
-_LEAST = 3.0  # ms that a time constant may be off
+_EVIDENCE_TOLERANCES = {"friction": 0.04, "normal": 1.5, "mass": 0.02}  # how far evidence may be off
+_RELATIVE_TOLERANCE = 0.1  # of it, for the others
+_MIN_TOLERANCE = 3.0  # ms that a time constant may be off
 _RIGHT = Verdict(True, "")
 
 
@@ -53,23 +53,23 @@ class _Evidence:
     otherwise: str
 
 
-def fault_in(line: str) -> str:
+def named_fault(line: str) -> str:
     """The fault that a line names first, or "nothing"; "" where it names none."""
     words = line.casefold()
     found = [(words.find(name), name) for name in (*FAULTS, NOTHING) if name in words]
     return min(found)[1] if found else ""
 
 
-def judged(case: Case, box: BlackBox, line: str) -> Verdict:
+def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
     """What is to be said of a line about a case, a fault and its evidence; of a right one nothing."""
-    said, fault = fault_in(line), case.mistake.fault or NOTHING
+    said, fault = named_fault(line), case.injected_fault.kind or NOTHING
     if not said:
         return Verdict(False, f"name one of {', '.join(FAULTS)}, and its evidence.", "no_fault")
     if said != fault and fault == NOTHING:
         known = "this robot had no fault: it " + ("was kicked." if case.falls else "did not even fall.")
         return Verdict(False, known, "innocent")
     if said != fault:
-        return Verdict(False, f"not {said}: {AGAINST[said]}", f"not {said}")
+        return Verdict(False, f"not {said}: {COUNTER_EVIDENCE[said]}", f"not {said}")
     if said == NOTHING:
         return _RIGHT
     if said == "swapped motors":
@@ -77,12 +77,12 @@ def judged(case: Case, box: BlackBox, line: str) -> Verdict:
     number = _NUMBER.search(line.casefold().split(said, 1)[1])
     if number is None:
         return Verdict(False, f"{said} it is. The evidence is missing: {EVIDENCE[said]}.", "no_evidence")
-    return _close(said, float(number[0]), _NUMBERS[said](case, box))
+    return _judge_number(said, float(number[0]), _NUMBERS[said](case, box))
 
 
 def mistaken(case: Case, box: BlackBox) -> dict[str, str]:
     """Hint -> a line with the right fault and evidence that gets it."""
-    fault = str(case.mistake.fault)
+    fault = str(case.injected_fault.kind)
     if fault not in _NUMBERS:
         return {}
     evidence = _NUMBERS[fault](case, box)
@@ -91,7 +91,7 @@ def mistaken(case: Case, box: BlackBox) -> dict[str, str]:
 
 
 def _joints(case: Case, box: BlackBox, line: str) -> Verdict:
-    given, right = set(_JOINT.findall(line)), set(case.mistake.joints)
+    given, right = set(_JOINT.findall(line)), set(case.injected_fault.joints)
     unknown = sorted(given - set(box.robot.joint_names))
     if unknown:
         return Verdict(False, f"there is no {unknown[0]}; box.robot.joint_names lists them.", "no_such_joint")
@@ -104,7 +104,7 @@ def _joints(case: Case, box: BlackBox, line: str) -> Verdict:
 
 
 def _friction(case: Case, box: BlackBox) -> _Evidence:
-    mu = case.mistake.size
+    mu = case.injected_fault.size
     known = {
         "believed": (MU, "that is the friction that was told; which did the feet get?"),
         "share": (mu / MU, "that is a share of what was told; give the coefficient."),
@@ -112,22 +112,22 @@ def _friction(case: Case, box: BlackBox) -> _Evidence:
         "angle": (float(np.rad2deg(np.arctan(mu))), "that is the angle of the cone; give its tangent."),
     }
     otherwise = "take feet that slide and bear, and forces along and across the ground."
-    return _Evidence(mu, _WORKS["friction"], known, otherwise)
+    return _Evidence(mu, _EVIDENCE_TOLERANCES["friction"], known, otherwise)
 
 
 def _normal(case: Case, box: BlackBox) -> _Evidence:
     ground, told = ground_normal(box), box.contacts.normals[0]
     slope, believed = (float(np.rad2deg(np.arccos(n[2]))) for n in (ground, told))
     known = {
-        "radians": (float(np.deg2rad(case.mistake.size)), "in degrees, please."),
+        "radians": (float(np.deg2rad(case.injected_fault.size)), "in degrees, please."),
         "slope": (slope, "that is how steep the ground is; what counts is the angle to the normal that was told."),
         "believed": (believed, "that is how steep the ground was believed to be; what counts is the angle to its normal."),
     }
-    return _Evidence(case.mistake.size, _WORKS["normal"], known, "four feet that bear span the plane, before they slide.")
+    return _Evidence(case.injected_fault.size, _EVIDENCE_TOLERANCES["normal"], known, "four feet that bear span the plane, before they slide.")
 
 
 def _mass(case: Case, box: BlackBox) -> _Evidence:
-    k, m = case.mistake.size, box.robot.mass
+    k, m = case.injected_fault.size, box.robot.mass
     known = {
         "inverse": (1.0 / k, "that is the true mass over the believed one."),
         "kilograms": (k * m, "that is the believed mass in kg; divide it by the data sheet's."),
@@ -136,11 +136,11 @@ def _mass(case: Case, box: BlackBox) -> _Evidence:
         "difference_percent": (100.0 * (k - 1.0), "that is how much it is off, in percent; give the factor, near 1."),
         "percent": (100.0 * k, "that is in percent; give the factor, near 1."),
     }
-    return _Evidence(k, _WORKS["mass"], known, "compare M q̈ + h with S τ + Jᵀ λ, both of the plan.")
+    return _Evidence(k, _EVIDENCE_TOLERANCES["mass"], known, "compare M q̈ + h with S τ + Jᵀ λ, both of the plan.")
 
 
 def _drift(case: Case, box: BlackBox) -> _Evidence:
-    b = np.array([np.asarray(box.equations(i).b) for i in np.flatnonzero(box.time < EARLY)])
+    b = np.array([np.asarray(box.equations(i).b) for i in np.flatnonzero(box.time < DRIFT_TIME)])
     late = max(float(np.abs(box.equations(i).b).max()) for i in range(0, len(box), 5))
     right, of_feet = float(np.abs(b).max()), np.linalg.norm(b.reshape(len(b), -1, 3), axis=2)
     known = {
@@ -150,11 +150,11 @@ def _drift(case: Case, box: BlackBox) -> _Evidence:
         "late": (late, "that is of the whole record; in the fall everything is large. Take the first half second."),
     }
     otherwise = "b of box.equations(i), the largest entry while t < 0.5 s, without sign."
-    return _Evidence(right, _SHARE * right, known, otherwise)
+    return _Evidence(right, _RELATIVE_TOLERANCE * right, known, otherwise)
 
 
 def _slow(case: Case, box: BlackBox) -> _Evidence:
-    ms = case.mistake.size
+    ms = case.injected_fault.size
     known = {
         "seconds": (ms / 1e3, "in ms, please."),
         "bandwidth": (1e3 / (2.0 * np.pi * ms), "that is the bandwidth in Hz; give the time constant in ms."),
@@ -162,7 +162,7 @@ def _slow(case: Case, box: BlackBox) -> _Evidence:
         "rows": (ms / (1e3 * float(box.time[1] - box.time[0])), "that is in rows of the record; give ms."),
     }
     otherwise = "try time constants, and take the one whose lagged orders fit best."
-    return _Evidence(ms, max(_LEAST, _SHARE * ms), known, otherwise)
+    return _Evidence(ms, max(_MIN_TOLERANCE, _RELATIVE_TOLERANCE * ms), known, otherwise)
 
 
 _NUMBERS: dict[str, Callable[[Case, BlackBox], _Evidence]] = {
@@ -174,7 +174,7 @@ _NUMBERS: dict[str, Callable[[Case, BlackBox], _Evidence]] = {
 }
 
 
-def _close(fault: str, x: float, evidence: _Evidence) -> Verdict:
+def _judge_number(fault: str, x: float, evidence: _Evidence) -> Verdict:
     """Right for what is near enough, else the hint for the nearest of the numbers that a known mistake leads to."""
     if abs(x - evidence.right) <= evidence.off:
         return _RIGHT

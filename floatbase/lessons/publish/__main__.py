@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from floatbase.errors import InputError
-from floatbase.lessons.publish import FOLDER, README, prepare, readme_with_table, run, write_solutions
+from floatbase.lessons.publish import NOTEBOOKS, README, prepare_workspace, readme_with_table, run_and_store, write_solutions
 
 SOLUTIONS = Path("build/solutions")
 
@@ -24,8 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     shown.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="those that it has; all by default")
     shown.add_argument("--stored", action="store_true", help="run none; show what the notebooks hold")
     shown.add_argument("--to", type=Path, metavar="FOLDER", help="where to write, build/site by default")
-    rosed = commands.add_parser("roses", help="measure the push roses of lessons, such as 05, anew")
-    rosed.add_argument("lessons", nargs="+", metavar="LESSON")
+    measured = commands.add_parser("push-recovery", help="measure the push roses of lessons, such as 05, anew")
+    measured.add_argument("lessons", nargs="+", metavar="LESSON")
     keys = commands.add_parser("solutions", help="write the lessons with solutions in place of exercises, for teachers")
     keys.add_argument("--to", type=Path, default=SOLUTIONS, metavar="FOLDER", help=f"where to write, {SOLUTIONS} by default")
     graded = commands.add_parser("grade", help="judge the answers in files that learners wrote by hand_in(…)")
@@ -38,19 +38,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     try:
         if given.command == "run":
-            _run(given.lessons or sorted(FOLDER.glob("*.ipynb")))
+            _run(given.lessons or sorted(NOTEBOOKS.glob("*.ipynb")))
         elif given.command == "map":
             _map()
         elif given.command == "site":
             _site(given.lessons or None, given.to, given.stored)
-        elif given.command == "roses":
+        elif given.command == "push-recovery":
             _roses(given.lessons)
         elif given.command == "solutions":
             _solutions(given.to)
         elif given.command == "grade":
             _grade(given.files, given.table, given.code)
         else:
-            for line in prepare(mine=given.to):
+            for line in prepare_workspace(mine=given.to):
                 print(line)
     except InputError as error:
         parser.exit(2, f"{error}\n")
@@ -59,22 +59,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _run(lessons: Sequence[Path]) -> None:
     for lesson in lessons:
         print(lesson.name)
-        run(lesson)
+        run_and_store(lesson)
 
 
 def _map() -> None:
     from floatbase.lessons.publish import conventions, equations
 
-    (FOLDER / "equations.md").write_text(equations.table(), encoding="utf-8")
-    (FOLDER / "conventions.md").write_text(conventions.page(), encoding="utf-8")
+    (NOTEBOOKS / "equations.md").write_text(equations.table(), encoding="utf-8")
+    (NOTEBOOKS / "conventions.md").write_text(conventions.page(), encoding="utf-8")
     README.write_text(readme_with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def _roses(lessons: Sequence[str]) -> None:
-    from floatbase.lessons.roses import measure_rose
+    from floatbase.lessons.push_recovery import measure_push_recovery
 
     for lesson in lessons:
-        print(f"{lesson}: {measure_rose(lesson)}")
+        print(f"{lesson}: {measure_push_recovery(lesson)}")
 
 
 def _solutions(folder: Path) -> None:
@@ -85,12 +85,12 @@ def _solutions(folder: Path) -> None:
 def _grade(files: Sequence[Path], table: Path | None, code: bool) -> None:
     from floatbase.lessons.publish import grades
 
-    everyone = grades.grade(files)
-    print(grades.overview(everyone))
+    submissions = grades.grade_files(files)
+    print(grades.overview(submissions))
     if code:
-        print(grades.code_to_read(everyone))
+        print(grades.code_to_read(submissions))
     if table:
-        grades.write_table(everyone, table)
+        grades.write_table(submissions, table)
         print(f"All marks: {table}")
 
 

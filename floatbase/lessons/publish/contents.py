@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from floatbase.lessons.publish.notebooks import read
-from floatbase.lessons.publish.workspace import FOLDER
+from floatbase.lessons.publish.notebooks import read_notebook
+from floatbase.lessons.publish.workspace import NOTEBOOKS
 
-README = FOLDER.parent / "README.md"
+README = NOTEBOOKS.parent / "README.md"
 # number -> title, equations of the document; a lesson is ready once a notebook has its number
 PLANNED = {
     "05": ("Steering the centre of mass", "(20)-(25)"),
@@ -25,7 +25,7 @@ _BEGIN = "<!-- lessons: made by `python -m floatbase.lessons.publish map` -->\n"
 _END = "<!-- end of lessons -->\n"
 
 
-def lesson_table(folder: Path = FOLDER) -> str:
+def lesson_table(folder: Path = NOTEBOOKS) -> str:
     """The lessons as a table of Markdown: number, title, equations, ready or planned.
 
     folder: of the notebooks, whose names start with their number, as in 02_equations_of_motion.ipynb.
@@ -34,7 +34,7 @@ def lesson_table(folder: Path = FOLDER) -> str:
     for path in folder.glob("*.ipynb"):
         number = path.name.split("_")[0]
         title = title_of(path).split(" · ")[-1]
-        rows[number] = f"| {number} | [{title}](notebooks/{path.name}) | {equations_of(path)} | ready |"
+        rows[number] = f"| {number} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} | ready |"
     lines = ["| | lesson | equations | |", "|---|---|---|---|", *(rows[number] for number in sorted(rows))]
     return "\n".join(lines).replace("|  |", "| |") + "\n"
 
@@ -48,21 +48,21 @@ def readme_with_table(text: str) -> str:
 def title_of(source: Path) -> str:
     """The first heading of a lesson or of a text in Markdown."""
     if source.suffix == ".ipynb":
-        text = next((cell.source for cell in read(source).cells if cell.cell_type == "markdown"), "")
+        text = next((cell.source for cell in read_notebook(source).cells if cell.cell_type == "markdown"), "")
     else:
         text = source.read_text(encoding="utf-8")
     heading = re.search(r"^# (.+)$", text, re.MULTILINE)
     return heading[1] if heading else source.stem
 
 
-def taught_in(lesson: Path) -> set[str]:
+def equations_taught(lesson: Path) -> set[str]:
     """The equations and appendices of the document that a lesson teaches, "(9)" or "App. A": what its cells say as metadata."""
-    return {equation for cell in read(lesson).cells for equation in cell.metadata.get("teaches", [])}
+    return {equation for cell in read_notebook(lesson).cells for equation in cell.metadata.get("teaches", [])}
 
 
-def equations_of(lesson: Path) -> str:
+def equation_ranges(lesson: Path) -> str:
     """The equations that a lesson teaches, in short: "(8)-(13), (16), App. A"; none is ""."""
-    taught = taught_in(lesson)
+    taught = equations_taught(lesson)
     numbers = sorted(int(equation.strip("()")) for equation in taught if not equation.startswith("App."))
     first = [n for n in numbers if n - 1 not in numbers]
     last = [n for n in numbers if n + 1 not in numbers]

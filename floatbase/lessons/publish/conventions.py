@@ -10,14 +10,14 @@ import floatbase
 from floatbase import conventions
 
 _PACKAGE = Path(floatbase.__file__).parent
-_WITHOUT_TOLERANCES = ("lessons", "viewer")  # their numbers choose what is drawn, not what is answered
+_SKIPPED_PACKAGES = ("lessons", "viewer")  # their numbers choose what is drawn, not what is answered
 # NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int()
 _TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)  # (.+)$", re.MULTILINE)
 
 
 def page() -> str:
     """The page of conventions as Markdown."""
-    first, *rest = _with_table_of_symbols(conventions.__doc__ or "").split("\n", 1)
+    first, *rest = _with_symbol_table(conventions.__doc__ or "").split("\n", 1)
     rows = [f"| {room} | `{name}` | {value} | {reason} |" for room, name, value, reason in tolerances()]
     return "\n".join(
         [
@@ -39,7 +39,7 @@ def page() -> str:
     )
 
 
-def _with_table_of_symbols(text: str) -> str:
+def _with_symbol_table(text: str) -> str:
     """The text with its indented lines, which are symbols and their meaning, as a table of Markdown."""
     lines: list[str] = []
     symbol = re.compile(r"^    (\S.*?)\s{2,}(.+)$")
@@ -60,6 +60,6 @@ def tolerances() -> Iterator[tuple[str, str, str, str]]:
     """File, name, value and reason of every numeric constant of the package, each as its source states it."""
     for path in sorted(_PACKAGE.rglob("*.py")):
         place = path.relative_to(_PACKAGE)
-        if place.parts[0] not in _WITHOUT_TOLERANCES:
+        if place.parts[0] not in _SKIPPED_PACKAGES:
             for name, value, reason in _TOLERANCE.findall(path.read_text(encoding="utf-8")):
                 yield place.with_suffix("").as_posix(), name, value, reason.replace("|", "\\|")

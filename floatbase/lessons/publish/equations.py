@@ -17,15 +17,15 @@ from importlib import import_module
 from pathlib import Path
 
 import floatbase
-from floatbase.lessons.publish.contents import taught_in, title_of
+from floatbase.lessons.publish.contents import equations_taught, title_of
 from floatbase.lessons.publish.formulas import FORMULAS, NOTES, SECTIONS, Formula
-from floatbase.lessons.publish.workspace import FOLDER
+from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 TITLES = {formula.number: formula.title for formula in FORMULAS}
-_START = re.compile(r"\s*((?:\(\d+\))+|App\. [ABC])")
+_LEADING_NUMBERS = re.compile(r"\s*((?:\(\d+\))+|App\. [ABC])")
 _NUMBER = re.compile(r"\(\d+\)|App\. [ABC]")
 _TESTS = Path(floatbase.__file__).parents[1] / "tests"
-_WITHOUT_EQUATIONS = ("viewer", "lessons", "playground")  # rooms that show and teach them
+_SKIPPED_PACKAGES = ("viewer", "lessons", "playground")  # rooms that show and teach them
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ def entries() -> list[Entry]:
 
     A class is tested where it is named or where a function that returns it is; a member where both it and its class are.
     """
-    named = _names_in_tests()
+    named = _tests_by_name()
     found = []
-    for path, docstring, makers in _public():
-        start = _START.match(docstring)
+    for path, docstring, makers in _public_objects():
+        start = _LEADING_NUMBERS.match(docstring)
         if start:
             tests = set().union(*(named.get(maker, set()) for maker in makers))
             if path.count(".") > 1:  # room.Class.member
@@ -61,7 +61,7 @@ def entries() -> list[Entry]:
 def table() -> str:
     """The map as a page of Markdown."""
     found = entries()
-    taught = {path.name: taught_in(path) for path in sorted(FOLDER.glob("*.ipynb"))}
+    taught = {path.name: equations_taught(path) for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
     lines = [
         "# The map: equation → function → test → lesson",
         "",
@@ -70,15 +70,15 @@ def table() -> str:
         "function such as `dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
     ]
     for section in SECTIONS:
-        lines += ["", f"## {section.number} {section.title}", "", section.about]
+        lines += ["", f"## {section.number} {section.title}", "", section.summary]
         for formula in (formula for formula in FORMULAS if formula.section == section.number):
             lessons = [name for name, those in taught.items() if formula.number in those]
-            lines += _written_out(formula, [entry for entry in found if formula.number in entry.equations], lessons)
+            lines += _equation_lines(formula, [entry for entry in found if formula.number in entry.equations], lessons)
     lines += ["", "## Notes of the document", "", "The lessons name some of them by number.", ""]
     return "\n".join([*lines, *(f"{number}. {note}" for number, note in NOTES.items())]) + "\n"
 
 
-def _written_out(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:
+def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:
     """An equation in lines of Markdown: formula, meaning, functions, lessons, tests. An appendix has one, unnumbered."""
     appendix = formula.number == formula.section
     tests = sorted({test.split("::")[0] for entry in found for test in entry.tests})
@@ -87,14 +87,14 @@ def _written_out(formula: Formula, found: list[Entry], lessons: list[str]) -> li
         *([] if appendix else ["", f"### {formula.number} {formula.title}"]),
         *("", f"$${formula.latex}{tag}$$", "", formula.meaning, ""),
         f"- functions: {', '.join(f'`{entry.path}`' for entry in found)}",
-        f"- lessons: {', '.join(f'[{title_of(FOLDER / name)}]({name})' for name in lessons)}",
+        f"- lessons: {', '.join(f'[{title_of(NOTEBOOKS / name)}]({name})' for name in lessons)}",
         f"- tests that use them: {', '.join(f'`{test}`' for test in tests)}",
     ]
 
 
-def _public() -> Iterator[tuple[str, str, list[str]]]:
+def _public_objects() -> Iterator[tuple[str, str, list[str]]]:
     """Path, docstring and the names that make it, of every public function, class, method and property, each once."""
-    own = list(_exported())
+    own = list(_exported_objects())
     for room, name, value in own:
         makers = [name] + [maker for _, maker, made in own if _returns(made) == name]
         yield f"{room}.{name}", inspect.getdoc(value) or "", makers
@@ -103,10 +103,10 @@ def _public() -> Iterator[tuple[str, str, list[str]]]:
                 yield f"{room}.{name}.{member}", inspect.getdoc(thing) or "", makers
 
 
-def _exported() -> Iterator[tuple[str, str, object]]:
+def _exported_objects() -> Iterator[tuple[str, str, object]]:
     """Room, name and value of every function and class that a room exports and defines itself."""
     for found in pkgutil.iter_modules(floatbase.__path__):
-        if found.name.startswith("_") or found.name in _WITHOUT_EQUATIONS:
+        if found.name.startswith("_") or found.name in _SKIPPED_PACKAGES:
             continue
         room = import_module(f"floatbase.{found.name}")
         for name in getattr(room, "__all__", vars(room)):
@@ -125,12 +125,12 @@ def _returns(value: object) -> str:
     return str(getattr(value, "__annotations__", {}).get("return", ""))
 
 
-def _names_in_tests() -> dict[str, set[str]]:
+def _tests_by_name() -> dict[str, set[str]]:
     """For every name that a test uses, directly or through a helper of its file, the tests that use it."""
     found: dict[str, set[str]] = {}
     for path in sorted(_TESTS.rglob("test_*.py")):
         functions = {
-            node.name: _names(node)
+            node.name: _identifiers(node)
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
             if isinstance(node, ast.FunctionDef)
         }
@@ -142,7 +142,7 @@ def _names_in_tests() -> dict[str, set[str]]:
     return found
 
 
-def _names(node: ast.AST) -> set[str]:
+def _identifiers(node: ast.AST) -> set[str]:
     """All names and attributes below a node."""
     names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
     return names | {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}

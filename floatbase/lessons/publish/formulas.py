@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 
 class Section(NamedTuple):
-    """A section of the document. number: "§2.1" or "App. A". about: what it is about, in a sentence or two."""
+    """A section of the document. number: "§2.1" or "App. A". summary: what it is about, in a sentence or two."""
 
     number: str
     title: str
-    about: str
+    summary: str
 
 
 class Formula(NamedTuple):

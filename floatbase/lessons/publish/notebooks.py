@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from floatbase.lessons.exercises import all_exercises
-from floatbase.lessons.publish.workspace import FOLDER
+from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 # nbformat and nbclient are imported where they are used: `make lab` needs neither
 
 
-def read(path: Path) -> Any:
+def read_notebook(path: Path) -> Any:
     """A notebook."""
     import nbformat
 
     return nbformat.read(path, as_version=4)
 
 
-def solved(notebook: Any) -> Any:
+def with_solutions(notebook: Any) -> Any:
     """The notebook with the solution in place of each exercise's stub. Changes it in place."""
     known = all_exercises()
     for cell in notebook.cells:
@@ -31,7 +31,7 @@ def solved(notebook: Any) -> Any:
     return notebook
 
 
-def execute(notebook: Any, folder: Path, **settings: str) -> Any:
+def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
     """Run all cells in a fresh kernel in `folder`, in place; an error in a cell is raised.
 
     settings: more of the kernel's environment. FLOATBASE_HOME is a new folder, so that what the notebook answers is not
@@ -56,8 +56,8 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
 
     known, written = all_exercises(), []
     folder.mkdir(parents=True, exist_ok=True)
-    for source in sources or sorted(FOLDER.glob("*.ipynb")):
-        notebook, cells = solved(read(source)), []
+    for source in sources or sorted(NOTEBOOKS.glob("*.ipynb")):
+        notebook, cells = with_solutions(read_notebook(source)), []
         for cell in notebook.cells:
             cells.append(cell)
             name = cell.metadata.get("exercise")
@@ -69,11 +69,11 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
     return written
 
 
-def run(path: Path) -> None:
+def run_and_store(path: Path) -> None:
     """Run a lesson and store its printed outputs; pictures are drawn anew by whoever opens it, so they are not stored."""
     import nbformat
 
-    notebook = execute(read(path), path.parent)
+    notebook = execute_notebook(read_notebook(path), path.parent)
     for cell in notebook.cells:
         if cell.cell_type != "code":
             continue

@@ -20,10 +20,10 @@ from floatbase.lessons import static_export
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.web import pages
 
-_LEAST = 1500  # bytes of a command that pictures share; a smaller one each has itself
-_USUAL = 0.3  # of a robot's pictures
+_MIN_SHARED_SIZE = 1500  # bytes of a command that pictures share; a smaller one each has itself
+_COMMON_FRACTION = 0.3  # of a robot's pictures
 _FOLDER = "pictures"  # beside pictures.js
-_NEEDS = "This turns and moves where JavaScript is on."
+_NO_SCRIPT_TEXT = "This turns and moves where JavaScript is on."
 
 
 class Pictures:
@@ -37,44 +37,44 @@ class Pictures:
         """HTML for the mimebundle of an output that holds a picture, a recording or a panel; None where it holds none."""
         if static_export.MIME not in data:
             return None
-        about = dict(data[static_export.MIME])
-        commands = static_export.commands(about)
-        del about["commands"]
-        name = _name("picture", json.dumps(about, sort_keys=True).encode(), *commands)
-        self._placed[name] = about, commands
-        return _figure(name, about)
+        description = dict(data[static_export.MIME])
+        commands = static_export.commands(description)
+        del description["commands"]
+        name = _file_name("picture", json.dumps(description, sort_keys=True).encode(), *commands)
+        self._placed[name] = description, commands
+        return _figure_html(name, description)
 
     def write(self) -> None:
         """Write the files, after all pictures have been placed."""
         self._folder.mkdir(parents=True, exist_ok=True)
         self._folder.joinpath("viewer.html").write_text(pages.embedded_page("viewer.js"), encoding="utf-8")
         self._folder.joinpath("viewer.js").write_bytes(pages.viewer_code())
-        groups = self._groups()
+        groups = self._shared_files()
         for name, commands in groups.items():
             self._write(name, commands)
         at = {command: name for name, commands in groups.items() for command in commands}
-        for name, (about, commands) in self._placed.items():
+        for name, (description, commands) in self._placed.items():
             shared = sorted({at[command] for command in commands if command in at})
             own = [command for command in commands if command not in at]
             numbers = {c: i for i, c in enumerate([*(c for group in shared for c in groups[group]), *own])}
-            kept = {name: about[name] for name in ("keys", "first", "stops", "notes", "together")}
+            kept = {name: description[name] for name in ("keys", "first", "stops", "notes", "together")}
             head = {**kept, "shared": shared, "at": [numbers[command] for command in commands]}
             self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
-    def _groups(self) -> dict[str, list[bytes]]:
+    def _shared_files(self) -> dict[str, list[bytes]]:
         """Large commands that several pictures have, name of a file -> commands.
 
         There is a file for all robots, and for each robot one of what its pictures usually have and one of the rest.
         """
-        pictures = [(set(about["names"]), set(commands)) for about, commands in self._placed.values()]
-        uses = Counter(command for _, commands in pictures for command in commands if len(command) >= _LEAST)
+        pictures = [(set(description["names"]), set(commands)) for description, commands in self._placed.values()]
+        uses = Counter(command for _, commands in pictures for command in commands if len(command) >= _MIN_SHARED_SIZE)
         robots = {c: set.union(*(names for names, has in pictures if c in has)) for c, times in uses.items() if times > 1}
         found: dict[str, list[bytes]] = {}
         for command in sorted(robots):
             (robot,) = robots[command] if len(robots[command]) == 1 else ("robots",)
-            usual = uses[command] >= _USUAL * sum(robot in names for names, _ in pictures)
+            usual = uses[command] >= _COMMON_FRACTION * sum(robot in names for names, _ in pictures)
             found.setdefault(robot if usual else f"{robot}-more", []).append(command)
-        return {_name(name, *commands): commands for name, commands in found.items()}
+        return {_file_name(name, *commands): commands for name, commands in found.items()}
 
     def _write(self, name: str, parts: Sequence[bytes]) -> None:
         packed = base64.b64encode(gzip.compress(protocol.frame(parts), 9, mtime=0)).decode()
@@ -82,33 +82,33 @@ class Pictures:
         self._folder.joinpath(f"{name}.js").write_text(text, encoding="ascii")
 
 
-def _name(begin: str, *parts: bytes) -> str:
+def _file_name(begin: str, *parts: bytes) -> str:
     """A name for a file with these contents."""
     return f"{begin}-{hashlib.sha256(protocol.frame(parts)).hexdigest()[:12]}"
 
 
-def _figure(name: str, about: dict[str, Any]) -> str:
+def _figure_html(name: str, description: dict[str, Any]) -> str:
     """The figure as it is until its script comes: images of the first moment, its note, and controls that do not move yet."""
     scenes = "".join(
         f'<div class="floatbase-scene" style="--height:{height}px">{f"<b>{html.escape(title)}</b>" if title else ""}'
         f'<div><img alt="3-D picture of {html.escape(robot)}" src="data:image/png;base64,{image}"></div></div>'
         for height, robot, image, title in zip(
-            about["heights"], about["names"], about["stills"], about["titles"] or [""] * len(about["names"]), strict=True
+            description["heights"], description["names"], description["stills"], description["titles"] or [""] * len(description["names"]), strict=True
         )
     )
-    first = ",".join(str(control["first"]) for control in about["controls"])
-    note = about["notes"][about["stops"][first][0]] if first in about["stops"] else ""
-    controls = "".join(map(_control, about["controls"]))
-    words = f'<p class="floatbase-words">{html.escape(about["words"])}</p>' if about["words"] else ""
+    first = ",".join(str(control["first"]) for control in description["controls"])
+    note = description["notes"][description["stops"][first][0]] if first in description["stops"] else ""
+    controls = "".join(map(_control_html, description["controls"]))
+    words = f'<p class="floatbase-words">{html.escape(description["words"])}</p>' if description["words"] else ""
     return (
-        f'<figure class="floatbase-picture{" floatbase-beside" if about["beside"] else ""}" data-picture="{name}">'
+        f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" data-picture="{name}">'
         f'<div class="floatbase-seen">{f"""<div class="floatbase-scenes">{scenes}</div>""" if scenes else ""}'
         f'<div class="floatbase-note" aria-live="polite">{note}</div></div>'
-        f'<div class="floatbase-controls">{controls}</div>{words}<noscript><p>{_NEEDS}</p></noscript></figure>'
+        f'<div class="floatbase-controls">{controls}</div>{words}<noscript><p>{_NO_SCRIPT_TEXT}</p></noscript></figure>'
     )
 
 
-def _control(control: dict[str, Any]) -> str:
+def _control_html(control: dict[str, Any]) -> str:
     """A control as the browser's own element. Its value is the number of a stop, its text what that is called."""
     name, unit, first = html.escape(control["name"]), html.escape(control["unit"]), control["first"]
     named = f"{name} [{unit}]" if unit else name

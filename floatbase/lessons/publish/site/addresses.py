@@ -63,9 +63,9 @@ def members(value: Any) -> list[str]:
         return [name for name, _ in exported(value.__name__)]
     if not inspect.isclass(value):
         return []
-    return [name for name, member in vars(value).items() if not name.startswith("_") and _explains(member)]
+    return [name for name, member in vars(value).items() if not name.startswith("_") and _is_documented(member)]
 
 
-def _explains(member: Any) -> bool:
+def _is_documented(member: Any) -> bool:
     is_code = inspect.isroutine(member) or isinstance(member, property | staticmethod | classmethod) or hasattr(member, "func")
     return is_code and bool(inspect.getdoc(member))

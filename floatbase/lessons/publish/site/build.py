@@ -14,24 +14,24 @@ from nbformat.v4 import new_code_cell, new_notebook
 
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import conventions, equations
-from floatbase.lessons.publish.contents import equations_of, title_of
-from floatbase.lessons.publish.notebooks import read
+from floatbase.lessons.publish.contents import equation_ranges, title_of
+from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
 from floatbase.lessons.publish.site import mathml, reference
 from floatbase.lessons.publish.site.addresses import addresses
-from floatbase.lessons.publish.site.outputs import prepared, run_all
-from floatbase.lessons.publish.site.words import NOTES, anchor, linked
-from floatbase.lessons.publish.workspace import FOLDER
+from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
+from floatbase.lessons.publish.site.references import NOTES_ANCHOR, add_links, anchor_of
+from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 SITE = Path("build/site")
-_OWN = Path(__file__).parent  # texts and static files of the site
-_ROOT = FOLDER.parent
-RUN = _ROOT / "build" / "site-run"  # lessons that were run
+_SITE_SOURCE = Path(__file__).parent  # texts and static files of the site
+_ROOT = NOTEBOOKS.parent
+RUN_FOLDER = _ROOT / "build" / "site-run"  # lessons that were run
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
 _TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
-_ABOUT = {
+_DESCRIPTIONS = {
     "equations": "Every equation of the course, written out, with the functions, tests and lessons that belong to it.",
     "conventions": "Symbols, frames, signs, units and tolerances, the same in every function of floatbase.",
     "how_to": "Where your work is kept, and what to do when something fails.",
@@ -49,49 +49,49 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     lessons: those that it has, all by default. stored: run none of them, and show what their notebooks hold. Raises
     `InputError` when there is no such lesson, `FloatbaseError` when Sphinx finds a fault.
     """
-    known = sorted(FOLDER.glob("*.ipynb"))
+    known = sorted(NOTEBOOKS.glob("*.ipynb"))
     shown = known if lessons is None else sorted(path.resolve() for path in lessons)
     for path in shown:
         if path not in known:
-            raise InputError(f"there is no lesson {path}; the course's lessons are in {FOLDER}.")
-    *notebooks, scene = run_all([*([] if stored else shown), _scene()], RUN).values()
+            raise InputError(f"there is no lesson {path}; the course's lessons are in {NOTEBOOKS}.")
+    *notebooks, scene = run_lessons([*([] if stored else shown), _front_page_notebook()], RUN_FOLDER).values()
     pictures = Pictures(folder / "_static")
     if (folder / ".buildinfo").exists():  # an earlier site, and no other folder of somebody's
         shutil.rmtree(folder)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
         source = Path(place) / "source"
-        shutil.copytree(_OWN, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-        _lessons(source, dict(zip(shown, notebooks or map(read, shown), strict=True)), pictures)
-        _texts(source, shown, _picture(scene, pictures))
-        _library(source / "api")
-        _sphinx(source, folder)
+        shutil.copytree(_SITE_SOURCE, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+        _write_lessons(source, dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)), pictures)
+        _write_texts(source, shown, _first_picture(scene, pictures))
+        _write_reference(source / "api")
+        _run_sphinx(source, folder)
     pictures.write()
     pages = (page.read_text(encoding="utf-8") for page in folder.rglob("*.html"))
     mathml.write_font(pages, folder / "_static" / mathml.FONT)
     return folder / "index.html"
 
 
-def _scene() -> Path:
+def _front_page_notebook() -> Path:
     """A notebook that draws the picture of the first page: the program of the README, played."""
     readme = (_ROOT / "README.md").read_text(encoding="utf-8")
     code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
     play = 'fb.Viewer(robot, height=420).play(run, title="a push of 30 N to the side")'
     notebook = new_notebook(cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")])
-    path = RUN / "first_page.ipynb"
+    path = RUN_FOLDER / "first_page.ipynb"
     path.parent.mkdir(parents=True, exist_ok=True)
     nbformat.write(notebook, path)
     return path
 
 
-def _lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures) -> None:
+def _write_lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures) -> None:
     """The page of each lesson."""
     addresses = {path.name.split("_")[0]: path.name for path in notebooks}
     (source / "lessons").mkdir()
     for path, notebook in notebooks.items():
-        nbformat.write(prepared(notebook, pictures, addresses), source / "lessons" / path.name)
+        nbformat.write(prepare_lesson(notebook, pictures, addresses), source / "lessons" / path.name)
 
 
-def _picture(notebook: Any, pictures: Pictures) -> str:
+def _first_picture(notebook: Any, pictures: Pictures) -> str:
     """The first picture of a notebook, as Markdown; an image where it cannot be placed."""
     data = next(output.data for cell in notebook.cells for output in cell.outputs if "data" in output)
     placed = pictures.place(data)
@@ -99,7 +99,7 @@ def _picture(notebook: Any, pictures: Pictures) -> str:
     return f"```{{raw}} html\n{placed or image}\n```"
 
 
-def _lists(lessons: Sequence[Path]) -> str:
+def _toctrees(lessons: Sequence[Path]) -> str:
     """The lessons for the bar beside each page."""
     listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
     listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
@@ -109,34 +109,34 @@ def _lists(lessons: Sequence[Path]) -> str:
     )
 
 
-def _table(known: Iterable[Path]) -> str:
-    rows = [f"| [{title_of(path)}](lessons/{path.name}) | {equations_of(path)} |" for path in known]
+def _lesson_table(known: Iterable[Path]) -> str:
+    rows = [f"| [{title_of(path)}](lessons/{path.name}) | {equation_ranges(path)} |" for path in known]
     return "\n".join(["| lesson | equations |", "|---|---|", *rows])
 
 
-def _texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
+def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
     """All texts that are no lessons, with their links; the figures of the benchmarks."""
     made = {
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
-        "lessons/how_to.md": (FOLDER / "how_to.md").read_text(encoding="utf-8"),
+        "lessons/how_to.md": (NOTEBOOKS / "how_to.md").read_text(encoding="utf-8"),
         "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace("(notebooks/", "(lessons/"),
         **{f"benchmarks/{path.name}": path.read_text(encoding="utf-8") for path in _ROOT.glob("benchmarks/*.md")},
     }
     for name, text in made.items():
-        about = f'---\nmyst:\n  html_meta:\n    description: "{_ABOUT[Path(name).stem]}"\n---\n'
+        about = f'---\nmyst:\n  html_meta:\n    description: "{_DESCRIPTIONS[Path(name).stem]}"\n---\n'
         (source / name).write_text(about + text, encoding="utf-8")
     for path in source.rglob("*.md"):
         text = path.read_text(encoding="utf-8")
-        for name, part in {"scene": scene, "lessons": _table(lessons), "toctrees": _lists(lessons)}.items():
+        for name, part in {"scene": scene, "lessons": _lesson_table(lessons), "toctrees": _toctrees(lessons)}.items():
             text = text.replace(f"{{{name}}}", part) if path == source / "index.md" else text
         way = "" if path.parent.name == "lessons" else "lessons/" if path.parent == source else "../lessons/"
-        path.write_text(linked(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}), encoding="utf-8")
+        path.write_text(add_links(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}), encoding="utf-8")
     for path in _ROOT.glob("benchmarks/*.png"):
         shutil.copy(path, source / "benchmarks")
 
 
-def _library(target: Path) -> None:
+def _write_reference(target: Path) -> None:
     target.mkdir()
     for name, text in reference.pages().items():
         (target / name).write_text(text, encoding="utf-8")
@@ -157,14 +157,14 @@ def _with_anchors(page: str) -> str:
         return f'- <details class="tests"><summary>tests that use them, in {count}</summary>{listed}</details>'
 
     page = _TESTS.sub(fold, page)
-    page = page.replace("## Notes of the document", f"({NOTES})=\n## Notes of the document")
-    return _FUNCTIONS.sub(link, _HEADINGS.sub(lambda match: f"({anchor(match[1])})=\n{match[0]}", page))
+    page = page.replace("## Notes of the document", f"({NOTES_ANCHOR})=\n## Notes of the document")
+    return _FUNCTIONS.sub(link, _HEADINGS.sub(lambda match: f"({anchor_of(match[1])})=\n{match[0]}", page))
 
 
-def _sphinx(source: Path, folder: Path) -> None:
+def _run_sphinx(source: Path, folder: Path) -> None:
     """Let Sphinx write the pages; a warning is a fault."""
     from sphinx.cmd.build import build_main
 
-    options = ["-q", "-W", "--keep-going", "-E", "-j", "2", "-c", str(_OWN), "-d", str(source / ".doctrees")]
+    options = ["-q", "-W", "--keep-going", "-E", "-j", "2", "-c", str(_SITE_SOURCE), "-d", str(source / ".doctrees")]
     if build_main([*options, str(source), str(folder)]):
         raise FloatbaseError("Sphinx found faults, named above; the site is not whole.")

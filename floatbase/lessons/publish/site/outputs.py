@@ -15,28 +15,28 @@ import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
 
 import floatbase
-from floatbase.lessons.publish.notebooks import execute, read
-from floatbase.lessons.publish.site.words import linked
+from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook
+from floatbase.lessons.publish.site.references import add_links
 
-LIVE = "../run.md"
-AT_ONCE = 2  # lessons
-_SHARP = "%config InlineBackend.figure_format = 'retina'"
+RUN_PAGE = "../run.md"
+PARALLEL_RUNS = 2  # lessons
+_HIGH_RESOLUTION = "%config InlineBackend.figure_format = 'retina'"
 _INLINE = "module://matplotlib_inline.backend_inline"
-_CLAIMS = "claims of the text above, as code that fails if one is wrong"
-_WIDGET = "application/vnd.jupyter.widget-view+json"
-_TERMINAL = re.compile(r"\x1b\[[0-9;]*m")
+_CLAIMS_PROMPT = "claims of the text above, as code that fails if one is wrong"
+_WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
+_TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
-_OF_LEARNER = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)  # what they print is about the learner
+_LEARNER_CALLS = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)  # what they print is about the learner
 
 
-class Placing(Protocol):
+class PicturePlacer(Protocol):
     """What puts pictures into the site."""
 
     def place(self, data: Mapping[str, Any]) -> str | None:
         """HTML for an output's data that hold a picture, None for others."""
 
 
-def run_all(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
+def run_lessons(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
     """The lessons, run: path -> notebook with outputs. Those that are as they were when they ran last are taken from `kept`.
 
     kept: a folder, which is made, for what was run: a name holds a digest of the lesson and of the package.
@@ -45,19 +45,19 @@ def run_all(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
     source = _digest_of_package()
     files = {path: kept / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons}
     new = {path: file for path, file in files.items() if not file.exists()}
-    with ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn")) as pool:
-        for path in pool.map(_run, new, new.values()):
+    with ProcessPoolExecutor(PARALLEL_RUNS, mp_context=get_context("spawn")) as pool:
+        for path in pool.map(_run_lesson, new, new.values()):
             print(f"run: {path.name}", flush=True)
     for path, file in files.items():
         for former in set(kept.glob(f"{path.stem}-*.ipynb")) - {file}:
             former.unlink()
-    return {path: read(file) for path, file in files.items()}
+    return {path: read_notebook(file) for path, file in files.items()}
 
 
-def _run(path: Path, file: Path) -> Path:
-    notebook = read(path)
-    notebook.cells.insert(0, new_code_cell(_SHARP))
-    execute(notebook, path.parent, FLOATBASE_VIEWER="site", MPLBACKEND=_INLINE)
+def _run_lesson(path: Path, file: Path) -> Path:
+    notebook = read_notebook(path)
+    notebook.cells.insert(0, new_code_cell(_HIGH_RESOLUTION))
+    execute_notebook(notebook, path.parent, FLOATBASE_VIEWER="site", MPLBACKEND=_INLINE)
     notebook.cells.pop(0)
     part = file.with_suffix(".part")  # a build that was interrupted leaves no half
     nbformat.write(notebook, part)
@@ -79,7 +79,7 @@ def _digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 
 
-def prepared(notebook: Any, pictures: Placing, lessons: Mapping[str, str]) -> Any:
+def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str, str]) -> Any:
     """A lesson as Sphinx reads it. Changes it in place.
 
     notebook: with outputs. pictures: takes the 3-D pictures. lessons: number -> address.
@@ -88,9 +88,9 @@ def prepared(notebook: Any, pictures: Placing, lessons: Mapping[str, str]) -> An
     for i, cell in enumerate(notebook.cells):
         if cell.cell_type == "markdown":
             heading = (_HEADING.findall(cell.source) or [heading])[-1]
-            cell.source = linked(cell.source, lessons)
+            cell.source = add_links(cell.source, lessons)
         else:
-            notebook.cells[i] = _code(cell, heading, pictures)
+            notebook.cells[i] = _prepare_code_cell(cell, heading, pictures)
     notebook.metadata.pop("widgets", None)  # they live on no page without a kernel
     notebook.metadata["myst"] = {"html_meta": {"description": about}}
     return notebook
@@ -103,27 +103,27 @@ def _description(notebook: Any) -> str:
     return " ".join(re.sub(r"\[([^\]]*)\]\([^)]*\)|[*$`\\]", r"\1", paragraph).split())[:200]
 
 
-def _code(cell: Any, heading: str, pictures: Placing) -> Any:
+def _prepare_code_cell(cell: Any, heading: str, pictures: PicturePlacer) -> Any:
     tags = cell.metadata.get("tags", [])
     if "predict" in tags:
-        return new_markdown_cell(_question(cell))
+        return new_markdown_cell(_prediction_question(cell))
     if "check" in tags:
-        return new_markdown_cell(_live("The check of your answer, and hints, are in the live lesson"))
-    if _OF_LEARNER.search(cell.source):
-        return new_markdown_cell(_live("This is about what you said and solved, in the live lesson"))
+        return new_markdown_cell(_live_lesson_note("The check of your answer, and hints, are in the live lesson"))
+    if _LEARNER_CALLS.search(cell.source):
+        return new_markdown_cell(_live_lesson_note("This is about what you said and solved, in the live lesson"))
     if "claims" in tags:
         cell.metadata["tags"] = [*tags, "hide-input"]
-        cell.metadata["mystnb"] = {"code_prompt_show": _CLAIMS, "code_prompt_hide": _CLAIMS}
-    cell.outputs = [shown for output in cell.outputs for shown in _shown(output, pictures)]
+        cell.metadata["mystnb"] = {"code_prompt_show": _CLAIMS_PROMPT, "code_prompt_hide": _CLAIMS_PROMPT}
+    cell.outputs = [shown for output in cell.outputs for shown in _site_outputs(output, pictures)]
     _describe_figure(cell, heading)
     return cell
 
 
-def _live(text: str) -> str:
-    return f":::{{div}} live\n{text}: [how to run it]({LIVE}).\n:::"
+def _live_lesson_note(text: str) -> str:
+    return f":::{{div}} live\n{text}: [how to run it]({RUN_PAGE}).\n:::"
 
 
-def _question(cell: Any) -> str:
+def _prediction_question(cell: Any) -> str:
     """What a prediction asks for, in words."""
     call = next(
         node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
@@ -135,21 +135,21 @@ def _question(cell: Any) -> str:
         count, unit = given.get("count", 1), given.get("unit", "")
         wanted = ("a number" if count == 1 else f"{count} numbers") + (f", in {unit}" if unit else "")
     asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
-    return f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({LIVE}); here, think first.\n:::"
+    return f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({RUN_PAGE}); here, think first.\n:::"
 
 
-def _shown(output: Any, pictures: Placing) -> list[Any]:
+def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
     """An output as a page can show it, in a list; none where it is about the run alone."""
     if output.output_type == "stream":
-        output.text = _TERMINAL.sub("", output.text)
+        output.text = _TERMINAL_CODES.sub("", output.text)
         return [output] if output.name == "stdout" else []
     if output.output_type == "error":
         return [output]
     placed = pictures.place(output.data)
     if placed is not None:
         return [new_output("display_data", {"text/html": placed})]
-    data = {kind: value for kind, value in output.data.items() if kind != _WIDGET}
-    if _WIDGET in output.data and "image/png" not in data:
+    data = {kind: value for kind, value in output.data.items() if kind != _WIDGET_MIME}
+    if _WIDGET_MIME in output.data and "image/png" not in data:
         return []
     return [new_output("display_data", data, metadata=output.metadata)]
 

@@ -8,20 +8,20 @@ from typing import Any
 
 import floatbase
 from floatbase.lessons.publish.site.addresses import ROOMS, addresses, exported, members
-from floatbase.lessons.publish.site.docstrings import restructured
+from floatbase.lessons.publish.site.docstrings import to_restructured_text
 
-_LONGEST = 90  # characters of a constant's value that are shown
+_MAX_VALUE_LENGTH = 90  # characters of a constant's value that are shown
 
 
 def pages() -> dict[str, str]:
     """File name -> text, reStructuredText, of all pages of the library, with one that lists them."""
     listed = "\n".join(f"   {room} <{room}>" for room in ROOMS)
     rows = "\n".join(f"* :doc:`{room}`: {about}" for room, about in ROOMS.items())
-    index = f"{_meta('floatbase')}{_title('Library')}{_FRONT}\n\n{rows}\n\n.. toctree::\n   :hidden:\n\n{listed}\n"
-    return {"index.rst": index, **{f"{room}.rst": _page(room) for room in ROOMS}}
+    index = f"{_meta_description('floatbase')}{_title('Library')}{_INTRODUCTION}\n\n{rows}\n\n.. toctree::\n   :hidden:\n\n{listed}\n"
+    return {"index.rst": index, **{f"{room}.rst": _package_page(room) for room in ROOMS}}
 
 
-_FRONT = (
+_INTRODUCTION = (
     "``import floatbase as fb`` has the names that most programs need; everything else is imported from its room. Each page "
     "lists what its room exports. A number such as :ref:`(9) <eq-9>` leads to the equation; symbols, frames, signs and units "
     "are those of :doc:`the conventions </lessons/conventions>`."
@@ -32,17 +32,17 @@ def _is_code(value: Any) -> bool:
     return inspect.isclass(value) or inspect.isroutine(value) or hasattr(value, "__wrapped__")
 
 
-def _page(room: str) -> str:
-    head = f"{_meta(room)}{_title(room)}.. automodule:: {room}\n   :no-members:\n\n"
+def _package_page(room: str) -> str:
+    head = f"{_meta_description(room)}{_title(room)}.. automodule:: {room}\n   :no-members:\n\n"
     if room == "floatbase":
         known = addresses()
-        return head + _table([(f"fb.{name}", known[name], getattr(floatbase, name)) for name in floatbase.__all__])
+        return head + _name_table([(f"fb.{name}", known[name], getattr(floatbase, name)) for name in floatbase.__all__])
     things = [(name, f"{room}.{name}", value) for name, value in exported(room)]
     shown = [(name, address, value) for name, address, value in things if _is_code(value) or isinstance(value, ModuleType)]
-    return head + _table(shown) + "\n".join(_entry(*thing) for thing in things)
+    return head + _name_table(shown) + "\n".join(_autodoc_entry(*thing) for thing in things)
 
 
-def _meta(room: str) -> str:
+def _meta_description(room: str) -> str:
     return f".. meta::\n   :description: The library floatbase, {room}: {ROOMS[room]}\n\n"
 
 
@@ -50,20 +50,20 @@ def _title(text: str) -> str:
     return f"{text}\n{'=' * len(text)}\n\n"
 
 
-def _table(things: list[tuple[str, str, Any]]) -> str:
+def _name_table(things: list[tuple[str, str, Any]]) -> str:
     """Names, linked, with the beginning of what they say."""
     rows = [".. list-table::", "   :class: names", ""]
     for name, address, value in things:
         first = (inspect.getdoc(value) or "").split("\n\n")[0]
-        rows += [f"   * - :py:obj:`{name} <{address}>`", f"     - {restructured(first, ()).strip()}"]
+        rows += [f"   * - :py:obj:`{name} <{address}>`", f"     - {to_restructured_text(first, ()).strip()}"]
     return "\n".join([*rows, "", ""])
 
 
-def _entry(name: str, address: str, value: Any) -> str:
+def _autodoc_entry(name: str, address: str, value: Any) -> str:
     """Sphinx's order to print what a name says."""
     if isinstance(value, ModuleType):
         head = f"{address}\n{'-' * len(address)}\n\n.. automodule:: {value.__name__}\n   :no-members:\n   :no-index:\n\n"
-        return head + "\n".join(_entry(inner, f"{address}.{inner}", each) for inner, each in exported(value.__name__))
+        return head + "\n".join(_autodoc_entry(inner, f"{address}.{inner}", each) for inner, each in exported(value.__name__))
     if inspect.isclass(value):
         kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
         return (
@@ -74,5 +74,5 @@ def _entry(name: str, address: str, value: Any) -> str:
     if _is_code(value):
         return f".. autofunction:: {address}\n"
     text = repr(value)
-    shown = f"\n   :value: {text}" if len(text) <= _LONGEST and "\n" not in text and " at 0x" not in text else ""
+    shown = f"\n   :value: {text}" if len(text) <= _MAX_VALUE_LENGTH and "\n" not in text and " at 0x" not in text else ""
     return f".. py:data:: {address}{shown}\n"

@@ -8,35 +8,35 @@ from pathlib import Path
 
 from floatbase.lessons.publish.formulas import FORMULAS, SECTIONS
 
-NOTES = "notes-of-the-document"
+NOTES_ANCHOR = "notes-of-the-document"
 _NUMBERS = {formula.number for formula in FORMULAS}
 _SECTIONS = {section.number for section in SECTIONS}
 # what is left as it is: code, formulas, links, headings, HTML, fences
-_KEPT = r"```.*?```|`[^`\n]*`|\$\$.+?\$\$|\$[^$\n]+?\$|!?\[[^\]\n]*\]\([^)\n]*\)|^#.*?$|<[^>\n]+>"
-NAMED = re.compile(
+_NOT_LINKED = r"```.*?```|`[^`\n]*`|\$\$.+?\$\$|\$[^$\n]+?\$|!?\[[^\]\n]*\]\([^)\n]*\)|^#.*?$|<[^>\n]+>"
+REFERENCE = re.compile(
     r"(?<![\w\]])(?P<equation>\(\d{1,2}\))|(?P<section>§\d(?:\.\d)?)|(?P<appendix>App(?:\.|endix) [ABC])\b"
     r"|(?P<note>\bnotes? \d+)|(?P<lesson>\b[Ll]esson (?:\d\d|[A-Z])\b)"
 )
-_TO_LESSON = re.compile(r"\[([^\]]*)\]\((?:lessons/)?([^:()/]+\.ipynb)\)")
-_IN_MARKDOWN = re.compile(f"(?P<kept>{_KEPT})|{NAMED.pattern}", re.DOTALL | re.MULTILINE)
+_LESSON_LINK = re.compile(r"\[([^\]]*)\]\((?:lessons/)?([^:()/]+\.ipynb)\)")
+_IN_MARKDOWN = re.compile(f"(?P<kept>{_NOT_LINKED})|{REFERENCE.pattern}", re.DOTALL | re.MULTILINE)
 
 
-def anchor(number: str) -> str:
+def anchor_of(number: str) -> str:
     """The name of a place in the map: of "(9)" eq-9, of "§2.1" sec-2-1, of "App. A" app-a."""
     if number.startswith("App"):
         return f"app-{number[-1].lower()}"
     return f"sec-{number[1:].replace('.', '-')}" if number.startswith("§") else f"eq-{number.strip('()')}"
 
 
-def place(match: re.Match[str]) -> str:
-    """The place in the map that a match of `NAMED` leads to; "" where it leads nowhere, or to a lesson."""
+def target_of(match: re.Match[str]) -> str:
+    """The place in the map that a match of `REFERENCE` leads to; "" where it leads nowhere, or to a lesson."""
     if match["note"]:
-        return NOTES
+        return NOTES_ANCHOR
     named = match["equation"] or match["section"] or (match["appendix"] or "").replace("endix", ".")
-    return anchor(named) if named in _NUMBERS | _SECTIONS else ""
+    return anchor_of(named) if named in _NUMBERS | _SECTIONS else ""
 
 
-def linked(markdown: str, lessons: Mapping[str, str]) -> str:
+def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
     """Markdown with links to the map and to lessons; what links to a lesson that is not there is text.
 
     lessons: number -> address, such as "05" -> "05_centre_of_mass.ipynb".
@@ -45,9 +45,9 @@ def linked(markdown: str, lessons: Mapping[str, str]) -> str:
 
     def link(match: re.Match[str]) -> str:
         if match["kept"]:
-            to_lesson = _TO_LESSON.fullmatch(match[0])
+            to_lesson = _LESSON_LINK.fullmatch(match[0])
             return to_lesson[1] if to_lesson and to_lesson[2] not in names else match[0]
-        address = lessons.get(match["lesson"].split()[1], "") if match["lesson"] else f"#{place(match)}"
+        address = lessons.get(match["lesson"].split()[1], "") if match["lesson"] else f"#{target_of(match)}"
         return f"[{match[0]}]({address})" if len(address) > 1 else match[0]
 
     return _IN_MARKDOWN.sub(link, markdown)

@@ -4,16 +4,21 @@ from itertools import combinations
 
 import numpy as np
 
-from floatbase.lessons.lessonX.box import BlackBox
-from floatbase.lessons.lessonX.tools import ground_normal, lagged, needed, sliding
+from floatbase.lessons.lessonX.black_box import BlackBox
+from floatbase.lessons.lessonX.diagnostics import (
+    ground_normal,
+    lagged,
+    required_forces,
+    sliding_friction_ratios,
+)
 
 
 def investigate(box: BlackBox) -> str:
     """A fault with its evidence, or "nothing"."""
-    return of_plan(box) or of_motors(box) or of_ground(box) or "nothing"
+    return plan_fault(box) or motor_fault(box) or ground_fault(box) or "nothing"
 
 
-def of_plan(box: BlackBox) -> str:
+def plan_fault(box: BlackBox) -> str:
     """Did the controller plan a motion that is possible?"""
     rows = [(i, box.equations(i)) for i in range(0, len(box), 5)]
     left = np.array([e.M @ box.qdd[i] + e.h for i, e in rows])
@@ -27,9 +32,9 @@ def of_plan(box: BlackBox) -> str:
     return f"drift {b:.2f} m/s²" if asked < 0.1 * b else ""
 
 
-def of_motors(box: BlackBox) -> str:
+def motor_fault(box: BlackBox) -> str:
     """Did the joints get what was ordered?"""
-    got, told = needed(box)[:, 6:], box.tau[:-1]
+    got, told = required_forces(box)[:, 6:], box.tau[:-1]
     off = np.median(abs(told - got), axis=0)
     if off.max() < 0.5:  # N·m
         return ""
@@ -38,10 +43,12 @@ def of_motors(box: BlackBox) -> str:
     late = [np.median(abs(lagged(told, period, ms) - got)) for ms in constants]
     if min(late) < 0.3 * late[0]:
         return f"slow motors {constants[np.argmin(late)]} ms"
-    return exchanged(box, got, told, off)
+    return swapped_joints(box, got, told, off)
 
 
-def exchanged(box: BlackBox, got: np.ndarray, told: np.ndarray, off: np.ndarray) -> str:
+def swapped_joints(
+    box: BlackBox, got: np.ndarray, told: np.ndarray, off: np.ndarray
+) -> str:
     """Two joints that got each other's orders, as far as their motors can."""
     names, limits = box.robot.joint_names, box.robot.torque_limits
     best, found = 0.3, ""
@@ -54,13 +61,13 @@ def exchanged(box: BlackBox, got: np.ndarray, told: np.ndarray, off: np.ndarray)
     return found
 
 
-def of_ground(box: BlackBox) -> str:
+def ground_fault(box: BlackBox) -> str:
     """Is the ground what the controller was told?"""
     normal, told = ground_normal(box), box.contacts.normals[0]
     angle = np.rad2deg(np.arccos(min(1.0, normal @ told)))
     if angle > 5:
         return f"normal {angle:.1f}°"
-    used = sliding(box, normal)
+    used = sliding_friction_ratios(box, normal)
     if len(used) < 10:
         return ""
     mu = np.percentile(used, 90)

@@ -16,7 +16,7 @@ from hints import LIFTED, ODD
 import floatbase as fb
 from floatbase.errors import InputError
 from floatbase.lessons import all_exercises, check, hand_in, predict, progress
-from floatbase.lessons.publish import FOLDER, grades, read, write_solutions
+from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook, write_solutions
 
 
 @pytest.fixture(autouse=True)
@@ -61,22 +61,22 @@ def test_a_file_is_judged_again_and_its_claims_do_not_count(learner: Path, capsy
     predict("02.c", 12.5, unit="mm")
     path = hand_in("Ada Lovelace")
     assert path.name == "answers-Ada_Lovelace.json" and "1 of" in capsys.readouterr().out
-    marks = {mark.exercise: mark for mark in grades.judged(path).marks}
+    marks = {mark.exercise: mark for mark in grades.grade_file(path).results}
     assert (marks["00.1"].result, marks["00.1"].tries) == ("right", 3)
-    assert (marks["03.1"].result, marks["01.1"].result, grades.judged(path).predicted) == ("wrong", "·", 1)
+    assert (marks["03.1"].result, marks["01.1"].result, grades.grade_file(path).predicted) == ("wrong", "·", 1)
 
     claimed = json.loads(path.read_text())
     claimed["exercises"]["00.1"]["answer"] = 7.0
     claimed["exercises"]["01.1"] = {"tries": 1, "right": 1, "answer": [0.0, 0.0, 0.0]}
     path.write_text(json.dumps(claimed))
-    assert {mark.result for mark in grades.judged(path).marks if mark.exercise in ("00.1", "01.1")} == {"wrong"}
+    assert {mark.result for mark in grades.grade_file(path).results if mark.exercise in ("00.1", "01.1")} == {"wrong"}
 
 
 def test_who_solved_an_exercise_before_answers_were_kept_is_asked_to_check_it_again(
     learner: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    progress.keep("00.1", {"tries": 1, "right": 1})
-    progress.keep("99.1", {"tries": 1, "right": 1})  # of another course
+    progress.append("00.1", {"tries": 1, "right": 1})
+    progress.append("99.1", {"tries": 1, "right": 1})  # of another course
     hand_in("Ada")
     said = capsys.readouterr().out
     assert "1 of" in said and "your answers to 00.1: check them once more" in said
@@ -94,7 +94,7 @@ def test_code_is_kept_to_be_read_and_never_run(learner: Path) -> None:
     check("C.3", row_to_drop)
     before = len(ran)
     path = hand_in("Ada")
-    out = grades.code_to_read([grades.judged(path)])
+    out = grades.code_to_read([grades.grade_file(path)])
     assert len(ran) == before > 0
     assert "    def row_to_drop" in out and "--- Ada, C.3" in out
     assert [line for line in out.splitlines() if not line.startswith("    ") and line.strip()] == ["--- Ada, C.3"]
@@ -112,8 +112,8 @@ def test_an_answer_of_any_form_is_judged_without_an_error(learner: Path, kept: A
     found = {"form": "answers to the floatbase course", "name": "\x1b[2J=1", "predictions": {}}
     path = learner / "a.json"
     path.write_text(json.dumps(found | {"exercises": dict.fromkeys(all_exercises(), entry) | {"99.1": 5}}))
-    handed_in = grades.judged(path)
-    assert {mark.result for mark in handed_in.marks} == {"wrong"}
+    handed_in = grades.grade_file(path)
+    assert {mark.result for mark in handed_in.results} == {"wrong"}
     assert handed_in.name.isprintable()
 
 
@@ -124,9 +124,9 @@ NO_FILE = ("", "null", "[]", "{", '{"form": 5}', "[" * 100_000, '{"form": "answe
 def test_what_hand_in_did_not_write_is_told(learner: Path, text: str) -> None:
     (learner / "a.json").write_text(text)
     with pytest.raises(InputError, match="is not a file that hand_in"):
-        grades.judged(learner / "a.json")
+        grades.grade_file(learner / "a.json")
     with pytest.raises(InputError, match="cannot be read"):
-        grades.judged(learner / "none.json")
+        grades.grade_file(learner / "none.json")
 
 
 def test_nothing_to_hand_in_no_name_and_no_place_are_told(learner: Path) -> None:
@@ -155,7 +155,7 @@ def test_a_class_is_one_table(learner: Path) -> None:
     assert {row["file"] for row in rows} == {Path(file).name for file in files}
     assert {row["name"] for row in rows} == {"Ada", "Émilie du Châtelet", "'=1+1"}
     with pytest.raises(InputError, match="No file is left to judge"):
-        grades.grade([learner / "holiday.json"])
+        grades.grade_files([learner / "holiday.json"])
 
 
 def test_the_last_right_answer_is_kept_or_else_the_last(learner: Path) -> None:
@@ -168,10 +168,10 @@ def test_the_last_right_answer_is_kept_or_else_the_last(learner: Path) -> None:
 
 
 def test_solutions_for_teachers_stand_in_the_lessons(learner: Path) -> None:
-    lesson = FOLDER / "02_equations_of_motion.ipynb"
+    lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
     (path,) = write_solutions(learner / "solutions", [lesson])
-    cells = read(path).cells
+    cells = read_notebook(path).cells
     solutions = {name: e.solution for name, e in all_exercises().items() if name.startswith("02.")}
     assert {c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata} == solutions
     explained = sum(bool(all_exercises()[name].explanation) for name in solutions)
-    assert len(cells) == len(read(lesson).cells) + explained
+    assert len(cells) == len(read_notebook(lesson).cells) + explained

@@ -13,7 +13,7 @@ from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.exercises import all_exercises
 
-FORM = "answers to the floatbase course"
+FILE_FORMAT = "answers to the floatbase course"
 
 
 def hand_in(name: str, folder: str | Path = ".") -> Path:
@@ -30,7 +30,7 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         raise InputError(f"there is nothing to hand in yet: no answer and no prediction is kept in {progress.path()}.")
     exercises = {key: {**entry, "answer": answers.get(key)} for key, entry in tried.items()}
     written = {
-        "form": FORM, "name": name.strip(), "floatbase": fb.__version__,
+        "form": FILE_FORMAT, "name": name.strip(), "floatbase": fb.__version__,
         "time": datetime.now().astimezone().isoformat(timespec="seconds"), "exercises": exercises, "predictions": predicted,
     }  # fmt: skip
     file_name = "_".join(re.findall(r"\w+", name))

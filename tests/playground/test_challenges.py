@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.playground import CARDS, PERIOD, Card, Judge, Session, Settings
+from floatbase.playground import CHALLENGES, PERIOD, Challenge, Judge, Session, Settings
 
 GO2 = judges.load("go2")
 SLICE = 1.0 / 30.0  # s
@@ -21,7 +21,7 @@ def change(**changes: object) -> Act:
     def act(session: Session) -> None:
         if session.change(**changes):
             session.sim.reset()
-            session.restart()
+            session.after_reset()
 
     return act
 
@@ -32,12 +32,12 @@ def push(force: float, towards: float) -> Act:
 
 
 SOLUTIONS: dict[str, list[tuple[float, Act]]] = {
-    "Stand on two feet": [(0.0, change(shift=(-0.02, 0.0, 0.0))), (0.5, change(lifted=("FR_foot", "RL_foot")))],
-    "Survive 300 N": [(0.0, change(catches=True)), (0.3, push(300.0, 90.0))],
+    "Stand on two feet": [(0.0, change(com_shift=(-0.02, 0.0, 0.0))), (0.5, change(lifted_feet=("FR_foot", "RL_foot")))],
+    "Survive 300 N": [(0.0, change(steps_when_pushed=True)), (0.3, push(300.0, 90.0))],
     "Down an icy slope": [(0.0, change(slope=(20.0, 20.0), friction=(0.2, 0.2)))],
     "On an edge": [(0.0, change(friction=(0.1, 0.7))), (0.5, push(60.0, 45.0))],
-    "No answer": [(0.2, change(torque=0.1, least_force=60.0))],
-    "Quick foot": [(0.0, change(shift=(-0.05, -0.03, 0.0))), (1.0, change(lifted=("FL_foot",)))],
+    "No answer": [(0.2, change(torque_fraction=0.1, min_normal_force=60.0))],
+    "Quick foot": [(0.0, change(com_shift=(-0.05, -0.03, 0.0))), (1.0, change(lifted_feet=("FL_foot",)))],
     "Feet that travel": [(0.0, change(nod=0.3))],
     "On ice": [(0.0, change(friction=(0.05, 0.05))), (0.5, push(10.0, 0.0))],
     "How many facets?": [(0.0, change(facets=13))],
@@ -45,9 +45,9 @@ SOLUTIONS: dict[str, list[tuple[float, Act]]] = {
 }
 
 
-def play(card: Card, script: list[tuple[float, Act]], seconds: float = 8.0) -> Judge:
-    """Run a card as the page does, slice by slice, without a page."""
-    session, judge = Session(GO2, card.start), card.judge()
+def play(challenge: Challenge, script: list[tuple[float, Act]], seconds: float = 8.0) -> Judge:
+    """Run a challenge as the page does, slice by slice, without a page."""
+    session, judge = Session(GO2, challenge.start), challenge.judge()
     waiting, pushes = list(script), []
     while session.sim.time < seconds and not judge.won:
         while waiting and session.sim.time >= waiting[0][0]:
@@ -59,41 +59,41 @@ def play(card: Card, script: list[tuple[float, Act]], seconds: float = 8.0) -> J
         record = fb.rollout(
             session.sim, session.controller, duration, acting, control_period=PERIOD, actuators=session.actuators
         )
-        session.see(record)
-        judge.see(record, session)
+        session.observe(record)
+        judge.observe(record, session)
         if record.outcome != "completed":
-            judge.ended(record.outcome if record.error is None else f"{record.outcome}: {record.error}", session)
+            judge.run_ended(record.outcome if record.error is None else f"{record.outcome}: {record.error}", session)
             break
     return judge
 
 
 def test_there_are_ten() -> None:
-    assert [card.title for card in CARDS] == list(SOLUTIONS) and len(CARDS) == 10
+    assert [challenge.title for challenge in CHALLENGES] == list(SOLUTIONS) and len(CHALLENGES) == 10
 
 
-@pytest.mark.parametrize("card", CARDS, ids=lambda card: card.title)
-def test_a_card_can_be_solved(card: Card) -> None:
-    judge = play(card, SOLUTIONS[card.title])
-    assert judge.won and judge.says.startswith("Solved"), judge.says
+@pytest.mark.parametrize("challenge", CHALLENGES, ids=lambda challenge: challenge.title)
+def test_a_card_can_be_solved(challenge: Challenge) -> None:
+    judge = play(challenge, SOLUTIONS[challenge.title])
+    assert judge.won and judge.message.startswith("Solved"), judge.message
 
 
-@pytest.mark.parametrize("card", CARDS, ids=lambda card: card.title)
-def test_nobody_wins_by_waiting(card: Card) -> None:
-    judge = play(card, [], 3.0)
-    assert not judge.won and judge.says
+@pytest.mark.parametrize("challenge", CHALLENGES, ids=lambda challenge: challenge.title)
+def test_nobody_wins_by_waiting(challenge: Challenge) -> None:
+    judge = play(challenge, [], 3.0)
+    assert not judge.won and judge.message
 
 
-@pytest.mark.parametrize("card", [card for card in CARDS if "mass" in card.fixed], ids=lambda card: card.title)
-def test_what_may_not_be_changed_is_seen(card: Card) -> None:
-    judge = play(card, [(0.0, change(mass=(1.0, 0.9))), *SOLUTIONS[card.title]], 2.0)
-    assert not judge.won and "mass" in judge.says
+@pytest.mark.parametrize("challenge", [challenge for challenge in CHALLENGES if "mass" in challenge.locked], ids=lambda challenge: challenge.title)
+def test_what_may_not_be_changed_is_seen(challenge: Challenge) -> None:
+    judge = play(challenge, [(0.0, change(mass=(1.0, 0.9))), *SOLUTIONS[challenge.title]], 2.0)
+    assert not judge.won and "mass" in judge.message
 
 
 NEARLY = {
-    "Stand on two feet": [(0.5, change(lifted=("FR_foot", "RL_foot")))],
-    "Survive 300 N": [(0.0, change(catches=True)), (0.3, push(290.0, 90.0))],
+    "Stand on two feet": [(0.5, change(lifted_feet=("FR_foot", "RL_foot")))],
+    "Survive 300 N": [(0.0, change(steps_when_pushed=True)), (0.3, push(290.0, 90.0))],
     "Down an icy slope": [(0.0, change(friction=(0.7, 0.2)))],
-    "Quick foot": [(0.5, change(lifted=("FL_foot",)))],
+    "Quick foot": [(0.5, change(lifted_feet=("FL_foot",)))],
     "On ice": [(0.5, push(8.0, 0.0))],
     "How many facets?": [(0.0, change(facets=14))],
     "The weakest side": [(0.3, push(215.0, 0.0))],
@@ -103,9 +103,9 @@ NEARLY = {
 
 @pytest.mark.parametrize("title", NEARLY)
 def test_nearly_is_not_enough(title: str) -> None:
-    card = next(card for card in CARDS if card.title == title)
-    judge = play(card, NEARLY[title], 4.0)
-    assert not judge.won, judge.says
+    challenge = next(challenge for challenge in CHALLENGES if challenge.title == title)
+    judge = play(challenge, NEARLY[title], 4.0)
+    assert not judge.won, judge.message
 
 
 CHEATS = {
@@ -115,13 +115,13 @@ CHEATS = {
         [(0.0, change(slope=(0.0, 0.0), friction=(0.7, 1.0))), (0.1, change(gait="trot", velocity=(0.4, 0.0, 0.0)))],
     ),
     "pushed three times": ("The weakest side", [(0.3, push(215.0, 0.0)), (0.45, push(150.0, 0.0)), (0.6, push(150.0, 0.0))]),
-    "on weak motors": ("The weakest side", [(0.0, change(torque=0.5)), (0.3, push(190.0, 90.0))]),
+    "on weak motors": ("The weakest side", [(0.0, change(torque_fraction=0.5)), (0.3, push(190.0, 90.0))]),
     "past the number": ("How many facets?", [(0.1 * i, change(facets=3 + i)) for i in range(14)]),
     "without weight for a while": (
         "Stand on two feet",
         [
-            (0.0, change(shift=(-0.02, 0.0, 0.0))),
-            (0.5, change(lifted=("FR_foot", "RL_foot"), mass=(0.9, 0.9))),
+            (0.0, change(com_shift=(-0.02, 0.0, 0.0))),
+            (0.5, change(lifted_feet=("FR_foot", "RL_foot"), mass=(0.9, 0.9))),
             (1.2, change(mass=(1.0, 1.0))),
         ],
     ),
@@ -131,26 +131,26 @@ CHEATS = {
 @pytest.mark.parametrize("how", CHEATS)
 def test_nobody_wins_by_a_trick(how: str) -> None:
     title, script = CHEATS[how]
-    judge = play(next(card for card in CARDS if card.title == title), script, 7.0)
-    assert not judge.won, judge.says
+    judge = play(next(challenge for challenge in CHALLENGES if challenge.title == title), script, 7.0)
+    assert not judge.won, judge.message
 
 
-@pytest.mark.parametrize("title", [card.title for card in CARDS])
+@pytest.mark.parametrize("title", [challenge.title for challenge in CHALLENGES])
 def test_a_judge_watches_a_robot_whose_stance_changes(title: str) -> None:
-    lift, lower = change(lifted=("FL_foot",)), change(lifted=())
-    judge = play(next(card for card in CARDS if card.title == title), [(0.1, push(12.0, 0.0)), (0.3, lift), (0.6, lower)], 0.9)
-    assert judge.says
+    lift, lower = change(lifted_feet=("FL_foot",)), change(lifted_feet=())
+    judge = play(next(challenge for challenge in CHALLENGES if challenge.title == title), [(0.1, push(12.0, 0.0)), (0.3, lift), (0.6, lower)], 0.9)
+    assert judge.message
 
 
 def test_a_push_of_300_n_counts_in_every_direction() -> None:
-    judge, session = next(card for card in CARDS if card.title == "Survive 300 N").judge(), Session(GO2)
+    judge, session = next(challenge for challenge in CHALLENGES if challenge.title == "Survive 300 N").judge(), Session(GO2)
     record = fb.rollout(session.sim, session.controller, 0.008, control_period=4e-3)
     for angle in np.deg2rad(np.arange(-180.0, 181.0, 5.0)):
         judge.pushes = [fb.Push(300.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))]
-        judge.see(record, session)
-        assert judge.says.startswith("On its feet")
+        judge.observe(record, session)
+        assert judge.message.startswith("On its feet")
 
 
 def test_a_start_is_a_setting_that_the_card_itself_allows() -> None:
-    for card in CARDS:
-        assert isinstance(card.start, Settings) and all(hasattr(card.start, name) for name in card.fixed)
+    for challenge in CHALLENGES:
+        assert isinstance(challenge.start, Settings) and all(hasattr(challenge.start, name) for name in challenge.locked)

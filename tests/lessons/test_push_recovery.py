@@ -12,54 +12,54 @@ import pytest
 import floatbase as fb
 from floatbase import lessons
 from floatbase.errors import InputError
-from floatbase.lessons import draw_roses, measured_rose, plot_roses, rose_controller
+from floatbase.lessons import controller_factory, draw_push_recovery, measured_push_recovery, plot_push_recovery
 
 SECOND = "09 standing"  # a second rose of a lesson's own
-KEPT = json.loads((Path(lessons.__file__).parent / "roses.json").read_text(encoding="utf-8"))
+STORED = json.loads((Path(lessons.__file__).parent / "push_recovery.json").read_text(encoding="utf-8"))
 PART = 0.6  # of the kept push is survived and 1 / PART of it is not, on any processor: a fall amplifies rounding
 
 
-@pytest.mark.parametrize("lesson", sorted(KEPT))
+@pytest.mark.parametrize("lesson", sorted(STORED))
 def test_what_is_kept_is_what_the_physics_says(lesson: str) -> None:
-    rose = measured_rose(lesson)
+    recovery = measured_push_recovery(lesson)
     outcomes = []
     for factor in (PART, 1 / PART):
-        controller = rose_controller(lesson)()
-        push = fb.Push(factor * rose.pushes[2] * rose.unit_vectors[2], start=0.2, duration=rose.duration)
+        controller = controller_factory(lesson)()
+        push = fb.Push(factor * recovery.pushes[2] * recovery.unit_vectors[2], start=0.2, duration=recovery.duration)
         outcomes.append(fb.rollout(fb.Simulation(controller.robot), controller, 1.8, [push]).outcome)
     assert outcomes[0] == "completed" != outcomes[1]
 
 
-@pytest.mark.parametrize("lesson", [name for name in sorted(KEPT) if " " not in name])
+@pytest.mark.parametrize("lesson", [name for name in sorted(STORED) if " " not in name])
 def test_the_former_lesson_is_grey_or_a_second_rose_of_the_same_robot(lesson: str) -> None:
-    axis = plot_roses(lesson)
-    own = [name for name in KEPT if name.startswith(f"{lesson} ")]
-    former = own or [name for name in sorted(KEPT) if name < lesson and " " not in name][-1:]
-    robots = {measured_rose(name).state.robot.name for name in [lesson, *former]}
+    axis = plot_push_recovery(lesson)
+    own = [name for name in STORED if name.startswith(f"{lesson} ")]
+    former = own or [name for name in sorted(STORED) if name < lesson and " " not in name][-1:]
+    robots = {measured_push_recovery(name).state.robot.name for name in [lesson, *former]}
     assert len(robots) == 1
-    expected = [measured_rose(name).pushes for name in [lesson, *former]]
+    expected = [measured_push_recovery(name).pushes for name in [lesson, *former]]
     assert np.array_equal([line.get_ydata()[:-1] for line in axis.get_lines()], expected)
     plt.close(axis.figure)
-    assert {path.split("/")[0] for path in draw_roses(lesson)} == {"push_recovery", *["previous" for _ in former]}
+    assert {path.split("/")[0] for path in draw_push_recovery(lesson)} == {"push_recovery", *["previous" for _ in former]}
 
 
 def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> None:
-    assert rose_controller(SECOND)().stepping_gait is None is not rose_controller(SECOND.split()[0])().stepping_gait
-    assert len(plot_roses(SECOND).get_lines()) == 1
+    assert controller_factory(SECOND)().stepping_gait is None is not controller_factory(SECOND.split()[0])().stepping_gait
+    assert len(plot_push_recovery(SECOND).get_lines()) == 1
     plt.close("all")
     with pytest.raises(InputError, match="no controller to push"):
-        rose_controller("09 flying")
+        controller_factory("09 flying")
 
 
 @pytest.mark.parametrize("scale", [0.002, 0.003])
 def test_roses_on_the_ground_are_drawn_in_a_scale_that_is_asked_for(scale: float) -> None:
-    items = draw_roses("06", scale)
+    items = draw_push_recovery("06", scale)
     apart = items["push_recovery/label 200 N"].matrix[:2, 3] - items["push_recovery/label 100 N"].matrix[:2, 3]
     assert np.isclose(np.linalg.norm(apart), 100.0 * scale)
 
 
 def test_lessons_without_a_rose_are_told() -> None:
     with pytest.raises(InputError, match="no push rose"):
-        measured_rose("00")
+        measured_push_recovery("00")
     with pytest.raises(InputError, match="no controller to push"):
-        rose_controller("00")
+        controller_factory("00")

@@ -10,24 +10,24 @@ from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.viewer import Picture, markers, prefixed, shapes
 from floatbase.viewer.scene.colours import COM, MEASURED
 
-_PER_ACCELERATION = 0.03  # m of arrow per m/s², of the feet's drift
-_TEXT = 0.06  # height of letters, over the size of the robot
-_LEVER = 0.3  # m, of the force that a torque is drawn as
-_SHORTEST = 5e-3  # m: shorter arrows are not drawn
+_ACCELERATION_SCALE = 0.03  # m of arrow per m/s², of the feet's drift
+_TEXT_SIZE = 0.06  # height of letters, over the size of the robot
+_TORQUE_LEVER = 0.3  # m, of the force that a torque is drawn as
+_MIN_LENGTH = 5e-3  # m: shorter arrows are not drawn
 
-MEANINGS = {  # term: (colour of its arrows, what they are)
+TERM_LEGEND = {  # term: (colour of its arrows, what they are)
     "inertia": (COM, "m a, mass times acceleration"),
     "velocity": (COM, "C q̇, Coriolis and centrifugal force"),
     "gravity": (COM, "m g, weight"),
     "zeros": (MEASURED, "τ, torques of the joints"),
     "drift": (COM, "J̇ q̇, drift of the feet"),
 }
-_ROWS = {"inertia": 0.25, "velocity": 0.37, "gravity": 0.49, "zeros": 0.61, "drift": 0.73}  # of words, over the robot's size
-_OF_MASS = ("inertia", "velocity", "gravity")
-_BEHIND = 1.1  # times its size behind its centre of mass, where no arrow stands
+_WORD_HEIGHTS = {"inertia": 0.25, "velocity": 0.37, "gravity": 0.49, "zeros": 0.61, "drift": 0.73}  # of words, over the robot's size
+_PROPORTIONAL_TO_MASS = ("inertia", "velocity", "gravity")
+_WORD_DISTANCE = 1.1  # times its size behind its centre of mass, where no arrow stands
 
 
-def arrows(
+def term_arrows(
     term: str,
     record: fb.Rollout,
     scale: float,
@@ -43,23 +43,23 @@ def arrows(
     off: terms that the world does not have: gravity and C q̇ have no arrow then.
     mass: all masses of the world as a multiple of the data sheet's. M q̈, C q̇ and g are drawn with it, as they truly are.
     """
-    if term not in MEANINGS:
+    if term not in TERM_LEGEND:
         return {}
     made = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity, "zeros": _torques, "drift": _drift}
     lacking = term in off and term in ("gravity", "velocity")
-    drawn = {} if lacking else made[term](record, scale * (mass if term in _OF_MASS else 1.0), size)
+    drawn = {} if lacking else made[term](record, scale * (mass if term in _PROPORTIONAL_TO_MASS else 1.0), size)
     if drawn:
         return prefixed(f"term {term}", drawn)
-    words = MEANINGS[term][1].split(",")[0] + (": switched off" if lacking else " ≈ 0")
-    at = np.array(record.final.com) + [-_BEHIND * size, 0.0, _ROWS[term] * size]
-    return {f"word {term}": shapes.label(at, words, _TEXT * size)}
+    words = TERM_LEGEND[term][1].split(",")[0] + (": switched off" if lacking else " ≈ 0")
+    at = np.array(record.final.com) + [-_WORD_DISTANCE * size, 0.0, _WORD_HEIGHTS[term] * size]
+    return {f"word {term}": shapes.label(at, words, _TEXT_SIZE * size)}
 
 
 def _arrow(name: str, at: Array, vector: Array, words: str, size: float) -> Picture:
-    if not np.isfinite(vector).all() or np.linalg.norm(vector) < _SHORTEST:
+    if not np.isfinite(vector).all() or np.linalg.norm(vector) < _MIN_LENGTH:
         return {}
     tip = at + vector * (1.0 + 0.1 * size / np.linalg.norm(vector))
-    return {f"/{name}": shapes.arrow(at, vector, COM, size), f"/{name} label": shapes.label(tip, words, _TEXT * size)}
+    return {f"/{name}": shapes.arrow(at, vector, COM, size), f"/{name} label": shapes.label(tip, words, _TEXT_SIZE * size)}
 
 
 def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
@@ -75,7 +75,7 @@ def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
 def _gravity(record: fb.Rollout, scale: float, size: float) -> Picture:
     """The weight, as an arrow that ends at the centre of mass: below it there is the ground."""
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
-    words = shapes.label(at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "true m g", _TEXT * size)
+    words = shapes.label(at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "true m g", _TEXT_SIZE * size)
     return {"/m g": shapes.arrow(at - weight, weight, COM, size), "/m g label": words}
 
 
@@ -93,8 +93,8 @@ def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
     picture: Picture = {}
     for i, (joint, tau) in enumerate(zip(record.robot.joint_names, record.tau[-1].tolist(), strict=True)):
         axis = state.frame_jacobian(joint)[3:, first + i]
-        moment = scale / _LEVER * tau * axis
-        if np.linalg.norm(moment) > _SHORTEST:
+        moment = scale / _TORQUE_LEVER * tau * axis
+        if np.linalg.norm(moment) > _MIN_LENGTH:
             at = state.joint_transforms[record.robot.model.getJointId(joint)][:3, 3]
             picture[f"/{joint}"] = markers.curled_arrow(at, moment, MEASURED, on_top=True)
     return picture
@@ -108,5 +108,5 @@ def _drift(record: fb.Rollout, scale: float, size: float) -> Picture:
     for name in contacts.names:
         if contacts[name].k == 3:
             at = contacts.only(name).positions(record.final)[0]
-            picture |= _arrow(name, at, -_PER_ACCELERATION * eom.b[contacts.force_slice(name)], "J̇ q̇", size)
+            picture |= _arrow(name, at, -_ACCELERATION_SCALE * eom.b[contacts.force_slice(name)], "J̇ q̇", size)
     return picture

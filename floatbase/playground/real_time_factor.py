@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 
-class Pace:
+class RealTimeFactor:
     """Simulated time per real time. clock: gives real time, s. over: s of real time, back from now, that count."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, over: float = 2.0):
