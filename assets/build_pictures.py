@@ -1,6 +1,6 @@
 """Make the pictures of `assets/pictures/`: `python assets/build_pictures.py [name …]`. Needs playwright and a Chromium.
 
-They show the document's figures, every robot of the catalogue with its forces and friction cones, go2 with four-sided
+They show the course text's figures, every robot of the catalogue with its forces and friction cones, go2 with four-sided
 cones, and the feet of talos.
 """
 

@@ -227,7 +227,7 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
         lines += ['The reference backend, `backend="reference"`:', "", *time_table(reference, "reference"), ""]
     lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(compiled), ""]
     if own:
-        lines += ["## A task of one's own", "", OWN, "", *time_table(own, "own task"), ""]
+        lines += ["## A user-defined task", "", OWN, "", *time_table(own, "own task"), ""]
     planar = [row for row in rows if row.peer == PLANAR]
     if planar:
         lines += ["## An easier problem", "", *planar_section(planar), ""]

@@ -67,7 +67,7 @@ def ticks() -> Soak:
 
 
 class Height:
-    """A task of one's own: the height of the centre of mass."""
+    """A user-defined task: the height of the centre of mass."""
 
     name, weight, block = "height", 10.0, "qdd"
 
@@ -81,7 +81,7 @@ class Height:
 
 
 def own() -> Soak:
-    """The controller with a task, rows and a bound of one's own."""
+    """The controller with a task, rows and a user-defined bound."""
     robot = fb.load("go2")
     at, contacts = robot.standing(), fb.Contacts.feet(robot)
     inequality = LinearInequality("acceleration", "qdd", lambda eom, t: (np.eye(eom.nv)[6:], np.full(eom.d, 50.0)))

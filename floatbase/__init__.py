@@ -18,7 +18,7 @@ Walking       from floatbase.behaviours import Gait, Walk, Stand
 Pictures      Viewer
 Errors        FloatbaseError, InfeasibleError
 
-Symbols, frames, signs and units: help("floatbase.conventions"). All other names are imported from their rooms, such as
+Symbols, frames, signs and units: help("floatbase.conventions"). All other names are imported from their packages, such as
 `from floatbase.friction import FrictionPolyhedron`. Physics and pictures load when they are first used.
 """
 
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-# heavy rooms, imported at first use: mujoco behind Simulation, meshcat behind Viewer
+# heavy packages, imported at first use: mujoco behind Simulation, meshcat behind Viewer
 _LAZY = {
     "Ground": "floatbase.simulation",
     "Push": "floatbase.simulation",
@@ -105,7 +105,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
-        other = "other names are in its rooms, as in `from floatbase.friction import FrictionPolyhedron`"
+        other = "other names are in its packages, as in `from floatbase.friction import FrictionPolyhedron`"
         raise AttributeError(f"module 'floatbase' has no attribute {name!r}; {other}")
     value = getattr(import_module(_LAZY[name]), name)
     globals()[name] = value

@@ -47,7 +47,7 @@ class Affine(Value):
     __array_ufunc__ = None  # array + map is ours to add up, and so are array * map and array @ map
 
     def __init__(self, A: npt.ArrayLike, b: npt.ArrayLike, blocks: Mapping[str, slice] = _NO_BLOCKS):
-        values = self.__dict__  # written to directly: tasks of one's own make one at every tick
+        values = self.__dict__  # written to directly: user-defined tasks make one at every tick
         values["A"] = A = as_array("A", A, (None, None))
         values["b"], values["blocks"] = as_array("b", b, (len(A),)), as_blocks(blocks)
 
@@ -207,7 +207,7 @@ class Quadratic(Value):
         return self.H @ as_array("x", x, (self.n,)) + self.g
 
     def pullback(self, f: Affine) -> Quadratic:
-        """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)). Source: the document, §3."""
+        """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)). Source: [FBR], §3."""
         if as_instance("f", f, Affine).n_out != self.n:
             raise InputError(f"cannot pull back: the map gives {f.n_out} numbers, the cost takes {self.n}.")
         return Quadratic(f.A.T @ self.H @ f.A, f.A.T @ (self.H @ f.b + self.g), self(f.b))

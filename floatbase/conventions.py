@@ -50,7 +50,7 @@ Values (`State`, `Contacts`, `QP`, `Solution`, …) do not change: they hold rea
 
 Importing
 ---------
-`import floatbase as fb` has the names that most programs need. Everything else is imported from its room: `floatbase.robots`,
+`import floatbase as fb` has the names that most programs need. Everything else is imported from its package: `floatbase.robots`,
 `floatbase.dynamics`, `floatbase.objectives`, `floatbase.friction`, `floatbase.qp`, `floatbase.control`, `floatbase.actuators`,
 `floatbase.simulation`, `floatbase.behaviours`, `floatbase.viewer`, `floatbase.lessons`, `floatbase.playground`, and the
 small `floatbase.affine`, `floatbase.linear_algebra` and `floatbase.errors`.

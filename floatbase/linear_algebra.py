@@ -1,4 +1,4 @@
-"""Rank, null space and row lengths: the few decisions of linear algebra that every room must take alike."""
+"""Rank, null space and row lengths: the few decisions of linear algebra that every package must take alike."""
 
 from __future__ import annotations
 

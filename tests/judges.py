@@ -120,7 +120,7 @@ def limp(q: Array, v: Array, t: float) -> Torques:
 
 
 class KeepStill:
-    """A task of one's own: no joint accelerates."""
+    """A user-defined task: no joint accelerates."""
 
     block: ClassVar[str] = "qdd"
     name, weight = "keep still", 5.0

@@ -1,7 +1,7 @@
-"""Every public function, constructor and method of the rooms, called with wrong arguments, one at a time.
+"""Every public function, constructor and method of the packages, called with wrong arguments, one at a time.
 
 Only an error of the package is right: not another exception, a warning, or an argument of a wrong kind that nobody noticed.
-What is new in a room is in here by itself; right arguments come from `values`, by annotation and by name. What each kind of
+What is new in a package is in here by itself; right arguments come from `values`, by annotation and by name. What each kind of
 check refuses is tested once, with all of `WRONG`.
 """
 
@@ -34,7 +34,7 @@ from floatbase.simulation import LiveSimulation, PerturbedSimulation
 from floatbase.viewer.export import recording
 from floatbase.viewer.plots import run_plots
 
-ROOMS = (
+PACKAGES = (
     "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp", "robots", "simulation",
     "viewer",
 )  # fmt: skip
@@ -140,7 +140,7 @@ LEFT_OUT = {
     "judges whatever a learner may give": ("Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in", "array_or_verdict", "predict",
         "reveal", "review"),
     "the page's server, with tests of its own": ("Window",),
-    "rooms call these among themselves, with what they have checked": (
+    "packages call these among themselves, with what they have checked": (
         "Simulation.advance", "PerturbedSimulation.advance",
         "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian", "raibert_foothold",
@@ -171,9 +171,9 @@ ALONE = {name for names in LEFT_OUT.values() for name in names}
 
 
 class Callee(NamedTuple):
-    """Something to call: room, name, the function, and its parameters but `self`."""
+    """Something to call: package, name, the function, and its parameters but `self`."""
 
-    room: str
+    package: str
     name: str
     call: Callable[..., Any]
     parameters: list[inspect.Parameter]
@@ -181,12 +181,12 @@ class Callee(NamedTuple):
 
 
 def callees() -> Iterator[Callee]:
-    """All that the rooms offer to call: functions, constructors, methods."""
+    """All that the packages offer to call: functions, constructors, methods."""
     seen: set[int] = set()
-    for room in ROOMS:
-        home = import_module(f"floatbase.{room}".rstrip("."))
+    for package in PACKAGES:
+        home = import_module(f"floatbase.{package}".rstrip("."))
         found = [(name, getattr(home, name)) for name in home.__all__]
-        if room == "viewer":
+        if package == "viewer":
             found += [
                 (f"{module.__name__.split('.')[-1]}.{name}", value) for module in MODULES for name, value in made_in(module)
             ]
@@ -195,11 +195,11 @@ def callees() -> Iterator[Callee]:
                 continue
             seen.add(id(value))
             if inspect.isfunction(value):
-                yield Callee(room or "floatbase", name, value, parameters_of(value))
+                yield Callee(package or "floatbase", name, value, parameters_of(value))
             elif inspect.isclass(value) and not issubclass(value, Exception) and not getattr(value, "_is_protocol", False):
                 if name not in RESULTS.split():
-                    yield Callee(room or "floatbase", name, value, parameters_of(value))
-                yield from methods_of(room or "floatbase", name, value)
+                    yield Callee(package or "floatbase", name, value, parameters_of(value))
+                yield from methods_of(package or "floatbase", name, value)
 
 
 def made_in(module: Any) -> list[tuple[str, Any]]:
@@ -207,14 +207,14 @@ def made_in(module: Any) -> list[tuple[str, Any]]:
     return [(name, value) for name, value in mine if not name.startswith("_") and callable(value)]
 
 
-def methods_of(room: str, name: str, kind: type) -> Iterator[Callee]:
+def methods_of(package: str, name: str, kind: type) -> Iterator[Callee]:
     for method, value in inspect.getmembers(kind, inspect.isfunction):
         if (not method.startswith("_") or method in ("__call__", "__getitem__")) and f"{name}.{method}" not in ALONE:
             if isinstance(inspect.getattr_static(kind, method), staticmethod):
-                yield Callee(room, f"{name}.{method}", value, parameters_of(value))
+                yield Callee(package, f"{name}.{method}", value, parameters_of(value))
             else:
                 one = right().get(name)
-                yield Callee(room, f"{name}.{method}", partial(value, one), parameters_of(value)[1:], (one,))
+                yield Callee(package, f"{name}.{method}", partial(value, one), parameters_of(value)[1:], (one,))
 
 
 def parameters_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
@@ -280,10 +280,10 @@ def answer(call: Callable[[], object]) -> str | None:
     return "accepted"
 
 
-@pytest.mark.parametrize("room", [room or "floatbase" for room in ROOMS])
-def test_wrong_arguments_are_told(room: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("package", [package or "floatbase" for package in PACKAGES])
+def test_wrong_arguments_are_told(package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    here = [callee for callee in callees() if callee.room == room]
+    here = [callee for callee in callees() if callee.package == package]
     missing = [f"{callee.name}: {name}" for callee in here for name, value in rights_of(callee).items() if value is ...]
     assert missing == [], "`right` needs an argument for each of these"
     refused = {c.name: found for c in here if (found := answer(partial(called, c, rights_of(c)))) != "accepted"}

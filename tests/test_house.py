@@ -1,4 +1,4 @@
-"""The house stands: floors import downwards, rooms are entered by their fronts, files are small, every name is explained."""
+"""The house stands: floors import downwards, packages are entered by their fronts, files are small, every name is explained."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import floatbase
 
 PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
-# from the ground up; rooms named on one line stand side by side on one floor and may see each other
+# from the ground up; packages named on one line stand side by side on one floor and may see each other
 FLOORS = (
     ("conventions", "errors", "_validation", "_assets", "affine", "linear_algebra"),
     ("qp",),
@@ -33,7 +33,7 @@ FLOORS = (
     ("playground",),
     ("__main__",),
 )
-HEIGHT = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
+HEIGHT = {package: height for height, packages in enumerate(FLOORS) for package in packages}
 MOST_LINES = 450  # of a file: more is two ideas
 CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}  # what robot.standing() and state.robot cost
 COMPILED = {"floatbase.control.tick.jit", "floatbase.control.tick.tick"}  # numba loads with them, so no front imports them
@@ -42,7 +42,7 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "_assets" not in path
 INDOORS = [path for path in MODULES if path != PACKAGE / "__init__.py"]
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 OUTDOORS = [*TESTS, *sorted((ROOT / "benchmarks").rglob("*.py")), *sorted((ROOT / "notebooks").glob("*.ipynb"))]
-ROOMS = [".".join(path.parent.relative_to(ROOT).parts) for path in INDOORS if path.name == "__init__.py"]
+PACKAGES = [".".join(path.parent.relative_to(ROOT).parts) for path in INDOORS if path.name == "__init__.py"]
 
 
 class Import(NamedTuple):
@@ -127,8 +127,8 @@ def test_rooms_are_entered_by_their_fronts() -> None:
             front, _, inner = found.module.rpartition(".")
             entered = file_of(front) if front and front != "floatbase" else None
             if found.module in COMPILED or (entered and entered.parent in path.parents):
-                continue  # the latter is at home in the room
-            if found.module in ROOMS:
+                continue  # the latter is at home in the package
+            if found.module in PACKAGES:
                 if found.name and found.name not in import_module(found.module).__all__:
                     wrong.append(f"{said(path)}:{found.line} imports {found.name}, which {found.module} does not export")
             elif entered and inner not in import_module(front).__all__:
@@ -157,14 +157,14 @@ def test_every_module_is_short_says_what_it_is_and_leaves_nothing_open() -> None
 
 def test_every_exported_name_resolves_and_has_a_docstring() -> None:
     wrong = []
-    for room in ["floatbase", *ROOMS]:
-        module = import_module(room)
+    for package in ["floatbase", *PACKAGES]:
+        module = import_module(package)
         for name in getattr(module, "__all__", []):
             value = getattr(module, name)
             doc = inspect.getdoc(value) or ""
             explains_itself = inspect.ismodule(value) or (callable(value) and not get_origin(value))
             if explains_itself and (not doc or doc.startswith(f"{name}(")):  # dataclass writes one that starts so
-                wrong.append(f"{room}.{name} has no docstring of its own")
+                wrong.append(f"{package}.{name} has no docstring of its own")
     assert not wrong, "\n".join(wrong)
 
 

@@ -104,10 +104,10 @@ def test_pages_say_what_they_are_and_figures_what_they_show(built: Path) -> None
 def test_equations_and_functions_lead_to_each_other(built: Path) -> None:
     map_page = page_at(built / "lessons" / "equations.html")
     for entry in equations.entries():
-        room, name = entry.path.split(".", 1)
-        assert f"../api/floatbase.{room}.html#floatbase.{room}.{name}" in map_page.links
+        package, name = entry.path.split(".", 1)
+        assert f"../api/floatbase.{package}.html#floatbase.{package}.{name}" in map_page.links
         back = {f"../lessons/equations.html#{number}" for number in map(anchor, entry.equations)}
-        assert back <= page_at(built / "api" / f"floatbase.{room}.html").links
+        assert back <= page_at(built / "api" / f"floatbase.{package}.html").links
     assert {anchor(number) for number in equations.TITLES} <= map_page.names
     text = (built / "lessons" / "equations.html").read_text(encoding="utf-8")
     assert text.count('class="equation"') == len(equations.TITLES)

@@ -47,7 +47,7 @@ NO_VALUES = {
 }
 
 
-def rooms() -> list[Any]:
+def packages() -> list[Any]:
     names = "actuators behaviours control dynamics friction lessons lessons.lesson04 objectives qp robots simulation viewer"
     return [fb, *(import_module(f"floatbase.{name}") for name in names.split())]
 
@@ -72,9 +72,9 @@ def same(a: Any, b: Any) -> bool:
 def test_every_class_of_the_rooms_is_tested_here_or_no_value() -> None:
     classes = {
         name: found
-        for room in rooms()
-        for name in room.__all__
-        if inspect.isclass(found := getattr(room, name)) and not issubclass(found, Exception)
+        for package in packages()
+        for name in package.__all__
+        if inspect.isclass(found := getattr(package, name)) and not issubclass(found, Exception)
     }
     protocols = {name for name, found in classes.items() if getattr(found, "_is_protocol", False)}
     excused = " ".join(NO_VALUES.values()).split()

@@ -1,4 +1,4 @@
-"""A value of every public class of the rooms, for tests that hold for all of them."""
+"""A value of every public class of the packages, for tests that hold for all of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whole-body control as a quadratic program (§4 of the document)."""
+"""Whole-body control as a quadratic program (§4 of the course text)."""
 
 from floatbase.control.analytic import AnalyticController
 from floatbase.control.command import Command

@@ -36,7 +36,7 @@ class AnalyticController(Value):
 
     The desired wrench is f̃_c = m (a - g) with a = -kp e - kd ė, where e leads from `com` to the centre of mass; τ̃_c does the
     same for the base's rotation, with the robot's inertia about its centre of mass. Nothing keeps
-    forces in their cones or torques within limits. Source: the document, §3.1.
+    forces in their cones or torques within limits. Source: [FBR], §3.1.
 
     robot: the robot to control.
     contacts: its contacts with the ground.

@@ -62,14 +62,14 @@ class WholeBodyController(FixedAttributes):
         stand bounds nothing until it does, so that `replace(contacts=…)` may lift it; other names that are no contact's are
         errors.
     torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.
-    inequalities: inequality rows of one's own on q̈, τ or λ, see `floatbase.control.LinearInequality`.
+    inequalities: user-defined inequality rows on q̈, τ or λ, see `floatbase.control.LinearInequality`.
     contact_weight: None holds the contacts by rows, (5). A number, such as 1e4, puts ½ contact_weight ‖A q̈ - b‖² into the
-        objective instead: contacts give way where torques and friction do not suffice to hold them, and only rows of one's own
+        objective instead: contacts give way where torques and friction do not suffice to hold them, and only user-defined rows
         and bounds of normal forces can make a tick infeasible.
     mismatch: what is taken for (7), the truth by default, see `floatbase.control.ModelMismatch`; any other takes the reference backend.
     solver: one of `floatbase.qp.solvers()`.
     backend: "reference" assembles and solves the QP as it is written. "compiled" solves the same problem many times faster
-        (`floatbase.control.tick`), with tasks, constraints and rows of one's own too. "auto" takes compiled where it can.
+        (`floatbase.control.tick`), with tasks, constraints and user-defined rows too. "auto" takes compiled where it can.
 
     The attribute `backend` says which backend runs, `backend_reason` why. `problem` is what is solved. The first compiled controller ever
     compiles for about a minute, unless the set-up did (`python -m floatbase compile`). Later ones load what was compiled,
@@ -78,7 +78,7 @@ class WholeBodyController(FixedAttributes):
     compiled tick cannot answer to the last digits, or that has no answer, is handed to the reference backend, and its
     `Command.backend` says so.
 
-    Functions of t and objects of one's own are tried once when a controller is made with them, at t = 0, where the robot
+    Functions of t and user-defined objects are tried once when a controller is made with them, at t = 0, where the robot
     stands: a trajectory that begins later must give something at 0 too.
 
     Raises `InputError` for arguments that do not fit. A call raises `InfeasibleError` with the rows in conflict.

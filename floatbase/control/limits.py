@@ -1,4 +1,4 @@
-"""The inequalities of (27) without a state: friction, normal forces, torque limits, and rows of one's own."""
+"""The inequalities of (27) without a state: friction, normal forces, torque limits, and user-defined rows."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
 @dataclass(frozen=True, eq=False)
 class LinearInequality(Value):
-    """Inequality rows of one's own, G x ≤ h, on one block x of (q̈, τ, λ).
+    """User-defined inequality rows, G x ≤ h, on one block x of (q̈, τ, λ).
 
     name: in messages; of the row, where there is one, else of "name 0", "name 1", …
     block: "qdd", "tau" or "forces".
@@ -111,7 +111,7 @@ class Limits(Value):
         number for all, or a mapping from the name of a contact to a number or a function of the time t in s; 0 and none where
         it has none. The bound of a name that is not among the contacts waits until it is: a foot that has lifted will stand
         again.
-    inequalities: inequality rows of one's own.
+    inequalities: user-defined inequality rows.
 
     Raises `InputError` for values that do not fit.
     """

@@ -70,13 +70,13 @@ def build_qp(
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
     Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: those of
-    `Limits`. Source: the document, §4.1.
+    `Limits`. Source: [FBR], §4.1.
 
     eom: the equations of motion (7) at a state.
     tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is missing).
     limits: the inequalities.
     t: s, the time that tasks with moving targets are evaluated at.
-    mismatch: what is taken for (7) instead of eom; tasks and rows of one's own see eom.
+    mismatch: what is taken for (7) instead of eom; tasks and user-defined rows see eom.
 
     Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a measured velocity that the
     contacts do not quite allow makes them inconsistent. The rows therefore count along the directions that A resolves well

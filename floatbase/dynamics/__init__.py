@@ -1,4 +1,4 @@
-"""Constrained equations of motion and the space of motions they leave (§2 and App. A of the document)."""
+"""Constrained equations of motion and the space of motions they leave (§2 and App. A of the course text)."""
 
 from floatbase.dynamics.constraint_rank import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE, contact_space, resolved_constraint
 from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame

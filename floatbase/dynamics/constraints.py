@@ -31,7 +31,7 @@ _MIN_TILT = 1e-6  # sine of the angle between axle and normal; below it rounding
 
 @dataclass(frozen=True, eq=False)
 class LinearConstraint(Value):
-    """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the document).
+    """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the course text).
 
     Holonomic constraints φ(q, t) = 0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q, q̇) = 0 give (6). The
     constraint's force is Aᵀ λ with one multiplier λ for each row, in the row's own unit; it has no point and no friction cone.
@@ -131,7 +131,7 @@ class RollingWheel(SinglePointContact):
 def fixed_frame(frame: str) -> LinearConstraint:
     """A frame welded to the world: six rows, (5) with A = J and b = -J̇ q̇; λ is the wrench of the bolts, N and N·m, world.
 
-    With a floating base bolted by it, λ is what the document's Figure 1 (left) calls the reaction of the ground.
+    With a floating base bolted by it, λ is what the course text's Figure 1 (left) calls the reaction of the ground.
     """
     return LinearConstraint(f"bolts of {as_string('frame', frame)}", 6, partial(_fixed_frame_rows, frame))
 

@@ -126,7 +126,7 @@ class PointContact(SinglePointContact):
 
 @dataclass(frozen=True, eq=False)
 class FlatFootContact(Value):
-    """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note 9 of the document).
+    """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note 9 of the course text).
 
     The frame's six rows hold the motion and the corners only carry forces. Twelve rows for the motion of the corners would
     have rank 6, and would be inconsistent when the foot turns.

@@ -19,8 +19,8 @@ Block: TypeAlias = Literal["qdd", "tau", "forces"]  # the three unknowns of (7):
 class EquationsOfMotion(Value):
     """(1)(4)(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
 
-    For point contacts A = J and b = -J̇ q̇, as the document writes it. Without contacts it is (4) with λ empty, and for a fixed
-    base (1). Source: the document, §1-§2.1.
+    For point contacts A = J and b = -J̇ q̇, as the course text writes it. Without contacts it is (4) with λ empty, and for a fixed
+    base (1). Source: [FBR], §1-§2.1.
 
     M: (nv, nv), inertia.
     h: (nv,), Coriolis, centrifugal and gravity forces, N and N·m.

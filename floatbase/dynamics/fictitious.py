@@ -25,7 +25,7 @@ _STEP = 1e-5  # m and rad to each side for central differences: curvature and ro
 class BiasForces(Value):
     """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each (nv,), N and N·m as h.
 
-    Which is which, and how large, depends on the coordinates: see `bias_forces`. Source: the document, Appendix A.
+    Which is which, and how large, depends on the coordinates: see `bias_forces`. Source: [FBR], Appendix A.
     """
 
     gravity: Array
@@ -120,7 +120,7 @@ def centripetal_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
 class RotatingFrameView(Value):
     """A free particle as one who rides on a turning frame sees it; a row for each time.
 
-    All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: the document, Appendix A.
+    All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: [FBR], Appendix A.
 
     time: (n,) s.
     rotation: (n, 3, 3), R_world_frame.

@@ -28,7 +28,7 @@ def forces_from_torques(eom: EquationsOfMotion) -> Affine:
 
     Maps shape (d,), N·m, to (k,), N, world. λ is unique where J has full row rank k; elsewhere (solo8 on four feet, corners
     of a flat foot) this is the smallest λ, as the pseudo-inverse has it. Directions of motion that the contacts resolve worse
-    than `CONSTRAINT_RANK_TOLERANCE` count as not held, see `contact_space`. Source: the document, §2.2.1.
+    than `CONSTRAINT_RANK_TOLERANCE` count as not held, see `contact_space`. Source: [FBR], §2.2.1.
     """
     space = contact_space(eom)
     # what forces must add to q̈ along the resolved rows: b - A M⁻¹ (S τ - h)
@@ -66,7 +66,7 @@ def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 class FeasibleSpace(Value):
     """(13)(16)(17) All (q̈, τ, λ) that satisfy (7), as the map β -> v + V⊥ β with orthonormal V⊥.
 
-    eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: the document, §2.2.2.
+    eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: [FBR], §2.2.2.
     """
 
     eom: EquationsOfMotion

@@ -1,4 +1,4 @@
-"""Friction cones, polyhedra and the wrenches that a stance can produce (§4.2 of the document)."""
+"""Friction cones, polyhedra and the wrenches that a stance can produce (§4.2 of the course text)."""
 
 from floatbase.friction.cones import Decomposition, FrictionCone, FrictionPolyhedron, Status, decompose, tangents
 from floatbase.friction.polytopes import cone_face_matrix, polytope_vertices

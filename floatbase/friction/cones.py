@@ -1,6 +1,6 @@
 """Friction (28): a force's normal and tangential parts, the exact cone, and the polyhedron with n facets in its place.
 
-A force is what the ground does to the robot, shape (3,), N, world. Normals point out of the ground. Source: the document, §4.2.
+A force is what the ground does to the robot, shape (3,), N, world. Normals point out of the ground. Source: [FBR], §4.2.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Decomposition(Value):
 def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
     """(28) The two components of a contact force that friction compares: α_∥ ≤ μ α_⊥.
 
-    force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source: the document, Figure 3.
+    force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source: [FBR], Figure 3.
     """
     f, n = as_array("force", force, (3,), "N"), unit_vector("normal", normal)
     alpha = float(n @ f)

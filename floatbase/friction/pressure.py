@@ -1,4 +1,4 @@
-"""Where the ground pushes: centre of pressure, and the wrench that a sole's corners make (note 9 of the document)."""
+"""Where the ground pushes: centre of pressure, and the wrench that a sole's corners make (note 9 of the course text)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The wrenches that a stance can produce: the sum of its friction cones (28) by (20) and (21), and slices of it.
 
 A wrench is w = (f_c, τ_c), shape (6,): the total contact force, N, and its moment about the centre of mass, N·m, both
-world: τ_c = Σ (x_i - x_c) × f_i. Sources: the document, §3.1 and §4.2; Caron, Pham and Nakamura, Leveraging cone double
+world: τ_c = Σ (x_i - x_c) × f_i. Sources: [FBR], §3.1 and §4.2; Caron, Pham and Nakamura, Leveraging cone double
 description for multi-contact stability of humanoids, RSS 2015.
 """
 
@@ -256,7 +256,7 @@ def wrench_set(
         the controller's.
     max_normal_force: N, one number or one for each contact point; no limit by default.
 
-    Raises `InputError` where there is no contact, or one whose forces have no cone. Source: the document, §3.1, §4.2.
+    Raises `InputError` where there is no contact, or one whose forces have no cone. Source: [FBR], §3.1, §4.2.
     """
     as_instance("state", state, State)
     as_instance("contacts", contacts, Contacts)

@@ -1,4 +1,4 @@
-"""The document's figures as 3-D scenes: each function returns a `Viewer` that shows one figure.
+"""The course text's figures as 3-D scenes: each function returns a `Viewer` that shows one figure.
 
 Figure 1: left a robot bolted to the ground, right a floating base. Figure 2: a quadruped, its base, centre of mass and feet.
 Figure 3: left the friction cone, right the plane through normal and force.

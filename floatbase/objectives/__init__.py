@@ -1,4 +1,4 @@
-"""Costs: moved between spaces, on the centre of mass, and as tasks (§3 of the document)."""
+"""Costs: moved between spaces, on the centre of mass, and as tasks (§3 of the course text)."""
 
 from floatbase.objectives.centroidal import (
     TorquesFromForces,

@@ -47,7 +47,7 @@ def net_force_matrix(contacts: Contacts) -> Array:
 def net_moment_matrix(state: State, contacts: Contacts) -> Array:
     """(21) G_τ, shape (3, 3n), m: τ_c = G_τ λ = Σ (x_i - x_c) × f_i, the moment about the centre of mass x_c. World.
 
-    The order matters: footnote 10 of the document prints x_c - x_i, which would give the opposite moment.
+    The order matters: footnote 10 of the course text prints x_c - x_i, which would give the opposite moment.
     """
     as_instance("state", state, State)
     as_instance("contacts", contacts, Contacts)
@@ -77,7 +77,7 @@ def wrench_objective(
 ) -> Quadratic:
     """(22) w_f ½ ‖f̃_c - G_f λ‖² + w_τ ½ ‖τ̃_c - G_τ λ‖² as a cost on λ.
 
-    The document adds N² and (N·m)² as they come, w_f = w_τ = 1. Where the feet cannot give the whole wrench, the weights decide
+    The course text adds N² and (N·m)² as they come, w_f = w_τ = 1. Where the feet cannot give the whole wrench, the weights decide
     which part is missed; w_τ = 1e6 is the same as counting moments in N·mm.
 
     state: where the robot is.
@@ -116,7 +116,7 @@ def centroidal_inertia(state: State) -> Array:
 def tangential_bias(contacts: Contacts) -> Quadratic:
     """(23), first part: Σ ½ ‖(I - n nᵀ) f_i‖², the friction that each foot asks for, squared; a cost on λ.
 
-    The document prints the norm without its square; only squared is it quadratic.
+    The course text prints the norm without its square; only squared is it quadratic.
     """
     N = _normal_matrix(contacts)
     return Quadratic.from_residual(np.eye(len(N)) - N @ N.T, np.zeros(len(N)))
@@ -175,7 +175,7 @@ def torques_from_forces(eom: EquationsOfMotion) -> TorquesFromForces:
     """(24)(25) min ½ ‖f^τ(β)‖² subject to λ = f^λ(β), for every λ at once.
 
     f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k: forces out of reach,
-    one τ for each λ, and a choice among many. Source: the document, §3.1.2.
+    one τ for each λ, and a choice among many. Source: [FBR], §3.1.2.
     """
     as_instance("eom", eom, EquationsOfMotion)
     A, b = resolved_constraint(eom)

@@ -52,7 +52,7 @@ class Task(Protocol):
 
     name: in messages and tables. weight: of ½‖residual‖² in the objective.
 
-    An object of one's own of this form is a task too, on the compiled tick as on the reference backend: this one keeps the height
+    A user-defined object of this form is a task too, on the compiled tick as on the reference backend: this one keeps the height
     of the centre of mass, as far as its acceleration may be 100 (h - z) - 20 ż, m/s².
 
         class Height:

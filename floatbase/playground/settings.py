@@ -195,7 +195,7 @@ _IMPORTS = (
 def _load_call(robot: Robot) -> str:
     """The call that loads a robot: one that `load` does not give comes from the file that its name tells.
 
-    Limits of one's own, locked joints and feet of several radii are not told.
+    User-defined limits, locked joints and feet of several radii are not told.
     """
     with suppress(FloatbaseError):
         if load(robot.name) == robot:

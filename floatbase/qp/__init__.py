@@ -1,4 +1,4 @@
-"""Quadratic programs: named rows, optimality, back ends, and rows in conflict (§4, App. C of the document)."""
+"""Quadratic programs: named rows, optimality, back ends, and rows in conflict (§4, App. C of the course text)."""
 
 from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set, table_top
 from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_constraints

@@ -25,7 +25,7 @@ they do, both choices fall on the row with the least index (Bland's rule), which
 A direction without curvature, along which the objective falls, has no minimiser: p then is the way down and α may be as
 long as it likes; if no row blocks, the objective has no minimum.
 
-Source: the document, Appendix C; Nocedal and Wright, Numerical Optimization (2006), ch. 16.5; for Bland's rule on
+Source: [FBR], Appendix C; Nocedal and Wright, Numerical Optimization (2006), ch. 16.5; for Bland's rule on
 quadratic programs Chang and Cottle, Math. Programming 18 (1980).
 """
 
@@ -146,7 +146,7 @@ def active_set(
 
 
 def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (1.0, 1.0)) -> QP:
-    """The document's table: min ½ Σ curvature (x - minimum)² in the plane x = (along, up), subject to up ≥ 0.
+    """The course text's table: min ½ Σ curvature (x - minimum)² in the plane x = (along, up), subject to up ≥ 0.
 
     With the minimum above the table the row "table" is inactive and might not be there; with the minimum below it the
     row is active and might be an equality.

@@ -2,7 +2,7 @@
 
     min ½ xᵀ H x + gᵀ x   subject to   A x = b,   G x ≤ h
 
-The document's g_i(x) = 0 are the rows of A x - b = 0; its h_j(x) < 0 are those of G x - h ≤ 0, with the ≤ that it
+The course text's g_i(x) = 0 are the rows of A x - b = 0; its h_j(x) < 0 are those of G x - h ≤ 0, with the ≤ that it
 means: an active row holds with equality. x is an optimum, for H positive semidefinite, exactly if there are multipliers
 ν, one for each equality, and μ, one for each inequality, with (Karush, Kuhn, Tucker)
 
@@ -12,7 +12,7 @@ means: an active row holds with equality. x is an optimum, for H positive semide
     μ_i (G x - h)_i = 0           complementarity: only the rows we rest on are active
 
 μ_i is what one unit more in h_i would lower the objective by, to first order; ν_i likewise in b_i, of either sign.
-Source: the document, Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
+Source: [FBR], Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _ROUNDING = 1e-14  # part of a sum's terms that may be rounding: some 50 units i
 
 @dataclass(frozen=True, eq=False)
 class QP(Value):
-    """App. C: min ½ xᵀ H x + gᵀ x  subject to  A x = b,  G x ≤ h, with the ≤ that the document means.
+    """App. C: min ½ xᵀ H x + gᵀ x  subject to  A x = b,  G x ≤ h, with the ≤ that the course text means.
 
     H: (n, n), symmetric, positive semidefinite where A x = b.
     g: (n,).

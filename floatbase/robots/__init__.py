@@ -1,4 +1,4 @@
-"""Robots, and the states they can be in (§1, §2 of the document)."""
+"""Robots, and the states they can be in (§1, §2 of the course text)."""
 
 from floatbase.robots.loading import PLATE_SIZE, catalogue, load, load_urdf, with_floating_base
 from floatbase.robots.robot import UNIT_NORM_TOLERANCE, Foot, Robot, as_corners, as_torque_limits, check_unit_norms

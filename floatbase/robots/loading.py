@@ -1,4 +1,4 @@
-"""Robots from files: the catalogue, any other robot of example-robot-data once its feet are given, and URDFs of one's own."""
+"""Robots from files: the catalogue, any other robot of example-robot-data once its feet are given, and your own URDFs."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def load_urdf(
     posture: npt.ArrayLike | None = None,
     locked: Sequence[str] = (),
 ) -> Robot:
-    """Load a robot of your own from a URDF.
+    """Load your own robot from a URDF.
 
     path: of the URDF file, or the URDF's text itself, such as `robot.urdf`.
     name: the file's name without its ending, or "robot" of a text, by default.
@@ -215,7 +215,7 @@ def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     """What example-robot-data says about a robot."""
     if str(name).endswith((".urdf", ".xml", ".xacro")) or "/" in str(name):
         raise UnknownNameError(
-            f"{str(name)!r} is no robot's name but a file's; fb.load_urdf({str(name)!r}, feet=[…]) loads a URDF of your own. "
+            f"{str(name)!r} is no robot's name but a file's; fb.load_urdf({str(name)!r}, feet=[…]) loads your own URDF. "
             f"Names that fb.load knows: {', '.join(CATALOGUE)}, and the others of example-robot-data."
         )
     if not isinstance(name, str) or name not in known:

@@ -176,7 +176,7 @@ class Robot(Value):
 
     @cached_property
     def S(self) -> Array:
-        """(3) The actuation matrix, shape (nv, d): S τ puts zeros where no motor acts. Source: the document, §2."""
+        """(3) The actuation matrix, shape (nv, d): S τ puts zeros where no motor acts. Source: [FBR], §2."""
         return read_only(np.eye(self.nv, self.d, self.d - self.nv))
 
     @cached_property

@@ -188,7 +188,7 @@ class Viewer(Controls):
         return self
 
     def add_legend_entry(self, kind: str, colour: RGB, meaning: str) -> None:
-        """Let the legend explain items of one's own, from the next picture on that has any.
+        """Let the legend explain user-defined items, from the next picture on that has any.
 
         kind: first part of their paths. colour: RGB, from 0 to 1. meaning: what the legend says.
         """

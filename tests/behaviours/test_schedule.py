@@ -160,7 +160,7 @@ def test_the_support_margin_is_the_distance_to_the_hull() -> None:
 
 
 def test_names_of_the_front_door_are_untouched() -> None:
-    assert not {"Gait", "Walk"} & set(fb.__all__)  # they live in their room
+    assert not {"Gait", "Walk"} & set(fb.__all__)  # they live in their package
 
 
 def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_over() -> None:

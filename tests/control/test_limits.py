@@ -1,4 +1,4 @@
-"""Rows of one's own and bounds of normal forces: kept on both backends, told when they conflict, refused where they do not fit."""
+"""User-defined rows and bounds of normal forces: kept on both backends, told when they conflict, refused where they do not fit."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ UP = [0.0, 0.0, 1.0]
 
 
 class Own:
-    """A task of one's own, whose parts a test leaves out or makes wrongly."""
+    """A user-defined task, whose parts a test leaves out or makes wrongly."""
 
     def __init__(self, without: str = "", residual: object = None):
         parts = {"block": "qdd", "name": "mine", "weight": 1.0, "residual": lambda eom, t=0.0: residual}
@@ -45,7 +45,7 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
 
 
 class Fixed(Own):
-    """A task of one's own with a residual of fixed size."""
+    """A user-defined task with a residual of fixed size."""
 
     def __init__(self, **wrong: object):
         super().__init__()

@@ -1,4 +1,4 @@
-"""Tasks and constraints of one's own: the same answers on both backends, and the words for what is wrong with them."""
+"""Tasks and user-defined constraints: the same answers on both backends, and the words for what is wrong with them."""
 
 from __future__ import annotations
 

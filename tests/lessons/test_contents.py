@@ -21,8 +21,8 @@ def test_every_function_stands_in_the_map_once_by_the_path_that_users_import(ent
     paths = [entry.path for entry in entries]
     assert len(set(paths)) == len(paths)
     for path in paths:
-        room, name, *member = path.split(".")
-        value = getattr(import_module(f"floatbase.{room}"), name)
+        package, name, *member = path.split(".")
+        value = getattr(import_module(f"floatbase.{package}"), name)
         assert hasattr(value, member[0]) if member else callable(value)
     assert {"dynamics.forces_from_torques", "affine.Quadratic.pullback"} <= set(paths)
 

@@ -105,7 +105,7 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
 
 
 def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_10_would_roll_it_left() -> None:
-    """(x_i - x_c) × f_i: up at y > 0 turns about +x. Footnote 10 of the document prints x_c - x_i, the other way."""
+    """(x_i - x_c) × f_i: up at y > 0 turns about +x. Footnote 10 of the course text prints x_c - x_i, the other way."""
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot)
     left = contacts.positions(state)[:, 1] > 0

@@ -65,7 +65,7 @@ def check_record(run: ActiveSetRun) -> None:
         assert after.objective <= now.objective + 1e-12
 
 
-# the document's table ------------------------------------------------------------------------------------------------
+# the course text's table ------------------------------------------------------------------------------------------------
 
 
 def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there() -> None:

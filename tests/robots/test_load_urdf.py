@@ -1,4 +1,4 @@
-"""URDFs: models of one's own, joints held still, robots as example-robot-data has them, and what cannot be used."""
+"""URDFs: user-defined models, joints held still, robots as example-robot-data has them, and what cannot be used."""
 
 from __future__ import annotations
 

@@ -81,9 +81,9 @@ class CompiledTick:
     the array of numbers that `tick.tick` fills, how many rows are active, and what else the tick was given.
 
     qdd, tau, forces: where these are among the numbers.
-    unchecked_tasks: tasks of which the tables cannot tell whether they fit: those of one's own, and moving ones.
+    unchecked_tasks: tasks of which the tables cannot tell whether they fit: user-defined ones, and moving ones.
     arguments: what `tick.tick` takes after q, v and `TickInputs.packed`, but for the answer and the stages to run.
-    default_inputs: as they are without a state, zeros for what moves and nothing of one's own.
+    default_inputs: as they are without a state, zeros for what moves and nothing user-defined.
     workspace: real and whole numbers, memory of the tick.
 
     Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
@@ -110,7 +110,7 @@ class CompiledTick:
         self._make_workspace(0)
 
     def _make_workspace(self, n_user_rows: int) -> None:
-        """Memory for one tick at a time, the dynamics' lock sees to it, whose tasks of one's own have so many rows."""
+        """Memory for one tick at a time, the dynamics' lock sees to it, whose user-defined tasks have so many rows."""
         if n_user_rows > self._n_user_rows:
             n_floats, n_ints = self._workspace_sizes(self._tables[0], n_user_rows)
             self.workspace, self._n_user_rows = (np.empty(n_floats), np.empty(n_ints, np.int64)), n_user_rows

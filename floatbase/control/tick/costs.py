@@ -21,7 +21,7 @@ class TaskTable(NamedTuple):
     gains: Any  # (N, 3), weight, kp, kd
     frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
     targets: Any  # of all tasks, one after the other: position, rotation row by row or q, then velocity and acceleration
-    user_start: Any  # where tasks of one's own start among them, one after the other: block, m, weight, A (m, n), b (m,)
+    user_start: Any  # where user-defined tasks start among them, one after the other: block, m, weight, A (m, n), b (m,)
     n_user: Any  # how many these are
     n_user_rows: Any  # the sum of their m
 
@@ -140,7 +140,7 @@ def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, b
 
 @jit
 def count_user_rows(inputs, at, n_user, nv, k, d):
-    """How many rows the `n_user` tasks of one's own have that start at `at` in `inputs`, and where they end."""
+    """How many rows the `n_user` user-defined tasks have that start at `at` in `inputs`, and where they end."""
     rows = 0
     for _ in range(n_user):
         block, m = int(inputs[at]), int(inputs[at + 1])
@@ -150,7 +150,7 @@ def count_user_rows(inputs, at, n_user, nv, k, d):
 
 @jit
 def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
-    """Add (weight / 2) ‖A x + b‖² of all tasks of one's own to R. Returns how many rows are in use then."""
+    """Add (weight / 2) ‖A x + b‖² of all user-defined tasks to R. Returns how many rows are in use then."""
     inputs, at, V, T = tasks.targets, tasks.user_start, space.V, space.T
     k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
     for _ in range(tasks.n_user):

@@ -1,7 +1,7 @@
 """The inequalities of (27)(28), G β ≤ h, which are written out only for the rows that β violates.
 
 Rows are numbered: F facets and the least normal force of each of P points, then their P largest normal forces, d upper torque
-limits, d lower ones, and the rows of one's own. What every problem needs is compiled into the search (`jit_forceinline`), what few
+limits, d lower ones, and the user-defined rows. What every problem needs is compiled into the search (`jit_forceinline`), what few
 need is not: left to itself, the compiler takes in neither, and a tick with many active rows takes 6 % longer.
 """
 
@@ -30,7 +30,7 @@ class Inequalities(NamedTuple):
     torque_limits: Any  # (d,), N·m
     inputs: Any  # what `user_terms.UserTerms` packed
     bounds: Any  # where in it P least and P largest normal forces start, N
-    user_start: Any  # where rows of one's own start, one group after the other: block, number m of rows, G (m, n), h (m,)
+    user_start: Any  # where user-defined rows start, one group after the other: block, number m of rows, G (m, n), h (m,)
     n_user_groups: Any  # how many groups there are
     has_optional: Any  # whether there are any of these, or a largest normal force
 
@@ -102,7 +102,7 @@ def force_rows_of(limits: Inequalities):
 
 @jit
 def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
-    """`violated_row` for largest normal forces and rows of one's own, measured on rows of unit length.
+    """`violated_row` for largest normal forces and user-defined rows, measured on rows of unit length.
 
     forces, tau: (k,), (d,), those at β. qdd: (nv,), memory.
     """
@@ -157,7 +157,7 @@ def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau
 
 @jit
 def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
-    """`row_in_beta` for the rows of one's own, by their own number."""
+    """`row_in_beta` for the user-defined rows, by their own number."""
     V, T, inputs, at = space.V, space.T, limits.inputs, limits.user_start
     k, nb = V.shape[0] - nv, V.shape[1] - 1
     clear(out)

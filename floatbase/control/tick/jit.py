@@ -40,7 +40,7 @@ cache_error = ""  # why what is compiled cannot be kept on disk, in words
 
 
 def source_digest(folder: Path = Path(__file__).parent) -> int:
-    """A number for the text of this folder and for the constants of other rooms that numba compiles in."""
+    """A number for the text of this folder and for the constants of other packages that numba compiles in."""
     text = repr(
         (INCONSISTENCY_TOLERANCE, CONSTRAINT_RANK_TOLERANCE, CONSTRAINT_NOISE, FEASIBILITY_TOLERANCE, UNIT_NORM_TOLERANCE)
     ).encode()

@@ -1,4 +1,4 @@
-"""One moment of the compiled tick, as tasks, constraints and rows of one's own see it: only what they ask for is computed."""
+"""One moment of the compiled tick, as tasks, constraints and user-defined rows see it: only what they ask for is computed."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
     """Tree, links, contacts, tasks and limits as `problem_arrays.pack_problem` and `user_terms.UserTerms` laid them out.
 
     sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets, numbers of
-        contacts of one's own, tasks of one's own, groups of rows of one's own; 1 or 0: whether all contacts are points, and
+        user-defined contacts, user-defined tasks, groups of user-defined rows; 1 or 0: whether all contacts are points, and
         `Inequalities.has_optional`.
     int_tables, float_tables: whole and real numbers of all tables, one table after the other, as in a workspace.
     inputs: as for `tick`.
@@ -72,7 +72,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
 def workspace_sizes(sizes, n_user_rows):
     """How many real and how many whole numbers a tick needs.
 
-    sizes: as for `unpack`. n_user_rows: number of rows of all tasks of one's own.
+    sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.
     """
     n_joints, _, _, m, _, n_tasks, d, k = (int(size) for size in sizes[:8])
     base = 6
@@ -124,7 +124,7 @@ def make_tick(digest):
 
         q, v: (nq,), (nv,), the state.
         inputs: what changes from tick to tick, as `user_terms.UserTerms` packs it: targets, least and largest normal force of each point,
-            then contacts, tasks and rows of one's own.
+            then contacts, tasks and user-defined rows.
         sizes, int_tables, float_tables: as for `unpack`; few arrays, since each costs.
         M, h, J, Ag, oMi: the views of `problem_arrays.Dynamics` for q and v.
         float_workspace, int_workspace: workspaces of `workspace_sizes` numbers.

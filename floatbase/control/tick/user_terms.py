@@ -1,4 +1,4 @@
-"""What a tick is given beside the state: moving targets, and the numbers of tasks, constraints and rows of one's own."""
+"""What a tick is given beside the state: moving targets, and the numbers of tasks, constraints and user-defined rows."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class TickInputs(NamedTuple):
     """What one tick is given."""
 
     packed: Array  # targets, least and largest normal force of each point, then own contacts, tasks and rows
-    n_user_rows: int = 0  # of all tasks of one's own
+    n_user_rows: int = 0  # of all user-defined tasks
     contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each own contact
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType(
         {}
-    )  # weight and residual of tasks of one's own, by their number
+    )  # weight and residual of user-defined tasks, by their number
     normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))  # least and largest of each point, (P,)
-    inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of rows of one's own
+    inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of user-defined rows
 
 
 class UserTerms:

@@ -23,7 +23,7 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
 def corner_table(minimum: npt.ArrayLike = (-1.5, -1.5), curvature: npt.ArrayLike = (1.0, 0.5)) -> fb.QP:
-    """The document's table with three walls: a bowl with its lowest point at `minimum`, in the plane (along, up).
+    """The course text's table with three walls: a bowl with its lowest point at `minimum`, in the plane (along, up).
 
     Rows: table up ≥ 0, ramp along - 3 up ≤ 2, roof 2 along + 3 up ≤ 2, wall along ≥ -3.
     """

@@ -34,7 +34,7 @@ _STYLES = ("-", "--", ":")
 
 
 def show_table(lowest: float) -> str:
-    """The document's table and a bowl with its lowest point so far above it: where the marble rests and what the row costs.
+    """The course text's table and a bowl with its lowest point so far above it: where the marble rests and what the row costs.
 
     lowest: m, negative below the table. Returns HTML.
     """

@@ -9,7 +9,7 @@ from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 README = NOTEBOOKS.parent / "README.md"
-# number -> title, equations of the document; a lesson is ready once a notebook has its number
+# number -> title, equations of the course text; a lesson is ready once a notebook has its number
 PLANNED = {
     "05": ("Steering the centre of mass", "(20)-(25)"),
     "06": ("Friction cones", "(28)"),
@@ -56,7 +56,7 @@ def title_of(source: Path) -> str:
 
 
 def equations_taught(lesson: Path) -> set[str]:
-    """The equations and appendices of the document that a lesson teaches, "(9)" or "App. A": what its cells say as metadata."""
+    """The equations and appendices of the course text that a lesson teaches, "(9)" or "App. A": what its cells say as metadata."""
     return {equation for cell in read_notebook(lesson).cells for equation in cell.metadata.get("teaches", [])}
 
 

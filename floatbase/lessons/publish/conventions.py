@@ -18,7 +18,7 @@ _TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|in
 def page() -> str:
     """The page of conventions as Markdown."""
     first, *rest = _with_symbol_table(conventions.__doc__ or "").split("\n", 1)
-    rows = [f"| {room} | `{name}` | {value} | {reason} |" for room, name, value, reason in tolerances()]
+    rows = [f"| {package} | `{name}` | {value} | {reason} |" for package, name, value, reason in tolerances()]
     return "\n".join(
         [
             "# Conventions",

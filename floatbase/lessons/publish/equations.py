@@ -1,7 +1,7 @@
 """The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; the formulas stand in `formulas`.
 
 A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as in "App. A: …", stands for
-them. Public is what a room exports. A test counts where it names that function, a lesson where the metadata of a cell says that
+them. Public is what a package exports. A test counts where it names that function, a lesson where the metadata of a cell says that
 it teaches the equation.
 """
 
@@ -25,14 +25,14 @@ TITLES = {formula.number: formula.title for formula in FORMULAS}
 _LEADING_NUMBERS = re.compile(r"\s*((?:\(\d+\))+|App\. [ABC])")
 _NUMBER = re.compile(r"\(\d+\)|App\. [ABC]")
 _TESTS = Path(floatbase.__file__).parents[1] / "tests"
-_SKIPPED_PACKAGES = ("viewer", "lessons", "playground")  # rooms that show and teach them
+_SKIPPED_PACKAGES = ("viewer", "lessons", "playground")  # packages that show and teach them
 
 
 @dataclass(frozen=True)
 class Entry:
     """One public thing that implements equations.
 
-    path: as users import it, room and name, such as "dynamics.forces_from_torques". equations: their numbers, such as "(9)".
+    path: as users import it, package and name, such as "dynamics.forces_from_torques". equations: their numbers, such as "(9)".
     tests: those that name it, as "file::test".
     """
 
@@ -52,7 +52,7 @@ def entries() -> list[Entry]:
         start = _LEADING_NUMBERS.match(docstring)
         if start:
             tests = set().union(*(named.get(maker, set()) for maker in makers))
-            if path.count(".") > 1:  # room.Class.member
+            if path.count(".") > 1:  # package.Class.member
                 tests &= named.get(path.rsplit(".", 1)[1], set())
             found.append(Entry(path, tuple(_NUMBER.findall(start[1])), tuple(sorted(tests))))
     return found
@@ -65,7 +65,7 @@ def table() -> str:
     lines = [
         "# The map: equation → function → test → lesson",
         "",
-        "Every equation of the document *Controlling Floating-Based Robots* that the course follows, section by section, in",
+        "Every equation of the course text *Controlling Floating-Based Robots* that the course follows, section by section, in",
         "our own words. Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish map`; do not edit. A",
         "function such as `dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
     ]
@@ -74,7 +74,7 @@ def table() -> str:
         for formula in (formula for formula in FORMULAS if formula.section == section.number):
             lessons = [name for name, those in taught.items() if formula.number in those]
             lines += _equation_lines(formula, [entry for entry in found if formula.number in entry.equations], lessons)
-    lines += ["", "## Notes of the document", "", "The lessons name some of them by number.", ""]
+    lines += ["", "## Notes of the course text", "", "The lessons name some of them by number.", ""]
     return "\n".join([*lines, *(f"{number}. {note}" for number, note in NOTES.items())]) + "\n"
 
 
@@ -95,22 +95,22 @@ def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) ->
 def _public_objects() -> Iterator[tuple[str, str, list[str]]]:
     """Path, docstring and the names that make it, of every public function, class, method and property, each once."""
     own = list(_exported_objects())
-    for room, name, value in own:
+    for package, name, value in own:
         makers = [name] + [maker for _, maker, made in own if _returns(made) == name]
-        yield f"{room}.{name}", inspect.getdoc(value) or "", makers
+        yield f"{package}.{name}", inspect.getdoc(value) or "", makers
         for member, thing in vars(value).items() if inspect.isclass(value) and not _is_protocol(value) else ():
             if not member.startswith("_"):
-                yield f"{room}.{name}.{member}", inspect.getdoc(thing) or "", makers
+                yield f"{package}.{name}.{member}", inspect.getdoc(thing) or "", makers
 
 
 def _exported_objects() -> Iterator[tuple[str, str, object]]:
-    """Room, name and value of every function and class that a room exports and defines itself."""
+    """Package, name and value of every function and class that a package exports and defines itself."""
     for found in pkgutil.iter_modules(floatbase.__path__):
         if found.name.startswith("_") or found.name in _SKIPPED_PACKAGES:
             continue
-        room = import_module(f"floatbase.{found.name}")
-        for name in getattr(room, "__all__", vars(room)):
-            value, home = getattr(room, name), f"{room.__name__}."
+        package = import_module(f"floatbase.{found.name}")
+        for name in getattr(package, "__all__", vars(package)):
+            value, home = getattr(package, name), f"{package.__name__}."
             if not name.startswith("_") and f"{getattr(value, '__module__', None)}.".startswith(home):
                 yield found.name, name, value
 

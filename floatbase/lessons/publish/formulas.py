@@ -1,4 +1,4 @@
-r"""The equations of the document, written out, each with a sentence of our own; its sections and notes in a line each.
+r"""The equations of the course text, written out, each with a sentence of our own; its sections and notes in a line each.
 
 The map (`equations`) shows them beside the functions, so that who has no other text can read the lessons. Formulas are LaTeX,
 in the notation of the lessons: M, h, S, J, A, b, λ = forces of the ground, τ = torques, q̈ = accelerations.
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 
 class Section(NamedTuple):
-    """A section of the document. number: "§2.1" or "App. A". summary: what it is about, in a sentence or two."""
+    """A section of the course text. number: "§2.1" or "App. A". summary: what it is about, in a sentence or two."""
 
     number: str
     title: str
@@ -18,7 +18,7 @@ class Section(NamedTuple):
 
 
 class Formula(NamedTuple):
-    """An equation of the document.
+    """An equation of the course text.
 
     number: "(9)" or "App. A".
     section: the number of the section that it stands in.

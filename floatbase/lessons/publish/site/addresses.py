@@ -1,4 +1,4 @@
-"""What stands where on the pages of the library: rooms, what they export, and the address of each name."""
+"""What stands where on the pages of the library: packages, what they export, and the address of each name."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 import floatbase
 
-# room -> what it is for, in the order of the floors
-ROOMS = {
+# package -> what it is for, in the order of the floors
+PACKAGES = {
     "floatbase": "the front door",
     "floatbase.robots": "robots and their states",
     "floatbase.dynamics": "contacts, equations of motion, spaces",
@@ -33,26 +33,26 @@ ROOMS = {
 
 @cache
 def addresses() -> dict[str, str]:
-    """What texts call a thing -> its address on these pages: alone, with its room, and as a member of its class."""
+    """What texts call a thing -> its address on these pages: alone, with its package, and as a member of its class."""
     found: dict[str, str] = {}
-    for room in list(ROOMS)[1:]:
-        for name, value in exported(room):
-            address = f"{room}.{name}"
+    for package in list(PACKAGES)[1:]:
+        for name, value in exported(package):
+            address = f"{package}.{name}"
             for called in (name, address):
                 found.setdefault(called, address)
             for member in members(value):
                 for called in (f"{name}.{member}", f"{address}.{member}"):
                     found.setdefault(called, f"{address}.{member}")
     front = {f"floatbase.{name}": found[name] for name in floatbase.__all__}
-    return {**found, **{room: room for room in ROOMS}, **front}
+    return {**found, **{package: package for package in PACKAGES}, **front}
 
 
-def exported(room: str) -> list[tuple[str, Any]]:
-    """Name and value of all that a room exports; of a module without `__all__`, what it defines itself."""
-    module = import_module(room)
+def exported(package: str) -> list[tuple[str, Any]]:
+    """Name and value of all that a package exports; of a module without `__all__`, what it defines itself."""
+    module = import_module(package)
     names = getattr(module, "__all__", None)
     if names is None:
-        own = [name for name, value in vars(module).items() if getattr(value, "__module__", None) == room]
+        own = [name for name, value in vars(module).items() if getattr(value, "__module__", None) == package]
         names = [name for name in own if not name.startswith("_")]
     return [(name, getattr(module, name)) for name in sorted(names, key=str.lower)]
 

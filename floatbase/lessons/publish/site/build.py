@@ -157,7 +157,7 @@ def _with_anchors(page: str) -> str:
         return f'- <details class="tests"><summary>tests that use them, in {count}</summary>{listed}</details>'
 
     page = _TESTS.sub(fold, page)
-    page = page.replace("## Notes of the document", f"({NOTES_ANCHOR})=\n## Notes of the document")
+    page = page.replace("## Notes of the course text", f"({NOTES_ANCHOR})=\n## Notes of the course text")
     return _FUNCTIONS.sub(link, _HEADINGS.sub(lambda match: f"({anchor_of(match[1])})=\n{match[0]}", page))
 
 

@@ -1,4 +1,4 @@
-"""The pages of the library: one for each room, with all that it exports."""
+"""The pages of the library: one for each package, with all that it exports."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any
 
 import floatbase
-from floatbase.lessons.publish.site.addresses import ROOMS, addresses, exported, members
+from floatbase.lessons.publish.site.addresses import PACKAGES, addresses, exported, members
 from floatbase.lessons.publish.site.docstrings import to_restructured_text
 
 _MAX_VALUE_LENGTH = 90  # characters of a constant's value that are shown
@@ -15,15 +15,15 @@ _MAX_VALUE_LENGTH = 90  # characters of a constant's value that are shown
 
 def pages() -> dict[str, str]:
     """File name -> text, reStructuredText, of all pages of the library, with one that lists them."""
-    listed = "\n".join(f"   {room} <{room}>" for room in ROOMS)
-    rows = "\n".join(f"* :doc:`{room}`: {about}" for room, about in ROOMS.items())
+    listed = "\n".join(f"   {package} <{package}>" for package in PACKAGES)
+    rows = "\n".join(f"* :doc:`{package}`: {about}" for package, about in PACKAGES.items())
     index = f"{_meta_description('floatbase')}{_title('Library')}{_INTRODUCTION}\n\n{rows}\n\n.. toctree::\n   :hidden:\n\n{listed}\n"
-    return {"index.rst": index, **{f"{room}.rst": _package_page(room) for room in ROOMS}}
+    return {"index.rst": index, **{f"{package}.rst": _package_page(package) for package in PACKAGES}}
 
 
 _INTRODUCTION = (
-    "``import floatbase as fb`` has the names that most programs need; everything else is imported from its room. Each page "
-    "lists what its room exports. A number such as :ref:`(9) <eq-9>` leads to the equation; symbols, frames, signs and units "
+    "``import floatbase as fb`` has the names that most programs need; everything else is imported from its package. Each page "
+    "lists what its package exports. A number such as :ref:`(9) <eq-9>` leads to the equation; symbols, frames, signs and units "
     "are those of :doc:`the conventions </lessons/conventions>`."
 )
 
@@ -32,18 +32,18 @@ def _is_code(value: Any) -> bool:
     return inspect.isclass(value) or inspect.isroutine(value) or hasattr(value, "__wrapped__")
 
 
-def _package_page(room: str) -> str:
-    head = f"{_meta_description(room)}{_title(room)}.. automodule:: {room}\n   :no-members:\n\n"
-    if room == "floatbase":
+def _package_page(package: str) -> str:
+    head = f"{_meta_description(package)}{_title(package)}.. automodule:: {package}\n   :no-members:\n\n"
+    if package == "floatbase":
         known = addresses()
         return head + _name_table([(f"fb.{name}", known[name], getattr(floatbase, name)) for name in floatbase.__all__])
-    things = [(name, f"{room}.{name}", value) for name, value in exported(room)]
+    things = [(name, f"{package}.{name}", value) for name, value in exported(package)]
     shown = [(name, address, value) for name, address, value in things if _is_code(value) or isinstance(value, ModuleType)]
     return head + _name_table(shown) + "\n".join(_autodoc_entry(*thing) for thing in things)
 
 
-def _meta_description(room: str) -> str:
-    return f".. meta::\n   :description: The library floatbase, {room}: {ROOMS[room]}\n\n"
+def _meta_description(package: str) -> str:
+    return f".. meta::\n   :description: The library floatbase, {package}: {PACKAGES[package]}\n\n"
 
 
 def _title(text: str) -> str:
