@@ -130,7 +130,15 @@ def commands() -> Faults:
 
 def pages() -> Faults:
     """The pages that the code writes are up to date, and every equation has a function, a test and a lesson."""
-    from floatbase.lessons.publish import NOTEBOOKS, README, conventions, equations, lesson_table, read_notebook, readme_with_table
+    from floatbase.lessons.publish import (
+        NOTEBOOKS,
+        README,
+        conventions,
+        equations,
+        lesson_table,
+        read_notebook,
+        readme_with_table,
+    )
 
     made = {
         NOTEBOOKS / "equations.md": equations.table(),

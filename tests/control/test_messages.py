@@ -52,7 +52,7 @@ class Fixed(Own):
         vars(self).update({"residual": lambda eom, t=0.0: fb.Affine.identity(3)} | wrong)
 
 
-def rows(block: str, n: int, m: int | None = None, owners: tuple[str, ...] = ()) -> Rows:
+def rows(block: str, n: int, m: int | None = None, owners: tuple[str, ...] = ()) -> LinearInequality:
     return LinearInequality("r", block, (np.eye(n), np.ones(m or n)), owners)
 
 
